@@ -8,7 +8,6 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.consensus import Consensus, agreement
-from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.pipeline.run_repair import RepairedPose
 from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
@@ -78,9 +77,8 @@ def with_repair(model: BodyModel, pose: PoseRecord, repaired: RepairedPose) -> P
     if repaired.alternatives is None:
         return pose
     remarks = without_uncertainty(pose.remark, alternatives=True)
-    moved = {n for h in repaired.alternatives for n in limbs_elsewhere(PosedBody(model, repaired.pose), h.body)}
     if repaired.alternatives:
-        remarks.append(may_be_elsewhere([x.name for x in limbs(model) if x.name in moved]))
+        remarks.append(may_be_elsewhere(PosedBody(model, repaired.pose), repaired.alternatives))
     return replace(pose, remark=", ".join(remarks))
 
 

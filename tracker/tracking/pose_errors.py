@@ -64,8 +64,8 @@ def limb_odds(model: BodyModel, covariances: Array) -> Array:
 def elsewhere_odds(nats: Array, is_searched: Sequence[bool]) -> Array:
     """Return the log odds that each limb is off and lost, (n_limbs, 2), by the colours of the run.
 
-    A limb may look unusual because something hides it. A search that has compared its place with others on that frame,
-    and knows none within `CLEAR_NATS`, speaks against the colours by as much.
+    A limb may look unusual because it is partly occluded. If a search has compared its place with others on that
+    frame, and found none within `CLEAR_NATS`, the log odds are lower by as much.
 
     Args:
         nats: how much likelier each limb is elsewhere, (n_limbs,); see `region_deficit.elsewhere_nats`.

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from tracker.body.limbs import limb_display_name
+from tracker.body.limbs import limb_display_name, limbs
+from tracker.body.model import PosedBody
+from tracker.fitting.hypothesis import Hypothesis, limbs_elsewhere
 
 _UNCERTAIN = " uncertain"
 _MAY_BE_ELSEWHERE = " may be elsewhere"
@@ -13,9 +15,11 @@ def uncertain(limb: str, reason: str = "") -> str:
     return f"{limb_display_name(limb)}{_UNCERTAIN}{reason}"
 
 
-def may_be_elsewhere(limbs: Sequence[str]) -> str:
-    """Return the remark that other poses, with limbs of these names elsewhere, are about as good."""
-    return f"{' and '.join(map(limb_display_name, limbs)) or 'body'}{_MAY_BE_ELSEWHERE}"
+def may_be_elsewhere(body: PosedBody, others: Sequence[Hypothesis]) -> str:
+    """Return the remark that other poses, with limbs elsewhere than in the pose of a body, are about as good."""
+    moved = {name for other in others for name in limbs_elsewhere(body, other.body)}
+    names = [limb_display_name(limb.name) for limb in limbs(body.model) if limb.name in moved]
+    return f"{' and '.join(names) or 'body'}{_MAY_BE_ELSEWHERE}"
 
 
 def without_uncertainty(remark: str, alternatives: bool = False) -> list[str]:

@@ -56,9 +56,10 @@ def test_only_angles_that_may_wind_are_unwrapped():
     start, limited = BODY.neutral(), BODY.dof_names.index("left_elbow.extension")
     to = start.copy()
     to[winds], to[limited] = start[winds] + 4.0, start[limited] + 4.0
-    step = shortest_step(BODY, to, start)
-    np.testing.assert_allclose(step[winds], 4.0 - 2 * np.pi)
-    assert step[limited] == pytest.approx(4.0)
+    for a, b, way in ((start, to, 1), (to, start, -1)):
+        step = shortest_step(BODY, b, a)
+        np.testing.assert_allclose(step[winds], way * (4.0 - 2 * np.pi))
+        assert step[limited] == pytest.approx(way * 4.0)
 
 
 def test_a_path_has_no_flip():

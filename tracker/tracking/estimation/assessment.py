@@ -5,12 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import covariance
-from tracker.fitting.hypothesis import Hypothesis, limbs_elsewhere
+from tracker.fitting.hypothesis import Hypothesis
 from tracker.geometry.arrays import Array
 from tracker.tracking import confidence
 from tracker.tracking.confidence import PoseQuality, Status, worst
@@ -102,11 +101,9 @@ def finalize(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFi
     )  # fmt: skip
     if not found.alternatives:
         return out
-    moved = {limb for other in found.alternatives for limb in limbs_elsewhere(found.body, other.body)}
-    names = [x.name for x in limbs(model) if x.name in moved]
     poses = tuple(b.values for b in bodies)
     return out.in_doubt(
-        may_be_elsewhere(names),
+        may_be_elsewhere(found.body, found.alternatives),
         [(*poses[:person], other.pose, *poses[person + 1 :]) for other in found.alternatives],
     )
 
