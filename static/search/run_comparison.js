@@ -30,6 +30,9 @@ export class RunComparison {
   #kept = new Set();
   /** @type {number | null | undefined} the last run; undefined before the first message */
   #run;
+  #isBusy = false;
+  /** @type {import("../model/series.js").Tab | null | undefined} the open tab at the end of a run whose comparison may follow */
+  #tabAtEnd;
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -45,6 +48,7 @@ export class RunComparison {
     this.#take = button("run-comparison-take", () => actions.takeReplaced());
     this.#end = button("run-comparison-end", () => actions.compareRange(false));
     store.subscribe((changed) => {
+      if (changed.has("state")) this.#followWork();
       if (changed.has("rangeComparison")) this.#followRun();
       else if (changed.has("drawer") && store.facts.drawer === null && this.#run) actions.compareRange(false);
       const isOpen = store.facts.drawer === "runs";
@@ -55,6 +59,14 @@ export class RunComparison {
     });
   }
 
+  /** Note the open tab when a run ends: its comparison follows, but a tab that is opened meanwhile stays. */
+  #followWork() {
+    const { state, drawer } = this.#store.facts;
+    const isBusy = !!state?.range?.running || !!state?.track.running;
+    if (this.#isBusy && !isBusy) this.#tabAtEnd = drawer;
+    this.#isBusy = isBusy;
+  }
+
   /** Open the tab when a run has replaced poses by better or worse ones. Closing the drawer ends it. */
   #followRun() {
     const run = this.#store.facts.rangeComparison?.run ?? null;
@@ -63,7 +75,9 @@ export class RunComparison {
     this.#run = run;
     if (isFirst || run === null) return;
     this.#kept.clear();
-    this.#open();
+    const isOther = this.#tabAtEnd !== undefined && this.#tabAtEnd !== this.#store.facts.drawer;
+    this.#tabAtEnd = undefined;
+    if (!isOther) this.#open();
   }
 
   #show() {

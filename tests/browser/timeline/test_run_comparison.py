@@ -107,3 +107,18 @@ async def test_gain_and_harm_of_a_run_are_opened_and_decided_by_stretch(page, en
     await page.locator("#close-drawer").click()
     await until(lambda: endpoint.heard("compare_range"))
     assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": None, "last": None}]
+
+
+async def test_a_comparison_leaves_a_tab_that_is_opened_after_its_run(page, endpoint):
+    await endpoint.broadcast(NOTHING)
+    for run, is_opened in enumerate((True, False)):
+        for running in (True, False):
+            endpoint.state["track"]["running"] = running
+            await endpoint.broadcast(endpoint.state)
+            await shows(page, f"quadrille.state.state.track.running === {str(running).lower()}")
+        if is_opened:
+            await page.keyboard.press("Shift+L")
+            await shows(page, "quadrille.state.drawer === 'doubts'")
+        await endpoint.broadcast(COMPARED | {"stretches": [stretch(24, 30, 6, "better")], "run": run})
+        await shows(page, f"quadrille.state.rangeComparison?.run === {run}")
+        assert await page.evaluate("quadrille.state.drawer") == ("doubts" if is_opened else "runs")
