@@ -12,6 +12,7 @@ from tracker.geometry.arrays import Array
 from tracker.pipeline.run_repair import RepairedPose
 from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import classify_limbs, probabilities, worst
+from tracker.tracking.estimation.limb_repair import MIN_GAIN_NATS
 from tracker.tracking.pose_errors import alternative_odds, elsewhere_odds, limb_odds, point_covariances
 from tracker.tracking.remarks import may_be_elsewhere, uncertain, without_uncertainty
 from tracker.tracking.run_confidence import log_odds
@@ -49,24 +50,32 @@ def assessed_by_tracks(
         repaired: how well it agrees with the colours of the run, and other poses by contours and colours together,
             which take the place of those of the tracker; None where that is not known.
     """
-    errors = point_covariances(model, found.covariances)
-    # For each limb the view without which it is farthest away.
-    of_limbs = [found.distances_m[:, np.isin(model.point_parts, x.parts)].max(axis=1) for x in limbs(model)]
-    reasons = [f" without {tracks.without[int(distances.argmax())]}" for distances in of_limbs]
-    odds = limb_odds(model, errors)
+    pose = replace(pose, errors=point_covariances(model, found.covariances))
+    odds, reasons = _apart(model, found, [f" without {view}" for view in tracks.without])
     if repaired is not None:
-        by_colors = elsewhere_odds(repaired.elsewhere, [x.name in repaired.searched for x in limbs(model)])
-        for i in np.flatnonzero(by_colors[:, 0] > odds[:, 0]):
-            reasons[i] = f": {repaired.against[i]}"
-        odds = np.maximum(odds, by_colors)
-        if repaired.alternatives is not None:
-            is_ambiguous, by_others = False, alternative_odds(model, pose.values, repaired.alternatives)
-            for i in np.flatnonzero(by_others[:, 0] > odds[:, 0]):
-                reasons[i] = ""  # the remark of `with_repair` says so
-            odds = np.maximum(odds, by_others)
+        is_ambiguous, odds = False, _with_run(model, pose, repaired, odds, reasons)
     elif features is not None and not tracks.has_history:
         odds = np.maximum(odds, log_odds(features))
-    return _classified(model, replace(pose, errors=errors), odds, reasons, is_ambiguous)
+    return _classified(model, pose, odds, reasons, is_ambiguous)
+
+
+def _apart(model: BodyModel, found: Consensus, reasons: Sequence[str]) -> tuple[Array, list[str]]:
+    """Return the log odds that each limb is off and lost, (n_limbs, 2), by how far other poses lie from it, and the
+    reason of the farthest of them."""
+    of_limbs = [found.distances_m[:, np.isin(model.point_parts, x.parts)].max(axis=1) for x in limbs(model)]
+    return limb_odds(model, point_covariances(model, found.covariances)), [reasons[int(d.argmax())] for d in of_limbs]
+
+
+def _with_run(model: BodyModel, pose: PoseRecord, repaired: RepairedPose, odds: Array, reasons: list[str]) -> Array:
+    """Return the log odds by the colours of the run and by other poses, too, (n_limbs, 2); put in their reasons."""
+    by_colors = elsewhere_odds(repaired.elsewhere, [x.name in repaired.searched for x in limbs(model)])
+    for i in np.flatnonzero(by_colors[:, 0] > odds[:, 0]):
+        reasons[i] = f": {repaired.against[i]}"
+    odds = np.maximum(odds, by_colors)
+    by_others = alternative_odds(model, pose.values, repaired.alternatives)
+    for i in np.flatnonzero(by_others[:, 0] > odds[:, 0]):
+        reasons[i] = ""  # the remark of `with_repair` says so
+    return np.maximum(odds, by_others)
 
 
 def with_repair(model: BodyModel, pose: PoseRecord, repaired: RepairedPose) -> PoseRecord:
@@ -74,8 +83,6 @@ def with_repair(model: BodyModel, pose: PoseRecord, repaired: RepairedPose) -> P
     the remark in place of the tracker's."""
     if repaired.trace:
         pose = replace(pose, trace=(*(x for x in pose.trace or () if x.kind != "repair"), *repaired.trace))
-    if repaired.alternatives is None:
-        return pose
     remarks = without_uncertainty(pose.remark, alternatives=True)
     if repaired.alternatives:
         remarks.append(may_be_elsewhere(PosedBody(model, repaired.pose), repaired.alternatives))
@@ -83,8 +90,8 @@ def with_repair(model: BodyModel, pose: PoseRecord, repaired: RepairedPose) -> P
 
 
 def with_alternatives(change: PoseChange, repaired: RepairedPose) -> PoseChange:
-    """Return a row with the alternatives of its repair in place of those of the tracker, if they were compared."""
-    if repaired.alternatives is None or change.pose is None:
+    """Return a row with the alternatives of its repair in place of those of the tracker."""
+    if change.pose is None:
         return change
     revision = change.pose.model_revision
     return replace(change, alternatives=tuple(Alternative(h.pose, revision) for h in repaired.alternatives))
@@ -96,7 +103,9 @@ def assessed_keyframe(
 ) -> AssessmentChange | None:  # fmt: skip
     """Return what is known about a keyframe, by the same evidence as of other poses.
 
-    A person has chosen among alternatives, so that they do not make it doubtful.
+    A person has seen more than a track has, and has chosen among poses that are about as good. If the repair has
+    examined the keyframe, tracks therefore only propose. It is doubtful where its contours pull it away, the colours of
+    the run find a limb elsewhere, or another pose is clearly better.
 
     Args:
         model: the body.
@@ -114,7 +123,24 @@ def assessed_keyframe(
     trust = tracks.trust if repaired is None else tracks.trust * repaired.trust
     found = agreement(model, keyframe.values, tracks.poses, trust)
     plain = replace(keyframe, remark="")
-    return AssessmentChange.of(person, frame, assessed_by_tracks(model, plain, found, tracks, False, None, repaired))
+    if repaired is None or repaired.refined is None:
+        pose = assessed_by_tracks(model, plain, found, tracks, False, None, repaired)
+    else:
+        plain = replace(plain, errors=point_covariances(model, found.covariances))
+        pose = _assessed_by_its_frame(model, plain, repaired, repaired.refined)
+    return AssessmentChange.of(person, frame, pose)
+
+
+def _assessed_by_its_frame(
+    model: BodyModel, keyframe: PoseRecord, repaired: RepairedPose, refined: Array
+) -> PoseRecord:
+    """Return a keyframe with the status by how far its contours pull it, (n_values,), and by clearly better poses."""
+    better = tuple(h for h in repaired.alternatives if h.cost < -MIN_GAIN_NATS)
+    repaired = repaired._replace(alternatives=better)
+    pulled = agreement(model, keyframe.values, refined[None], np.ones((1, len(limbs(model)))))
+    odds, reasons = _apart(model, pulled, [": contours elsewhere"])
+    odds = _with_run(model, keyframe, repaired, odds, reasons)
+    return _classified(model, with_repair(model, keyframe, repaired), odds, reasons, False)
 
 
 def _classified(

@@ -65,11 +65,13 @@ class RepairedPose(NamedTuple):
     """The searches of the repair: those that were taken, and the last one."""
     covariance: Array | None = None
     """Of the pose, (n_dofs, n_dofs), rad and metres; None where it stayed as tracked."""
-    alternatives: tuple[Hypothesis, ...] | None = None
-    """Other poses with a limb elsewhere that are about as good by contours and colours together. Their costs are
-    relative to that of the pose, nats. None where none were compared."""
+    alternatives: tuple[Hypothesis, ...] = ()
+    """Other poses with a limb elsewhere that are about as good by contours and colours together, or better where the
+    pose stays. Their costs are relative to that of the pose, nats."""
     searched: tuple[str, ...] = ()
     """Names of the limbs for which a search has proposed places all over, and has left them where they are."""
+    refined: Array | None = None
+    """Pose to which the contours of the frame pull it, (n_values,); None where it was not examined. Keyframes are."""
 
 
 class RepairStep(NamedTuple):
@@ -124,10 +126,10 @@ class RunRepair:
             for k in self._frames:
                 scores[k] = known.score(self._regions(known, k), self._bodies[k]).nats
                 yield RepairStep(first + len(scores), first + 3 * n)
-            if self._covariance_of is None:
-                break
             for done in self._repair(known, self._elsewhere(scores)[0]):
                 yield RepairStep(first + n + min(done, n), first + 3 * n)
+            if self._covariance_of is None:
+                break
             self._select_alternatives()
             changed = [k for k in self._frames if self._bodies[k] is not before[k]]
             if not changed or first == 2 * n * (_MAX_TRIES - 1):
@@ -195,7 +197,8 @@ class RunRepair:
 
     def _repair(self, known: RegionModel, elsewhere: Mapping[int, Array]) -> Iterator[int]:
         """Examine all frames, the one with the largest contradiction first. Yields how many are done."""
-        due = [(-float(self._of_person(elsewhere[k], i).max()), k, i) for k in self._frames for i in self._free(k)]
+        everybody = ((k, i) for k in self._frames for i in self._subjects.tracked)
+        due = [(-float(self._of_person(elsewhere[k], i).max()), k, i) for k, i in everybody]
         heapify(due)
         colors, failures, visits = self._part_colors(), 0, Counter[tuple[int, int]]()
         while due:
@@ -206,18 +209,20 @@ class RunRepair:
             search = limbs_to_search(self._subjects.models[i], self._of_person(elsewhere[k], i)) if is_searched else []
             others = self._other_poses(k, i)
             apart = self._apart(k, i, others)
-            if search or apart:
-                is_moved = self._examine(known, colors[i], k, i, others, apart, search)
+            if search or apart or i in self._subjects.keyframes_at(k):
+                is_better = self._examine(known, colors[i], k, i, others, apart, search)
                 if search:
-                    failures = 0 if is_moved else failures + 1
-                if is_moved:
+                    failures = 0 if is_better else failures + 1
+                if is_better:
                     around = [n for n in self._around(k) if i in self._free(n) and visits[n, i] < _MAX_TRIES]
                     for n in around:
                         heappush(due, (-np.inf, n, i))
             yield len(visits)
 
     def _free(self, frame: int) -> list[int]:
-        """Return the tracked people who have no keyframe on a frame."""
+        """Return the tracked people whose pose on a frame may be replaced: who have no keyframe there."""
+        if self._covariance_of is None:
+            return []
         return [i for i in self._subjects.tracked if i not in self._subjects.keyframes_at(frame)]
 
     def _around(self, frame: int) -> list[int]:
@@ -250,19 +255,24 @@ class RunRepair:
         self, known: RegionModel, colors: PartColors | None, frame: int, person: int, others: Sequence[Array],
         apart: Sequence[Limb], search: Sequence[Limb],
     ) -> bool:  # fmt: skip
-        """Compare the pose of a person on a frame with others; return whether another takes its place."""
+        """Compare the pose of a person on a frame with others; return whether another is better.
+
+        It takes the place of the pose if that is free.
+        """
         bodies = self._bodies[frame]
         model = bodies[person].model
         guesses = [bodies, *(with_body(bodies, person, PosedBody(model, pose)) for pose in others)]
         views = common_evidence(self._observer, frame, guesses, self._settings)
         evidence = FrameEvidence(views, known, known.frame(views, bodies), colors, self._subjects.active_dofs[person])
         found = better_limbs(evidence, bodies, person, self._settings, search, others, apart)
+        if is_staying := person not in self._free(frame):
+            found = found.staying(bodies[person])
         self._found[frame, person] = found
         taken = (entry for entry in self._traces.get((frame, person), ()) if entry.taken)
         self._traces[frame, person] = (*taken, found.entry)
         if search or found.is_better:
             self._searched[frame, person] = tuple(limb.name for limb in search)
-        if found.is_better:
+        if found.is_better and not is_staying:
             self._moved.add((frame, person))
             self._bodies[frame] = with_body(bodies, person, PosedBody(model, found.pose))
         return found.is_better
@@ -283,9 +293,9 @@ class RunRepair:
                     self._traces[k, i] = (*before, last._replace(after_nats=round(best.cost, 1), taken=True))
 
     def _candidates(self, frame: int, person: int) -> list[Hypothesis]:
-        """Return the pose of a person on a frame, and the alternatives that are elsewhere or cheaper."""
+        """Return the pose of a person on a frame, and the alternatives that are elsewhere or cheaper if it is free."""
         body, examined = self._bodies[frame][person], self._found.get((frame, person))
-        if examined is None:
+        if examined is None or person not in self._free(frame):
             return [Hypothesis(body)]
         cost = examined.cost
         others = (h for h in examined.alternatives if h.cost < cost or distance_m(h.body, body) > SAME_POSE_M)
@@ -298,19 +308,19 @@ class RunRepair:
         for i, of_person in self._tracks.items():
             own = slice(self._first[i], self._first[i + 1])
             for k, tracks in of_person.items():
+                examined = self._found.get((k, i))
+                refined = None if examined is None else examined.refined
                 trust, pose = self._trusted(k, i, tracks), self._bodies[k][i].values
                 known = elsewhere[k][own], tuple(against[k][own])
                 out[i][k] = RepairedPose(
                     pose, trust, *known, self._traces.get((k, i), ()), self._covariances.get((k, i)),
-                    self._rivals(k, i), self._searched.get((k, i), ()),
+                    self._rivals(k, i), self._searched.get((k, i), ()), refined,
                 )  # fmt: skip
         return out
 
-    def _rivals(self, frame: int, person: int) -> tuple[Hypothesis, ...] | None:
-        """Return the poses of a person that are about as good as the one on a frame, with a limb elsewhere."""
+    def _rivals(self, frame: int, person: int) -> tuple[Hypothesis, ...]:
+        """Return the poses of a person that are at least about as good as the one on a frame, with a limb elsewhere."""
         body, examined = self._bodies[frame][person], self._found.get((frame, person))
-        if self._covariance_of is None:
-            return None
         others = () if examined is None else (replace(h, cost=h.cost - examined.cost) for h in examined.alternatives)
         return tuple(h for h in others if h.cost < CLEAR_NATS and distance_m(h.body, body) > SAME_POSE_M)
 

@@ -79,7 +79,7 @@ def alternative_odds(model: BodyModel, pose: Array, alternatives: Sequence[Hypot
     """Return the log odds that each limb is off and lost, (n_limbs, 2), by other poses on the same evidence.
 
     A limb is as likely elsewhere as all poses together that have it there. It is at most as likely elsewhere as not:
-    poses that are clearly better have been taken.
+    poses that are clearly better have been taken, unless the pose stays.
 
     Args:
         model: the body.

@@ -14,7 +14,7 @@ from tracker.fitting.consensus import agreement
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline import track_session
-from tracker.pipeline.assessed_poses import assessed_by_tracks, with_alternatives, with_repair
+from tracker.pipeline.assessed_poses import assessed_by_tracks, assessed_keyframe, with_alternatives, with_repair
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.run_repair import RepairedPose, RepairStep, RunRepair
 from tracker.pipeline.stored_run import TrackPlan, stored_run
@@ -306,12 +306,11 @@ def test_poses_that_the_repair_found_about_as_good_take_the_place_of_those_of_th
     record = PoseRecord(pose, ("tracked",) * len(pose), 7, remark=f"{noted}, {back}")
     change = PoseChange("person", 4, record, (Alternative(pose + 0.3, 7),))
     agreed = agreement(model, pose, tracks.poses, tracks.trust)
-    unknown = RepairedPose(pose, np.ones((3, n), np.bool_), np.full(n, -5.0), ("",) * n)
+    alone = RepairedPose(pose, np.ones((3, n), np.bool_), np.full(n, -5.0), ("",) * n)
     rivals = (Hypothesis(PosedBody(model, other), cost=0.5),)
     for repaired, status, remarks, poses in (
-        (unknown, "doubtful", [noted, back], [pose + 0.3]),
-        (unknown._replace(alternatives=()), "good", [back], []),
-        (unknown._replace(alternatives=rivals), "doubtful", [back, "left arm may be elsewhere"], [other]),
+        (alone, "good", [back], []),
+        (alone._replace(alternatives=rivals), "doubtful", [back, "left arm may be elsewhere"], [other]),
     ):  # fmt: skip
         kept = with_alternatives(change, repaired)
         assert [a.values.tolist() for a in kept.alternatives] == [p.tolist() for p in poses]
@@ -321,3 +320,38 @@ def test_poses_that_the_repair_found_about_as_good_take_the_place_of_those_of_th
         assessed = assessed_by_tracks(model, known, agreed, tracks, is_ambiguous, None, repaired)
         assert assessed.status == status
         assert [r for r in assessed.remark.split(", ") if r != "left arm uncertain: "] == remarks
+
+
+@pytest.mark.parametrize(
+    ("pulled_m", "cost", "status", "remark"),
+    [
+        (0.0, None, "good", ""),
+        (0.04, None, "good", ""),
+        (0.08, None, "doubtful", "left arm uncertain: contours elsewhere"),
+        (0.15, None, "lost", "left arm uncertain: contours elsewhere"),
+        (0.0, -2.0, "good", ""),
+        (0.0, -7.0, "doubtful", "left arm may be elsewhere"),
+    ],
+)
+def test_a_keyframe_is_in_doubt_by_its_own_frame_and_not_by_tracks_alone(pulled_m, cost, status, remark):
+    model = load_model("gavrila22")
+    pose, n = model.neutral(), len(limbs(model))
+
+    def moved(by_m):
+        angle = by_m / np.linalg.norm(model.points_world(pose)[wrist] - model.points_world(pose)[shoulder])
+        other = pose.copy()
+        other[model.value_names.index("left_shoulder.elevation")] += angle
+        return other
+
+    shoulder, wrist = (model.point_names.index(f"left_{name}") for name in ("shoulder", "wrist"))
+    tracks = FrameTracks(np.array([moved(0.09)] * 3), np.ones((3, n)), ("a", "b", "c"))
+    others = () if cost is None else (Hypothesis(PosedBody(model, moved(0.4)), cost=cost),)
+    repaired = RepairedPose(
+        pose, np.ones((3, n), np.bool_), np.full(n, -50.0), ("",) * n, alternatives=others, refined=moved(pulled_m)
+    )
+    found = assessed_keyframe(model, "person", 4, PoseRecord(pose, ("manual",) * len(pose), 1), tracks, repaired)
+    assert (found.status, found.remark) == (status, remark)
+    tip = np.sqrt(np.trace(found.errors[wrist]))
+    assert tip == pytest.approx(0.09, abs=0.03)  # the error bars tell how far the tracks are apart
+    by_tracks = assessed_keyframe(model, "person", 4, PoseRecord(pose, ("manual",) * len(pose), 1), tracks)
+    assert by_tracks.status == "doubtful"

@@ -52,21 +52,22 @@ def contours(monkeypatch):
     monkeypatch.setattr(run_repair, "covariance_by_contours", known)
 
 
-def repaired(walk, keyframes=(), deviation=0.01, active=None, alternatives=None):
+def repaired(walk, keyframes=None, deviation=0.01, active=None, alternatives=None, seen=None):
     """The steps of a repair whose tracks agree with one another on the wrong leg.
 
+    `keyframes` are poses by frame that a person has set, `seen` those of the tracks where they are other ones.
     `deviation` is the standard deviation of the tracked poses, rad and metres; None to compare them only.
     `alternatives` are poses by frame that the tracker found about as good.
     """
     others = {(k, 0): [pose] for k, pose in (alternatives or {}).items()}
     n_limbs = len(limbs(walk.model))
+    tracked = {k: b.values for k, (b,) in enumerate(walk.tracked)}
     tracks = {
-        k: FrameTracks(np.array([b.values] * 3), np.ones((3, n_limbs)), ("A", "B", "C"))
-        for k, (b,) in enumerate(walk.tracked)
+        k: FrameTracks(np.array([pose] * 3), np.ones((3, n_limbs)), ("A", "B", "C"))
+        for k, pose in (tracked | (seen or {})).items()
     }
-    stay = {k: {0: walk.tracked[k][0].values} for k in keyframes}
-    subjects = Subjects.of([walk.model], None, [active], stay)
-    bodies = {k: tuple(b) for k, b in enumerate(walk.tracked)}
+    subjects = Subjects.of([walk.model], None, [active], {k: {0: pose} for k, pose in (keyframes or {}).items()})
+    bodies = {k: (PosedBody(walk.model, pose),) for k, pose in (tracked | (keyframes or {})).items()}
     known = None if deviation is None else lambda frame, person: deviation**2 * np.eye(walk.model.n_dofs)
     return list(RunRepair(Filmed(walk), subjects, TrackSettings(), bodies, {0: tracks}, known, others).steps())
 
@@ -105,7 +106,8 @@ def test_a_leg_is_taken_that_only_all_frames_together_speak_for(walk, monkeypatc
         k = next(k for k, views in enumerate(walk.views) if views is evidence.views)
         true = Hypothesis(walk.true[k][0], "repair", -0.7 * MIN_GAIN_NATS)
         entry = Search.of("repair", ("right_calf",), 0.0, true.cost, False)
-        return Repair(bodies[0].values, 0.0, 0.7 * MIN_GAIN_NATS, (true,) if walk.wrong[k] else (), entry)
+        tracked, found = bodies[0].values, (true,) if walk.wrong[k] else ()
+        return Repair(tracked, 0.0, 0.7 * MIN_GAIN_NATS, found, entry, tracked)
 
     monkeypatch.setattr(run_repair, "better_limbs", undecided)
     found = repaired(walk)[-1].found[0]
@@ -119,11 +121,31 @@ def test_a_leg_is_taken_that_only_all_frames_together_speak_for(walk, monkeypatc
 @pytest.mark.slow
 def test_a_keyframe_stays_and_is_doubted(walk):
     frame = int(np.flatnonzero(walk.wrong)[0])
-    found = repaired(walk, [frame])[-1].found[0]
+    found = repaired(walk, {frame: walk.tracked[frame][0].values})[-1].found[0]
     leg = [x.name for x in limbs(walk.model)].index("right_calf")
     assert np.array_equal(found[frame].pose, walk.tracked[frame][0].values)
     assert found[frame].elsewhere[leg] > 10
     assert found[frame].against[leg].startswith("right calf elsewhere in ")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("deviation", [0.01, None])
+def test_a_keyframe_is_compared_with_the_places_of_tracks_and_stays(walk, deviation):
+    """Also where poses are compared only."""
+    leg = [x.name for x in limbs(walk.model)].index("right_calf")
+    k = int(np.flatnonzero(walk.wrong)[0])
+    true, wrong = walk.true[k][0].values, walk.tracked[k][0].values
+    right = repaired(walk, {k: true}, deviation)[-1].found[0][k]
+    assert np.array_equal(right.pose, true)
+    assert not right.trust[:, leg].any()
+    assert right.alternatives == ()
+    assert off_m(walk, k, right.refined) < 0.05
+    off = repaired(walk, {k: wrong}, deviation, seen={k: true})[-1].found[0][k]
+    assert np.array_equal(off.pose, wrong)
+    (better,), (entry,) = off.alternatives, off.trace
+    assert better.cost < -MIN_GAIN_NATS
+    assert off_m(walk, k, better.pose) < SAME_POSE_M
+    assert not entry.taken
 
 
 @pytest.mark.slow
@@ -171,7 +193,7 @@ def test_alternatives_of_the_tracker_are_compared_again(walk, monkeypatch):
         same, other = bodies[0], PosedBody(walk.model, wrong[0])
         found = Hypothesis(other, "repair", 11.5), Hypothesis(other, "repair", 14.0), Hypothesis(same, "repair", 10.0)
         entry = Search.of("repair", ("right_calf",), 10.0, 11.5, False)
-        return Repair(same.values, 10.0, 0.0, found if k in fine[:2] else (), entry)
+        return Repair(same.values, 10.0, 0.0, found if k in fine[:2] else (), entry, same.values)
 
     monkeypatch.setattr(run_repair, "better_limbs", compared)
     monkeypatch.setattr(run_repair, "select_alternatives", lambda frames, gain: [0] * len(frames))
@@ -183,4 +205,3 @@ def test_alternatives_of_the_tracker_are_compared_again(walk, monkeypatch):
         (rival,) = found[k].alternatives  # neither the same pose, nor one that is clearly worse
         assert rival.cost == pytest.approx(1.5)
     assert all(found[k].alternatives == () for k in fine[2:])
-    assert repaired(walk, deviation=None)[-1].found[0][fine[0]].alternatives is None

@@ -62,11 +62,23 @@ class Repair(NamedTuple):
     """Poses about as good as the best, with a limb elsewhere, cheapest first."""
     entry: Search
     """Of the search."""
+    refined: Array
+    """The refined pose with all limbs where they were tracked, (n_values,)."""
 
     @property
     def is_better(self) -> bool:
         """Whether a limb is better elsewhere."""
         return self.gain > MIN_GAIN_NATS
+
+    def staying(self, body: PosedBody) -> "Repair":
+        """Return the same of a pose that stays: a better one is an alternative to it."""
+        if not self.is_better:
+            return self
+        better = Hypothesis(PosedBody(body.model, self.pose), "repair", self.cost)
+        return self._replace(
+            pose=body.values, cost=self.cost + self.gain, alternatives=(better, *self.alternatives),
+            entry=self.entry._replace(taken=False),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +159,8 @@ def better_limbs(
     is_better = gain > MIN_GAIN_NATS
     entry = search_entry("repair", [*searched, *unproposed], start, [best, *rest])._replace(taken=is_better)
     if is_better:
-        return Repair(best.pose, best.cost, gain, tuple(rest), entry)
-    return Repair(tracked, start.cost, gain, (best, *rest), entry)
+        return Repair(best.pose, best.cost, gain, tuple(rest), entry, start.pose)
+    return Repair(tracked, start.cost, gain, (best, *rest), entry, start.pose)
 
 
 def refined_by_regions(
