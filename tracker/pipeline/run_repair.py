@@ -213,7 +213,7 @@ class RunRepair:
                 is_better = self._examine(known, colors[i], k, i, others, apart, search)
                 if search:
                     failures = 0 if is_better else failures + 1
-                if is_better:
+                if is_better and i in self._free(k):
                     around = [n for n in self._around(k) if i in self._free(n) and visits[n, i] < _MAX_TRIES]
                     for n in around:
                         heappush(due, (-np.inf, n, i))

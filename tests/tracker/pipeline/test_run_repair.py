@@ -1,5 +1,6 @@
 """Repair of a run whose tracks all have a leg elsewhere on some frames."""
 
+from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -149,6 +150,23 @@ def test_a_keyframe_is_compared_with_the_places_of_tracks_and_stays(walk, deviat
 
 
 @pytest.mark.slow
+def test_frames_beside_a_keyframe_that_is_wrong_are_examined_once(walk, monkeypatch):
+    """It stays, so that nothing new is known there."""
+    examined, better_limbs = Counter(), run_repair.better_limbs
+
+    def counted(evidence, *args):
+        examined[next(k for k, views in enumerate(walk.views) if views is evidence.views)] += 1
+        return better_limbs(evidence, *args)
+
+    monkeypatch.setattr(run_repair, "better_limbs", counted)
+    wrong = [int(k) for k in np.flatnonzero(walk.wrong)]
+    keyframes, true = ({k: of[k][0].values for k in wrong} for of in (walk.tracked, walk.true))
+    repaired(walk, keyframes, seen=true)
+    assert set(wrong) < set(examined)
+    assert set(examined.values()) == {1}
+
+
+@pytest.mark.slow
 def test_poses_that_are_compared_only_stay(walk):
     found = repaired(walk, deviation=None)[-1].found[0]
     assert all(np.array_equal(found[k].pose, body.values) for k, (body,) in enumerate(walk.tracked))
@@ -205,3 +223,5 @@ def test_alternatives_of_the_tracker_are_compared_again(walk, monkeypatch):
         (rival,) = found[k].alternatives  # neither the same pose, nor one that is clearly worse
         assert rival.cost == pytest.approx(1.5)
     assert all(found[k].alternatives == () for k in fine[2:])
+    (rival,) = repaired(walk, deviation=None)[-1].found[0][fine[0]].alternatives  # also of poses that are compared only
+    assert rival.cost == pytest.approx(1.5)
