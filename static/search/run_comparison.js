@@ -30,7 +30,7 @@ export class RunComparison {
   #kept = new Set();
   /** @type {number | null | undefined} the last run; undefined before the first message */
   #run;
-  #isBusy = false;
+  #wasRunning = false;
   /** @type {import("../model/series.js").Tab | null | undefined} the open tab at the end of a run whose comparison may follow */
   #tabAtEnd;
 
@@ -61,10 +61,14 @@ export class RunComparison {
 
   /** Note the open tab when a run ends: its comparison follows, but a tab that is opened meanwhile stays. */
   #followWork() {
-    const { state, drawer } = this.#store.facts;
-    const isBusy = !!state?.range?.running || !!state?.track.running;
-    if (this.#isBusy && !isBusy) this.#tabAtEnd = drawer;
-    this.#isBusy = isBusy;
+    const isRunning = this.#isRunning;
+    if (this.#wasRunning && !isRunning) this.#tabAtEnd = this.#store.facts.drawer;
+    this.#wasRunning = isRunning;
+  }
+
+  get #isRunning() {
+    const { state } = this.#store.facts;
+    return !!state?.range?.running || !!state?.track.running;
   }
 
   /** Open the tab when a run has replaced poses by better or worse ones. Closing the drawer ends it. */
@@ -85,7 +89,7 @@ export class RunComparison {
     const person = state?.person ?? 0;
     const poses = rangeComparison?.people[person] ?? [];
     const name = (session?.people.length ?? 1) > 1 ? ` of ${session?.people[person].name}` : "";
-    const isBusy = !connected || !!state?.range?.running || !!state?.track.running;
+    const isBusy = !connected || this.#isRunning;
     this.#take.disabled = isBusy || poses.length === 0;
     this.#end.disabled = !connected || !rangeComparison;
     this.#empty.hidden = poses.length > 0;

@@ -25,6 +25,7 @@ from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evaluation.references import read_joints
 from tracker.fitting.gauss_newton import fit_to_points
+from tracker.fitting.hypothesis import distance_m
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
@@ -62,7 +63,7 @@ def _moved(model: BodyModel, pose: Array, draw: Callable[[], Array], by_m: tuple
     """Return a pose after the first step of some, (n_dofs,), by which the farthest point moves as far as is asked."""
     while True:
         other = model.clip(model.retract(pose, draw()))
-        if by_m[0] < np.linalg.norm(model.points_world(other) - model.points_world(pose), axis=1).max() < by_m[1]:
+        if by_m[0] < distance_m(PosedBody(model, other), PosedBody(model, pose)) < by_m[1]:
             return other
 
 
@@ -74,7 +75,7 @@ def keyframes(
     worst_mm = dict(zip(bodies, np.nanmax(errors(bodies, reference, fps), axis=1), strict=True))
     right = [k for k, mm in worst_mm.items() if mm < RIGHT_MM]
     chosen = [right[len(right) * i // (N_EACH + 1)] for i in range(1, N_EACH + 1)]
-    rngs = {k: np.random.default_rng([crc32(str(reference.parent.name).encode()), k]) for k in chosen}
+    rngs = {k: np.random.default_rng([crc32(reference.parent.name.encode()), k]) for k in chosen}
     by_hand = {k: unsteady(model, bodies[k].values, rng) for k, rng in rngs.items()}
     yield KINDS[0], by_hand
     yield KINDS[1], {k: with_limb_elsewhere(model, by_hand[k], rng) for k, rng in rngs.items()}
@@ -96,19 +97,17 @@ def statuses(scene: Scene, folder: Path) -> Iterator[tuple[str, str]]:
         (person,) = session.people
         tracked = read_stored_poses(session.annotations_path, person.name, person.model)
         for kind, poses in keyframes(person.model, tracked, reference, session.fps):
-            with tempfile.TemporaryDirectory() as other:
-                again = Path(shutil.copytree(at, Path(other) / "again"))
-                path = load_session(again).annotations_path
-                with closing(AnnotationStore(path)) as store:
-                    revision = store.add_model_revision(person.name, format_model(person.model))
-                    records = {
-                        k: PoseRecord(pose, ("manual",) * len(pose), revision, keyframe=True)
-                        for k, pose in poses.items()
-                    }
-                    store.commit("by hand", [PoseChange(person.name, k, record) for k, record in records.items()])
-                quadrille("track", again)
-                found = read_stored_poses(path, person.name, person.model)
-                yield from ((kind, found[k].record.status) for k in poses)
+            again = Path(shutil.copytree(at, Path(scratch) / kind))
+            path = load_session(again).annotations_path
+            with closing(AnnotationStore(path)) as store:
+                revision = store.add_model_revision(person.name, format_model(person.model))
+                records = {
+                    k: PoseRecord(pose, ("manual",) * len(pose), revision, keyframe=True) for k, pose in poses.items()
+                }
+                store.commit("by hand", [PoseChange(person.name, k, record) for k, record in records.items()])
+            quadrille("track", again)
+            found = read_stored_poses(path, person.name, person.model)
+            yield from ((kind, found[k].record.status) for k in poses)
 
 
 def main() -> None:

@@ -50,20 +50,16 @@ def assessed_by_tracks(
         repaired: how well it agrees with the colours of the run, and other poses by contours and colours together,
             which take the place of those of the tracker; None where that is not known.
     """
-    pose = replace(pose, errors=point_covariances(model, found.covariances))
-    odds, reasons = _apart(model, found, [f" without {view}" for view in tracks.without])
+    errors = point_covariances(model, found.covariances)
+    # For each limb the view without which it is farthest away.
+    of_limbs = [found.distances_m[:, np.isin(model.point_parts, x.parts)].max(axis=1) for x in limbs(model)]
+    reasons = [f" without {tracks.without[int(distances.argmax())]}" for distances in of_limbs]
+    odds = limb_odds(model, errors)
     if repaired is not None:
         is_ambiguous, odds = False, _with_run(model, pose, repaired, odds, reasons)
     elif features is not None and not tracks.has_history:
         odds = np.maximum(odds, log_odds(features))
-    return _classified(model, pose, odds, reasons, is_ambiguous)
-
-
-def _apart(model: BodyModel, found: Consensus, reasons: Sequence[str]) -> tuple[Array, list[str]]:
-    """Return the log odds that each limb is off and lost, (n_limbs, 2), by how far other poses lie from it, and the
-    reason of the farthest of them."""
-    of_limbs = [found.distances_m[:, np.isin(model.point_parts, x.parts)].max(axis=1) for x in limbs(model)]
-    return limb_odds(model, point_covariances(model, found.covariances)), [reasons[int(d.argmax())] for d in of_limbs]
+    return _classified(model, replace(pose, errors=errors), odds, reasons, is_ambiguous)
 
 
 def _with_run(model: BodyModel, pose: PoseRecord, repaired: RepairedPose, odds: Array, reasons: list[str]) -> Array:
@@ -138,7 +134,8 @@ def _assessed_by_its_frame(
     better = tuple(h for h in repaired.alternatives if h.cost < -MIN_GAIN_NATS)
     repaired = repaired._replace(alternatives=better)
     pulled = agreement(model, keyframe.values, refined[None], np.ones((1, len(limbs(model)))))
-    odds, reasons = _apart(model, pulled, [": contours elsewhere"])
+    odds = limb_odds(model, point_covariances(model, pulled.covariances))
+    reasons = [": contours elsewhere"] * len(odds)
     odds = _with_run(model, keyframe, repaired, odds, reasons)
     return _classified(model, with_repair(model, keyframe, repaired), odds, reasons, False)
 
