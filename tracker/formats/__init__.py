@@ -19,6 +19,7 @@ __all__ = [
     "model_toml",
     "motion_csv",
     "number_rows",
+    "observation_layout",
     "opensim_model",
     "opensim_mot",
     "plain_data",
