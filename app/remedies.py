@@ -150,8 +150,31 @@ PHRASES = {
         "check the units of the file, and which joint each marker stands for",
     ),
     "check_world_of_file": Phrases(
-        "check --axes, the units of the file, and that it is in the world of the calibration",
-        "check the axes and units of the file, and that it is in the world of the calibration",
+        "check --axes, the units of the file, and that it is in the world of the calibration and of this recording",
+        "check the axes and units of the file, and that it is in the world of the calibration and of this recording",
+    ),
+    "read_as_skeleton": Phrases(
+        "say --joint-map {name}, or --unusual to keep them as they are",
+        "enter {name} as Names of points, or tick Keep unusual points",
+    ),
+    "exchange_sides": Phrases(
+        "exchange left and right in a --joint-map FILE.toml, or say --unusual to keep them as they are",
+        "export them again with left and right exchanged, or tick Keep unusual points",
+    ),
+    "read_in_unit": Phrases(
+        "correct the unit, by --units in a file that states none, or say --unusual to keep them as they are",
+        "correct the unit, by Units for a file that states none, or tick Keep unusual points",
+    ),
+    "read_with_axes": Phrases(
+        "say --axes={axes}, or --unusual to keep them as they are", "enter {axes} as Axes, or tick Keep unusual points"
+    ),
+    "shift_points": Phrases(
+        "say --first-frame={frame}, or --unusual to keep them as they are",
+        "enter {frame} as First frame, or tick Keep unusual points",
+    ),
+    "check_points": Phrases(
+        "check the names of the points with --joint-map, and the unit, or say --unusual to keep them as they are",
+        "check the names of the points and the unit, or tick Keep unusual points",
     ),
     "check_joint_map": Phrases("check --joint-map", "check which joint each marker stands for"),
     "give_joint_map": Phrases(
@@ -164,8 +187,8 @@ PHRASES = {
         "rename it after its camera, or leave it out",
     ),
     "give_point_order": Phrases(
-        "give a --joint-map FILE.toml whose 'points' lists the names of the {n} points in order, or the name of a known "
-        "one (docs/observations.md has an example)",
+        "give a --joint-map FILE.toml whose 'points' lists the names of the {n} points in order, or the name of a "
+        "known one (docs/observations.md has an example)",
         "list the names of the points in a joint map",
     ),
     "place_first_picture": Phrases(

@@ -60,6 +60,8 @@ class InitArguments:
     clock: OptionalClock = None
     """frames: each Frame# of the TRC file is a frame of the session; time: rows lie at their Time. By default DataRate
     and Time tell, and a contradiction is an error."""
+    unusual: bool = False
+    """set the pose also where the joints fit no person of the recording, or fit it better in other axes or frames."""
     json: bool = False
     """print one JSON object."""
 
@@ -104,12 +106,16 @@ def _init_from_joints(at: Target, arguments: InitArguments, path: Path) -> None:
     session, (index,) = at
     known = placement(session, arguments.first_frame, arguments.clock)
     joints = read_joints(path, session.fps, arguments.joint_map, arguments.axes, known)
-    given = set_pose_at_joints(session, index, arguments.frame, joints, arguments.fit_sizes)
+    given = set_pose_at_joints(
+        session, index, arguments.frame, joints, arguments.fit_sizes, arguments.axes, arguments.unusual
+    )
+    notes = [*joints.notes, *given.notes]
     residuals_mm = dict(given.residuals_mm)
     mean_mm, height_m = fmean(residuals_mm.values()), given.person.model.height_m
     sizes = None if given.acquired is None else acquisition_sentence(given.acquired)
     found = _record(session, arguments.frame, given) | {
-        "height_m": height_m, "residual_mm": residuals_mm, "mean_mm": mean_mm, "sizes": sizes, "notes": joints.notes
+        "height_m": height_m, "residual_mm": residuals_mm, "mean_mm": mean_mm, "sizes": sizes,
+        "notes": notes,
     }  # fmt: skip
     residual = f"{mean_mm:.1f} mm from {len(residuals_mm)} joints on average"
     lines = [f"{given.person.name}, {height_m:.2f} m tall, frame {arguments.frame}: {residual}"]
@@ -120,7 +126,7 @@ def _init_from_joints(at: Target, arguments: InitArguments, path: Path) -> None:
             f"note: these joints fit no body of {before_m:.2f} m: check the Units of the file and the names of its "
             "joints, or say --fit-sizes"
         )
-    _print(arguments, given, found, [*lines, *(f"note: {note}" for note in joints.notes)])
+    _print(arguments, given, found, [*lines, *(f"note: {note}" for note in notes)])
 
 
 def _record(session: "Session", frame: int, given: "GivenPose") -> dict[str, Any]:

@@ -35,6 +35,7 @@ ROOMS = [
     "tracker.tracking.contour",
     "tracker.tracking.voxel",
     "tracker.acquisition",
+    "tracker.plausibility",
     "tracker.calibration",
     "tracker.boards",
     "tracker.self_calibration",

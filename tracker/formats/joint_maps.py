@@ -57,6 +57,21 @@ class JointMap:
         single = {marker: (point,) for point, marker in self.markers.items()}
         return {m: single.get(m) or tuple(self.means.get(m, ())) for m in markers}
 
+    @property
+    def with_sides_exchanged(self) -> "JointMap":
+        """The convention with left for right."""
+        return replace(
+            self,
+            name=f"{self.name} with left and right exchanged",
+            markers={_other_side(point): marker for point, marker in self.markers.items()},
+            means={marker: tuple(map(_other_side, points)) for marker, points in self.means.items()},
+        )
+
+
+def _other_side(point: str) -> str:
+    side, _, joint = point.partition("_")
+    return f"{'right' if side == 'left' else 'left'}_{joint}" if joint else point
+
 
 OWN = JointMap("our own", {j: j for j in _BODY_POINTS})
 

@@ -44,6 +44,8 @@ class ImportRequest:
     """Width and height of the pictures that points or masks are of, px; 1, 1 for normalized points."""
     masks: bool = False
     """Whether masks are taken where the files hold key points, too."""
+    unusual: bool = False
+    """Whether points that are implausible for a person of the recording are stored all the same."""
     values: Mapping[str, int] = field(default_factory=dict)
     """Masks: value of a person's pixels, by name; all other values are anyone."""
 
@@ -57,6 +59,7 @@ class ImportRequest:
             "axes": self.axes if self.axes != "x,y,z" else None,
             "unit_m": self.unit_m,
             "confidence": self.confidence,
+            "unusual": self.unusual or None,
             "picture_size": "x".join(map(str, self.picture_size)) if self.picture_size else None,
             "values": " ".join(f"{name}={value}" for name, value in self.values.items()) or None,
         }

@@ -180,11 +180,19 @@ def _best_shift(cost: Array) -> float:
     """Return the shift at which a pair of views fits best, between frames by a parabola."""
     curve = np.nan_to_num(cost.mean(axis=1), nan=1.0)
     row, middle = int(curve.argmin()), len(curve) // 2
-    if row in (0, len(curve) - 1):
-        return row - middle
-    before, here, after = curve[row - 1 : row + 2]
+    return row - middle + vertex(curve[max(row - 1, 0) : row + 2])
+
+
+def vertex(three: Array) -> float:
+    """Return where a parabola through an extreme value and its neighbours is extreme, in steps from the middle one.
+
+    It is 0 for fewer values, at the end of a curve.
+    """
+    if len(three) < 3:
+        return 0.0
+    before, here, after = three
     bend = before - 2 * here + after
-    return row - middle + (float((before - after) / (2 * bend)) if bend > 0 else 0.0)
+    return float((before - after) / (2 * bend)) if bend else 0.0
 
 
 def _with(offsets: IntArray, view: int, value: int) -> IntArray:

@@ -1,4 +1,4 @@
-"""Place points in space at the frames of a session, and check them against its cameras."""
+"""Place points in space at the frames of a session."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -44,7 +44,9 @@ def read_space(
     rows = list[Array]()
     for path in paths:
         where = f"{SPACE_FORMATS[format_name].title} file {path}"
-        read = remap_axes(SPACE_FORMATS[format_name].read(path, request.unit_m, session.fps), request.axes)
+        read = remap_axes(
+            SPACE_FORMATS[format_name].read(path, request.unit_m, session.fps), request.axes, may_mirror=True
+        )
         if tables and tables[0].names != read.names:
             raise FormatError(f"{where}: expected the points of {paths[0].name}, found others; import them apart")
         placed = place_rows(read, where, session.fps, known)
@@ -75,7 +77,8 @@ def read_space(
                 f"{', '.join(names)}"
             )
         )
-    problems += _not_seen(joints_world, session)
+    if not np.isfinite(joints_world).all(axis=-1).any():
+        problems.append(FormatError("expected points of some frame, found none; check the file"))
     return PlacedPoints(ObservedJoints(names, request.people, joints_world), joint_map, tuple(rows)), problems, notes
 
 
@@ -90,26 +93,3 @@ def _outside(placed: MarkerTable, where: str, n_frames: int, is_chosen: bool) ->
         return [], notes + left_out
     wrong = f"{where}: expected rows of frames 0 to {n_frames - 1}, found frames {first} to {last}"
     return [FormatError(wrong, Remedy("choose_first_frame", frames="N"))], notes
-
-
-def _not_seen(joints_world: Array, session: Session) -> list[FormatError]:
-    """Return that most points lie in no pictures of two cameras, as in other axes, units or another world."""
-    points = joints_world[np.isfinite(joints_world).all(axis=-1)]
-    if not len(points):
-        return [FormatError("expected points of some frame, found none; check the file")]
-    points = points[:: max(1, len(points) // 10_000)]
-    n_views = np.zeros(len(points), dtype=np.int64)
-    for source in session.cameras:
-        px = source.camera.pinhole.project(points)
-        known = np.isfinite(px).all(axis=-1)
-        n_views[known] += source.camera.is_filmed(px[known])
-    seen = n_views >= min(2, len(session.cameras))
-    if 2 * seen.sum() >= len(points):
-        return []
-    middle = ", ".join(f"{x:.2f}" for x in np.median(points, axis=0))
-    return [
-        FormatError(
-            f"expected points that two cameras show, found {seen.mean():.0%} in pictures, around {middle} m",
-            Remedy("check_world_of_file"),
-        )
-    ]

@@ -19,6 +19,7 @@ from tracker.formats.pose_csv import PoseTable
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.geometry.framing import Framing, framings
+from tracker.plausibility.examine import examine_joints
 from tracker.session.lock import SessionLock
 from tracker.session.session import Person, Session, save_session
 from tracker.store.annotation_store import AnnotationStore
@@ -41,6 +42,8 @@ class GivenPose:
     """Sizes that were acquired from the joints and the contours; they are applied where the cost fell."""
     backup_error: str | None = None
     """Why the store could not be backed up; None if it could."""
+    notes: tuple[str, ...] = ()
+    """Sentences on what speaks against the joints, which the user accepted."""
 
     @property
     def points_world(self) -> Array:
@@ -48,7 +51,10 @@ class GivenPose:
         return self.person.model.points_world(self.pose)
 
 
-def set_pose_at_joints(session: Session, index: int, frame: int, joints: MarkerTable, fit_sizes: bool) -> GivenPose:
+def set_pose_at_joints(
+    session: Session, index: int, frame: int, joints: MarkerTable, fit_sizes: bool, axes: str = "x,y,z",
+    unusual: bool = False,
+) -> GivenPose:  # fmt: skip
     """Fit the pose of a person to the known joints of a frame, and store it.
 
     The limbs alone determine the pose, the trunk included: conventions disagree about neck and head. A body in preset
@@ -60,6 +66,8 @@ def set_pose_at_joints(session: Session, index: int, frame: int, joints: MarkerT
         frame: to set.
         joints: positions of joints under the body's names.
         fit_sizes: acquire the sizes of the body from several frames first. Poses that are stored stay.
+        axes: of the file by which the joints were read.
+        unusual: whether joints that are implausible for a person of the recording are accepted.
 
     Raises:
         TrackerError: the file has no such frame, its joints are those of no person, or the body is in no picture.
@@ -78,6 +86,9 @@ def set_pose_at_joints(session: Session, index: int, frame: int, joints: MarkerT
             person = replace(person, model=acquired.body)
         pose = fit_to_points(person.model, limbs, centers=True).pose
         views = _views(session, person, pose)
+        doubts = examine_joints(session, index, joints, axes, frame)
+        if doubts and not unusual:
+            raise doubts[0]
         if person is not session.people[index]:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
             save_session(replace(session, people=people))
@@ -85,7 +96,8 @@ def set_pose_at_joints(session: Session, index: int, frame: int, joints: MarkerT
         backup_error = _store(session, person, frame, pose, {"method": "joints", "joints": known})
     fitted = dict(zip(person.model.point_names, person.model.joint_centers_world(pose), strict=True))
     residuals_mm = {n: float(1000 * np.linalg.norm(fitted[n] - p)) for n, p in limbs.items()}
-    return GivenPose(person, pose, views, residuals_mm, acquired, backup_error)
+    notes = tuple(f"{doubt}; kept, as chosen" for doubt in doubts)
+    return GivenPose(person, pose, views, residuals_mm, acquired, backup_error, notes)
 
 
 def set_pose_from_table(session: Session, index: int, frame: int, table: PoseTable) -> GivenPose:

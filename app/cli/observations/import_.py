@@ -42,7 +42,8 @@ class ImportArguments:
     person: Names = ()
     """people of whom they are; all people by default. Points in space have one file for each, in this order."""
     joint_map: OptionalPath = None
-    """TOML file with the names of the points; guessed by default. docs/observations.md has an example."""
+    """TOML file with the names of the points, or the name of a known skeleton such as BODY_25B; guessed by default.
+    docs/observations.md has an example."""
     cameras: NamedPaths = ()
     """files or folder of a camera, where names do not tell."""
     first_frame: OptionalWhole = None
@@ -63,6 +64,8 @@ class ImportArguments:
     """take masks where the files hold key points too: segmentations of COCO, and PNG beside other files."""
     values: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PERSON=VALUE ...", help_behavior_hint="")] = ()
     """masks: label of the pixels of a person; without it all labels are anyone."""
+    unusual: bool = False
+    """store points also where they fit no person of the recording, or fit it better in other names, axes or frames."""
     dry_run: bool = False
     """show what would be imported, and store nothing."""
     json: bool = False
@@ -77,8 +80,9 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
     """
     from app.session.import_summary import import_summary
     from tracker.formats.trc import METRES_BY_WORD
-    from tracker.observations.importing import plan_import, store_import
+    from tracker.observations.importing import store_import
     from tracker.observations.request import ImportRequest
+    from tracker.plausibility.examine import plan_examined_import
     from tracker.session.lock import SessionLock
     from tracker.session.session import load_session
 
@@ -99,9 +103,10 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
         _confidence(arguments.confidence),
         _size(arguments.picture_size),
         arguments.masks,
+        arguments.unusual,
         parse_pairs(arguments.values, "--values", int),
     )
-    plan = plan_import(session, request)
+    plan = plan_examined_import(session, request)
     summary: dict[str, Any] = {**import_summary(session, plan, command_line_text), "stored": False}
     if not (plan.problems or arguments.dry_run):
         with SessionLock(session.folder):

@@ -17,7 +17,7 @@ from tracker.compute.progress import Report
 from tracker.errors import TrackerError
 from tracker.initialization.first_pose import FirstPoses
 from tracker.judging.judge import judge
-from tracker.observations.importing import plan_import, store_import
+from tracker.observations.importing import store_import
 from tracker.observations.observed import ObservationSet
 from tracker.observations.plans import ImportPlan, MaskPlan
 from tracker.observations.request import ImportRequest
@@ -26,6 +26,7 @@ from tracker.pipeline.chain import unplaced
 from tracker.pipeline.keypoint_evidence import find_by_keypoints, read_points
 from tracker.pipeline.keypoint_poses import imported_changes, poses_of
 from tracker.pipeline.track_session import AuditStep, Step, TrackSession
+from tracker.plausibility.examine import plan_examined_import
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
@@ -107,7 +108,7 @@ class Observing:
             TrackerError: they cannot be read, or are of no camera of the session.
         """
         self.discard()
-        plan = plan_import(self._session_state.session, request)
+        plan = plan_examined_import(self._session_state.session, request)
         self._set(plan=plan, message="", failed=False)
         return plan
 

@@ -116,8 +116,9 @@ def test_init_says_where_the_body_is_and_refuses_what_is_nowhere(run, session, t
     assert sorted(stored(session)) == [0, 1]
 
     write_trc(tmp_path / "small.trc", joints.names, joints.points / 1000, 25.0)
-    out = run("init", session, "--joints", tmp_path / "small.trc", "--frame", "2")[1]
-    assert "note: these joints fit no body of 1.78 m: check the Units" in out
+    small = ["init", session, "--joints", tmp_path / "small.trc", "--frame", "2"]
+    assert_refused(run(*small), ["found one 0.0017", "times 1000 the points fit one of 1.7", "--unusual"])
+    assert "note: these joints fit no body of 1.78 m: check the Units" in run(*small, "--unusual")[1]
 
 
 def test_evaluate_notes_a_reference_that_is_of_something_else(run, session, tmp_path):

@@ -13,6 +13,7 @@ from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints, triangulate_observations
 from tracker.observations.request import ImportRequest
 from tracker.observations.stored import list_observations, load_observations, source_path
+from tracker.plausibility.examine import plan_examined_import
 from tracker.session.session import load_session
 
 N = 12
@@ -201,12 +202,13 @@ def test_points_in_space(session, tmp_path):
     [
         (np.concatenate([TRUTH, TRUTH]), 30.0, "rows of frames 0 to 11, found frames 0 to 23"),
         (TRUTH + np.array([9.0, 0.0, 0.0]), 30.0, "points that two cameras show, found 0%"),
-        (TRUTH * 1000, 30.0, "in pictures, around -298.11, 55.00, 930.00 m"),
+        (TRUTH * 1000, 30.0, "times 0.001 the points fit one of 1.71 m"),
     ],
 )
 def test_points_in_space_that_contradict_the_session(session, tmp_path, points, rate, expected):
     write_trc(tmp_path / "a.trc", BODY_25.points, points, rate)
-    assert expected in problems(planned(session, tmp_path / "a.trc"))
+    request = ImportRequest("mp", (tmp_path / "a.trc",), tuple(p.name for p in session.people))
+    assert expected in problems(plan_examined_import(session, request))
 
 
 def test_rows_that_are_missing_are_named(session, tmp_path):

@@ -1,0 +1,107 @@
+"""Points of simulated people in wrong names, axes, units and frames: named, or asked about, never taken in silence."""
+
+import numpy as np
+import pytest
+from simulated_joints import FPS, N_FRAMES, SKELETONS, UP, detected, filmed, simulated_person, skeleton_points
+
+from tracker.formats.file_axes import axes_matrix, axis_conventions
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.plausibility.examine import contradictions
+from tracker.plausibility.readings import Reading, ReadPoints
+
+WRONG_M = 0.05
+"""Mean distance of the joints of limbs from which points that are stored are wrong: twice the error of a network."""
+SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 40))]
+
+
+class Case:
+    """A person whose true points a file has, in the order of a skeleton."""
+
+    def __init__(self, seed):
+        self.person, self.height_m = simulated_person(seed)
+        self.film = filmed(self.person, seed)
+        self.skeleton = [*SKELETONS.values()][seed % len(SKELETONS)]
+        self.clean = skeleton_points(self.person, self.skeleton)
+        self.points = detected(self.clean, seed)
+        self.rng = np.random.default_rng((seed, 3))
+        self.stated_m = self.height_m * float(np.exp(0.05 * self.rng.normal()))
+
+    def found(self, points, skeleton=None, axes="x,y,z", in_space=True):
+        """What speaks against points that are read as a skeleton, by default their own."""
+        given = Reading(skeleton or self.skeleton, axes)
+        same_size = [m for m in SKELETONS.values() if len(m.points) == len(given.joint_map.points)]
+        maps = [given.joint_map, *(m for m in same_size if m.name != given.joint_map.name)]
+        frames = np.arange(len(points))
+        read = ReadPoints((), points[:, None], frames, (self.stated_m,), UP, FPS, self.film)
+        return contradictions(read, given, maps, 0, in_space)
+
+
+@pytest.fixture(scope="module", params=SEEDS)
+def case(request):
+    return Case(request.param)
+
+
+def fields(found, key):
+    return [p.remedy.fields[key] for p in found if key in p.remedy.fields]
+
+
+@pytest.mark.slow
+def test_true_points_raise_few_questions():
+    """In space and in pictures, 200 people: at most 2 are asked about."""
+    asked = []
+    for seed in range(200):
+        case = Case(seed)
+        found = case.found(case.points, in_space=seed % 2 == 0)
+        asked += [(seed, str(f)) for f in found[:1]]
+    assert len(asked) <= 2, asked
+
+
+def test_true_points_are_taken(case):
+    assert case.found(case.points) == []
+
+
+def test_other_axes_are_named(case):
+    for words in case.rng.permutation([w for w in axis_conventions() if w != "x,y,z"])[:4]:
+        assert words in fields(case.found(case.points @ axes_matrix(words)), "axes"), words
+        assert case.found(case.points @ axes_matrix(words), axes=str(words)) == []
+
+
+@pytest.mark.parametrize("factor", [1000.0, 100.0, 1 / 0.0254, 1 / 0.3048, 0.3048, 0.0254])
+def test_other_units_are_named(case, factor):
+    found = case.found(factor * case.points)
+    assert f"times {1 / factor:.4g} the points fit" in str(found[0])
+
+
+@pytest.mark.parametrize("lag", [2, 5, -5])
+def test_lags_are_named_where_they_matter(case, lag):
+    """Points of other frames: a slow motion is near its place all the same."""
+    late = np.full(case.points.shape, np.nan)
+    inside = slice(max(lag, 0), N_FRAMES + min(lag, 0)), slice(max(-lag, 0), N_FRAMES + min(-lag, 0))
+    late[inside[0]] = case.points[inside[1]]
+    limbs = [case.skeleton.points.index(case.skeleton.markers[j]) for j in LIMB_JOINTS]
+    moved = np.linalg.norm(case.clean[inside[0]] - case.clean[inside[1]], axis=-1)[:, limbs]
+    found = case.found(late)
+    if moved.mean() > WRONG_M:
+        assert found, moved.mean()
+    assert all(abs(frame + lag) <= 1 for frame in fields(found, "frame")), found
+
+
+def test_points_in_the_order_of_another_skeleton_are_refused(case):
+    """Skeletons with as many points, or more of which the first are taken."""
+    own = case.skeleton.counterparts(case.skeleton.points)
+    for other in SKELETONS.values():
+        first = other.points[: len(own)]
+        theirs = other.counterparts(first)
+        differ = [a for a, b in zip(own, first, strict=False) if own[a] and own[a] != theirs[b]]
+        if len(first) < len(own) or not {own[a][0] for a in differ}.intersection(LIMB_JOINTS):
+            continue
+        found = case.found(detected(skeleton_points(case.person, other), 0)[:, : len(own)])
+        assert found, other.name
+        if len(other.points) == len(own):
+            assert fields(found, "name") == [other.name]
+
+
+@pytest.mark.parametrize("in_space", [True, False])
+def test_exchanged_sides_are_named(case, in_space):
+    found = case.found(case.points, skeleton=case.skeleton.with_sides_exchanged, in_space=in_space)
+    assert "left for right" in str(found[0])

@@ -1,0 +1,173 @@
+"""The log likelihood that points in space are the joints of a person, by bones and posture.
+
+Each term compares a person with points of anything, in nats for one posture, averaged over frames. A share of joints is
+grossly wrong (`GROSS`), so that no single one decides.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from tracker.acquisition.segment_lengths import SEGMENTS
+from tracker.acquisition.size_parameters import SizePriors
+from tracker.acquisition.typical_body import typical_body
+from tracker.formats.model_toml import load_model
+from tracker.geometry.arrays import Array
+
+GROSS = 0.1
+"""Share of joints that are grossly wrong: between those of a network of a slow person (3%) and of a fast one (25%)."""
+_ERROR = 0.02
+"""Standard deviation of a joint of another program from that of a body, share of its height: 3 cm of a network."""
+_RANGE = float(np.log(100.0))
+"""Range of the logarithm of a length between points of anything: from 2 cm to 2 m."""
+_LEAN_RAD = 0.3
+"""Standard deviation of the lean of a person who stands, walks or sits, rad."""
+_STATURES_M = (0.6, 2.3)
+"""Statures of people, metres: of a baby who sits, and of the tallest adults."""
+_IMPOSSIBLE = -10.0
+"""Log likelihood ratio of a stature that nobody has, nats: far below those of people."""
+_BODY = "gavrila38"
+_SEGMENTS = SEGMENTS | {
+    name: [([f"{side}_ankle"], [f"{side}_{end}"]) for side in ("left", "right")]
+    for name, end in (("foot", "toe"), ("heel", "heel"))
+}
+_FORWARD = {
+    "knee": ("hip", "knee", "ankle", 1.0, GROSS),
+    "elbow": ("shoulder", "elbow", "wrist", -1.0, 3 * GROSS),
+    "toe": ("ankle", "toe", "ankle", 1.0, GROSS),
+}
+"""Joints before, at and after each joint that lies before (1) or behind (-1) the line of the others, and the share of
+frames in which it seems not to: an arm may be turned. Toes lie before the ankle."""
+
+Places = Mapping[str, Array]
+"""Positions of points of the body by name, (F, 3) each; NaN where unknown."""
+
+
+class Bones(NamedTuple):
+    """Lengths of the bones of a person."""
+
+    nats: float
+    """Log likelihood ratio of a person against points of anything, for one posture; 0 without any bone."""
+    stature: float
+    """Height of a body with these lengths, in the unit of the points; NaN without any bone."""
+    oddest: str = ""
+    """Name of the segment that fits a person least."""
+    lengths: tuple[float, float] = (np.nan, np.nan)
+    """Its lengths in 80% of the frames, in the unit of the points."""
+    is_of_person: bool = True
+    """Whether no segment is grossly wrong on most frames."""
+
+
+def bones(places: Places) -> Bones:
+    """Compare the distances between neighbouring joints with those of a body of the stature that fits them.
+
+    Their logarithms are normal around those of typical proportions, with the spread of people (`SizePriors`) and of
+    joints. Constancy and symmetry follow, because each frame and each side counts.
+    """
+    known = {
+        (name, i): np.linalg.norm(_middle(places, a) - _middle(places, b), axis=-1)
+        for name, pairs in _SEGMENTS.items()
+        for i, (a, b) in enumerate(pairs)
+        if places.keys() >= {*a, *b}
+    }
+    known = {key: lengths for key, lengths in known.items() if np.isfinite(lengths).any()}
+    if not known:
+        return Bones(0.0, np.nan)
+    logs = np.log(np.maximum([*known.values()], 1e-9))
+    stature = usual = np.ones(1)
+    for _ in range(2):  # a child has other proportions
+        body = typical_body(load_model(_BODY, float(np.clip(stature, *_STATURES_M).item())))
+        own = body.named_points_world(body.neutral())
+        lengths = {n: np.linalg.norm(_middle(own, a) - _middle(own, b)) for n, ((a, b), *_) in _SEGMENTS.items()}
+        usual = np.log([lengths[name] / body.height_m for name, _ in known])[:, None]
+        stature = np.exp(np.nanmedian(logs - usual))
+    priors = SizePriors()
+    of_joints = np.sqrt(2) * np.hypot(priors.joint, _ERROR) / np.exp(usual)
+    ratios = _RANGE * norm.pdf(logs, usual + np.log(stature), np.hypot(priors.length, of_joints))
+    nats = np.nanmean(np.log((1 - GROSS) * ratios + GROSS), axis=1)
+    oddest = int(nats.argmin())
+    low, high = np.nanquantile(np.exp(logs[oddest]), (0.1, 0.9))
+    is_of_person = bool(nats[oddest] > 0.5 * np.log(GROSS))
+    return Bones(float(nats.sum()), float(stature), [*known][oddest][0], (float(low), float(high)), is_of_person)
+
+
+def stature_nats(stature_m: float, expected_m: float) -> float:
+    """Return the log likelihood ratio of a stature, against one of any order of magnitude.
+
+    Args:
+        stature_m: of the points, metres.
+        expected_m: that the session states, metres: of a child as of an adult, it is usually about right.
+    """
+    if np.isnan(stature_m):
+        return 0.0
+    near = norm.pdf(np.log(stature_m), np.log(expected_m), SizePriors().height)
+    anyone = is_stature(stature_m) / np.log(_STATURES_M[1] / _STATURES_M[0])
+    return float(np.log(max(_RANGE * ((1 - GROSS) * near + GROSS * anyone), np.exp(_IMPOSSIBLE))))
+
+
+def is_stature(stature_m: float) -> bool:
+    """Return whether people have a stature; NaN counts as unknown."""
+    return not (stature_m < _STATURES_M[0] or stature_m > _STATURES_M[1])
+
+
+def upright_nats(places: Places, up: Array) -> float:
+    """Return the log likelihood ratio of a person who stands, walks or sits upright.
+
+    Args:
+        places: points of the person.
+        up: direction of the vertical, (3,).
+    """
+    lower = next((j for j in ("ankle", "knee", "hip") if _has(places, j)), None)
+    if lower is None or not _has(places, "shoulder"):
+        return 0.0
+    spine = _middle(places, _both("shoulder")) - _middle(places, _both(lower))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lean = np.arccos(np.clip(spine @ up / np.linalg.norm(spine, axis=-1), -1.0, 1.0))
+    # On the sphere, normal in the lean: its density against that of any direction, 1 / (4 pi).
+    ratios = 2.0 / _LEAN_RAD**2 * np.exp(-0.5 * (lean / _LEAN_RAD) ** 2)
+    return _mean(np.log((1 - GROSS) * ratios + GROSS))
+
+
+def bend_nats(places: Places) -> float:
+    """Return the log likelihood ratio of knees, elbows and feet that point the right way; they do not if mirrored."""
+    if not (_has(places, "shoulder") and _has(places, "hip")):
+        return 0.0
+    up = _middle(places, _both("shoulder")) - _middle(places, _both("hip"))
+    left = sum(places[f"left_{j}"] - places[f"right_{j}"] for j in ("shoulder", "hip"))
+    forward = np.cross(left, up)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
+    height, total = np.linalg.norm(up, axis=-1), 0.0
+    for side in ("left", "right"):
+        for before, at, after, sign, wrong in _FORWARD.values():
+            names = [f"{side}_{j}" for j in (before, at, after)]
+            if not places.keys() >= set(names):
+                continue
+            a, b, c = (places[n] for n in names)
+            line = c - a
+            with np.errstate(invalid="ignore", divide="ignore"):
+                along = np.sum((b - a) * line, axis=-1) / np.sum(line * line, axis=-1)
+            foot = a + np.nan_to_num(along)[:, None] * line
+            # The trunk is 30% of the height.
+            ahead = sign * np.sum((b - foot) * forward, axis=-1) / (_ERROR * height / 0.3)
+            total += _mean(np.log(2 * (1 - wrong) * norm.cdf(ahead) + wrong))
+    return total
+
+
+def _has(places: Places, joint: str) -> bool:
+    return places.keys() >= set(_both(joint))
+
+
+def _both(joint: str) -> list[str]:
+    return [f"left_{joint}", f"right_{joint}"]
+
+
+def _middle(places: Places, names: Sequence[str]) -> Array:
+    return np.mean([places[n] for n in names], axis=0)
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else 0.0

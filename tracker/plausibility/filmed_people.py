@@ -1,0 +1,124 @@
+"""Compare points of people in space with the silhouettes of the people who were filmed."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.errors import TrackerError
+from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
+from tracker.footage.recording import Recording
+from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
+from tracker.observations.triangulation import INLIER_M
+from tracker.plausibility.body_likelihood import Places
+from tracker.session.session import Session
+
+_BELOW = (("elbow", "wrist"), ("knee", "ankle"))
+"""Joints of the parts that move most."""
+
+
+@dataclass(frozen=True, eq=False)
+class FilmedPeople:
+    """Distances from the silhouettes of the people in some frames."""
+
+    cameras: tuple[Camera, ...]
+    """Camera of the pixels of each view, with its lens distortion."""
+    distances_px: tuple[NDArray[np.uint8], ...]
+    """By view, the distance of each pixel from the silhouettes, (F, height, width), whole px, at most 255."""
+    shows_people: Mask
+    """Whether a view shows anybody, (F, n_views)."""
+    is_filmed: bool = True
+    """Whether they are those of footage; else people may be anywhere in the pictures."""
+
+    @property
+    def n_views(self) -> int:
+        """Number of views, each of which shows the limbs."""
+        return len(self.cameras)
+
+    @property
+    def knows_frames(self) -> bool:
+        """Whether there is footage."""
+        return self.is_filmed
+
+    def costs(self, places: Places, shift: int = 0) -> Array:
+        """Return how far limbs lie outside of the silhouettes, (F,): mean truncated squares, 0 to 1; NaN if unknown.
+
+        A point that fewer than two views show, or than there are, counts as far outside.
+
+        Args:
+            places: of one person on the frames, metres.
+            shift: frames by which the pictures are later.
+        """
+        points = _limb_points(places)
+        known = np.isfinite(points).all(axis=-1)
+        shown = np.arange(len(points)) + shift
+        is_shown = (shown >= 0) & (shown < len(self.shows_people))
+        shown = np.where(is_shown, shown, 0)
+        of_views = self.shows_people[shown] & is_shown[:, None]
+        squares = np.stack([self._squares(v, points, shown) for v in range(len(self.cameras))])
+        squares[~of_views.T] = np.nan
+        n_seen, n_views = np.isfinite(squares).sum(axis=0), of_views.sum(axis=1)[:, None]
+        of_points = np.where(n_seen >= np.minimum(2, n_views), np.nansum(squares, axis=0) / np.maximum(n_seen, 1), 1.0)
+        n_known = known.sum(axis=1)
+        out = np.where(known, of_points, 0.0).sum(axis=1) / np.maximum(n_known, 1)
+        return np.where((n_known > 0) & (n_views[:, 0] > 0), out, np.nan)
+
+    def _squares(self, view: int, points: Array, shown: IntArray) -> Array:
+        """Return the truncated squares of the distances of points in a view, (F, n); NaN where it does not show them.
+
+        Args:
+            view: its index.
+            points: (F, n, 3), metres.
+            shown: index of the picture of each frame, (F,).
+        """
+        camera, distances = self.cameras[view], self.distances_px[view]
+        flat = points.reshape(-1, 3)
+        px, depths = (x.reshape(*points.shape[:2], -1) for x in (camera.project(flat), camera.depths(flat)))
+        with np.errstate(invalid="ignore"):
+            inside = ((px > -0.5) & (px < np.array(distances.shape[:0:-1]) - 0.5)).all(axis=-1)
+            inside &= depths[..., 0] > NEAR_PLANE_M
+        u, v = np.moveaxis(np.round(np.where(inside[..., None], px, 0.0)).astype(np.int64), -1, 0)
+        away_m = distances[shown[:, None], v, u] * depths[..., 0] / camera.K[0, 0]
+        return np.where(inside, np.minimum(away_m / INLIER_M, 1.0) ** 2, np.nan)
+
+
+def film_people(session: Session, frames: IntArray) -> FilmedPeople:
+    """Find the people of some frames by the session's masks, backgrounds, or its own median.
+
+    Without readable footage, people may be anywhere in the pictures.
+    """
+    found = _silhouettes(session, frames)
+    if found is None:
+        cameras = tuple(c.camera for c in session.cameras)
+        anywhere = tuple(np.broadcast_to(np.uint8(0), (len(frames), c.height, c.width)) for c in cameras)
+        return FilmedPeople(cameras, anywhere, np.ones((len(frames), len(cameras)), dtype=bool), is_filmed=False)
+    distances = tuple(np.stack([_distances(s.mask) for s in of_view]) for of_view in zip(*found, strict=True))
+    shows = np.array([[not s.is_empty for s in views] for views in found])
+    return FilmedPeople(tuple(s.camera for s in found[0]), distances, shows)
+
+
+def _silhouettes(session: Session, frames: IntArray) -> list[tuple[ViewSilhouette, ...]] | None:
+    if not all(c.footage.exists() for c in session.cameras):
+        return None
+    try:
+        with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
+            return [finder.silhouettes(int(k)) for k in frames]
+    except TrackerError:  # the footage has its own messages
+        return None
+
+
+def _distances(mask: Mask) -> NDArray[np.uint8]:
+    found = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
+    return np.minimum(np.round(found), 255).astype(np.uint8)
+
+
+def _limb_points(places: Places) -> Array:
+    """Return the joints of forearms and calves and their middles, (F, n, 3); without these all points."""
+    pairs = [(f"{side}_{a}", f"{side}_{b}") for side in ("left", "right") for a, b in _BELOW]
+    ends: Sequence[tuple[Array, Array]] = [(places[a], places[b]) for a, b in pairs if places.keys() >= {a, b}]
+    points = [p for a, b in ends for p in (a, (a + b) / 2, b)] or [*places.values()]
+    return np.stack(points, axis=1)

@@ -1,0 +1,222 @@
+"""Ways to read the points of a file: by names, axes, unit and frames. One score in nats compares them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+
+from tracker.acquisition.size_parameters import SizePriors
+from tracker.fitting.hypothesis import CLEAR_NATS
+from tracker.formats.file_axes import axes_matrix, axis_conventions
+from tracker.formats.joint_maps import JointMap
+from tracker.formats.trc import METRES_BY_WORD
+from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.observations.shifts import vertex
+from tracker.plausibility.body_likelihood import Bones, Places, bend_nats, bones, is_stature, stature_nats, upright_nats
+
+
+class Witness(Protocol):
+    """Evidence of where people are on some frames."""
+
+    @property
+    def n_views(self) -> int:
+        """Number of measurements of each limb in a posture."""
+
+    @property
+    def knows_frames(self) -> bool:
+        """Whether it differs from frame to frame."""
+
+    def costs(self, places: Places, shift: int = 0) -> Array:
+        """Return how far a person is from it, (F,): mean truncated squares, 0 to 1; NaN where unknown.
+
+        Args:
+            places: of the person on the frames, metres.
+            shift: frames by which the evidence is later.
+        """
+
+
+_SCALES = tuple(sorted({round(a / b, 9) for a in METRES_BY_WORD.values() for b in METRES_BY_WORD.values()}))
+"""Factors between the units of lengths."""
+_POSTURE_S = 0.5
+"""Time after which a posture is another one, seconds: that of a step."""
+_MOST_POSTURES = 10.0
+"""Number of postures from which on their common offsets count more than their number."""
+_USUAL_SIGMAS = 3.0
+"""Standard deviations by which heights of people differ usually from those that a session states."""
+_LIMBS = 4
+"""Parts that tell something each in each view: forearms and calves."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A way to read the points of a file."""
+
+    joint_map: JointMap
+    """Names of its points."""
+    axes: str = "x,y,z"
+    """Axes of the file that are the session's x, y, z."""
+    scale: float = 1.0
+    """Factor of the points as they were read."""
+    shift: int = 0
+    """Frames by which the recording is later than the points."""
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Log likelihood ratios of a reading, nats; larger ones are better."""
+
+    bones: float
+    stature: float
+    upright: float
+    bend: float
+    place: float
+
+    @property
+    def total(self) -> float:
+        """Their sum."""
+        return self.bones + self.stature + self.upright + self.bend + self.place
+
+
+@dataclass(frozen=True, eq=False)
+class ReadPoints:
+    """Points of people on some frames of a session, as a file has them."""
+
+    names: tuple[str, ...]
+    """Names of the points in the file, (n_points,); empty if it has none, and a reading names them by their order."""
+    points: Array
+    """Positions in the axes of the file, (F, n_people, n_points, 3), metres as they are read; NaN where unknown."""
+    frames: IntArray
+    """Frames of the session, (F,), at equal steps."""
+    statures_m: tuple[float, ...]
+    """Height of each person that the session states, metres."""
+    up: Array
+    """Direction of the vertical of the session, (3,)."""
+    fps: float
+    """Frames of the session per second."""
+    witness: Witness | None
+    """The people of the recording on these frames; None for the body alone."""
+
+    @property
+    def step(self) -> int:
+        """Frames of the session from one to the next."""
+        return int(self.frames[1] - self.frames[0]) if len(self.frames) > 1 else 1
+
+    @cached_property
+    def n_postures(self) -> float:
+        """Number of postures that are another one each."""
+        known = np.isfinite(self.points).all(axis=-1).reshape(len(self.points), -1).any(axis=1)
+        return float(np.clip(known.sum() * self.step / self.fps / _POSTURE_S, 1.0, _MOST_POSTURES))
+
+    def places(self, reading: Reading) -> list[Places]:
+        """Return the points of the body of each person under a reading, metres."""
+        at = {name: i for i, name in enumerate(self.names or reading.joint_map.points)}
+        columns = {point: at[marker] for point, marker in reading.joint_map.markers.items() if marker in at}
+        read = reading.scale * self.points @ axes_matrix(reading.axes).T
+        return [{p: read[:, person, i] for p, i in columns.items()} for person in range(read.shape[1])]
+
+    def bones(self, reading: Reading) -> list[Bones]:
+        """Return the bones of each person under a reading."""
+        return [bones(places) for places in self.places(reading)]
+
+    def terms(self, reading: Reading) -> Terms:
+        """Return the log likelihood ratios of a reading."""
+        n, people = self.n_postures, self.places(reading)
+        found = [bones(places) for places in people]
+        return Terms(
+            n * sum(b.nats for b in found),
+            sum(stature_nats(b.stature, m) for b, m in zip(found, self.statures_m, strict=True)),
+            n * sum(upright_nats(places, self.up) for places in people),
+            n * sum(bend_nats(places) for places in people),
+            self._place_nats(reading),
+        )
+
+    def misplaced(self, reading: Reading) -> float:
+        """Return how far the people of a reading are from those of the recording, 0 to 1; NaN if unknown."""
+        costs = self._costs(reading)
+        known = costs[np.isfinite(costs)]
+        return float(known.mean()) if len(known) else np.nan
+
+    def likeliest(self, given: Reading, maps: Sequence[JointMap], in_space: bool) -> list[Reading]:
+        """Return the likeliest readings, the best first and all that are about as likely.
+
+        Args:
+            given: the one by which the file is read.
+            maps: names that the points may have.
+            in_space: whether the axes and the unit are the file's; those of key points are the cameras'.
+        """
+        axes = [*axis_conventions()] if in_space else [given.axes]
+        by_map = {m.name: self.bones(replace(given, joint_map=m)) for m in maps}
+        scales = self._scales(given) if in_space else [given.scale]
+        body = {Reading(*each, given.shift): -np.inf for each in product(maps, axes, scales)}
+        statures = {
+            (name, s): sum(stature_nats(s * b.stature, t) for b, t in zip(found, self.statures_m, strict=True))
+            for (name, found), s in product(by_map.items(), scales)
+        }
+        postures = {
+            (m.name, a): sum(upright_nats(p, self.up) + bend_nats(p) for p in self.places(Reading(m, a)))
+            for m, a in product(maps, axes)
+        }
+        for r in body:
+            name = r.joint_map.name
+            of_body = sum(b.nats for b in by_map[name]) + postures[name, r.axes]
+            body[r] = self.n_postures * of_body + statures[name, r.scale]
+        found, best = list[tuple[float, Reading]](), -np.inf
+        for reading in sorted(body, key=lambda r: -body[r]):  # places only take from it
+            if body[reading] < best - CLEAR_NATS:
+                break
+            found.append((body[reading] + self._place_nats(reading), reading))
+            best = max(best, found[-1][0])
+        return [r for nats, r in sorted(found, key=lambda f: -f[0]) if nats > best - CLEAR_NATS]
+
+    def _scales(self, given: Reading) -> list[float]:
+        """Return the factors that give people usual heights; the given one alone if it does."""
+        statures = np.array([b.stature for b in self.bones(given)]) / given.scale
+        expected = np.array(self.statures_m)[np.isfinite(statures)]
+        statures = statures[np.isfinite(statures)]
+
+        def is_near(scale: float) -> Mask:
+            return np.abs(np.log(scale * statures / expected)) <= _USUAL_SIGMAS * SizePriors().height
+
+        if is_near(given.scale).all():
+            return [given.scale]
+        usual = [s for s in _SCALES if is_near(s).any() or any(map(is_stature, s * statures))]
+        return sorted({given.scale, *usual})
+
+    def best_shift(self, reading: Reading) -> float:
+        """Return by how many frames of the session the recording is later than the points; 0 if that is not clear.
+
+        At most a quarter of the stretch is found. Between two frames a parabola tells.
+        """
+        most = len(self.points) // 4
+        if self.witness is None or not self.witness.knows_frames or not most:
+            return 0.0
+        costs = np.array([self._costs(replace(reading, shift=s)) for s in range(-most, most + 1)])
+        both = np.isfinite(costs).all(axis=0)  # the same frames and people at all shifts
+        if not both.any():
+            return 0.0
+        nats = self._weight * costs[:, both].mean(axis=1)
+        best = int(nats.argmax())
+        if nats[best] < nats[most] + CLEAR_NATS:
+            return 0.0
+        return self.step * (best - most + vertex(nats[max(best - 1, 0) : best + 2]))
+
+    def _place_nats(self, reading: Reading) -> float:
+        """Return the log likelihood of a reading by where people are, up to a constant; at most 0."""
+        return self._weight * float(np.nan_to_num(self.misplaced(reading)))
+
+    @property
+    def _weight(self) -> float:
+        """Log likelihood of people who are far from those of the recording.
+
+        Distances are normal with a standard deviation of half of the largest one. Each limb counts in each view.
+        """
+        return 0.0 if self.witness is None else -2.0 * _LIMBS * self.witness.n_views * self.n_postures
+
+    def _costs(self, reading: Reading) -> Array:
+        """Return how far each person is from those of the recording, (n_people * F,), 0 to 1; NaN if unknown."""
+        if self.witness is None:
+            return np.empty(0)
+        return np.concatenate([self.witness.costs(p, reading.shift) for p in self.places(reading)])
