@@ -10,7 +10,7 @@ from app.drawing.pictures import footage as footage_jpeg
 from app.session.footage_indices import footage_indices
 from tracker.errors import RecordingError
 from tracker.footage.video import open_footage
-from tracker.session.assemble import VIDEO_SUFFIXES
+from tracker.session.footage_files import VIDEO_SUFFIXES
 
 _LONGER_SIDE_PX = 320
 

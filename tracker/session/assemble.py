@@ -10,13 +10,13 @@ from tracker.calibrations.reading import CalibratedCameras, read_cameras
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
-from tracker.footage.image_file import IMAGE_SUFFIXES
-from tracker.footage.recording import check_size, read_background, read_mask
+from tracker.footage.recording import check_size
 from tracker.footage.video import Footage, open_footage
 from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS
+from tracker.session.footage_files import check_side_files, find_background, find_masks
 from tracker.session.matching import (
     camera_name,
     check_image_numbers,
@@ -24,7 +24,6 @@ from tracker.session.matching import (
     common_length,
     common_offsets,
     common_rate,
-    find_entry,
     footage_notes,
     match_footage,
 )
@@ -35,8 +34,6 @@ from tracker.validation import same_form
 T = TypeVar("T")
 
 DEFAULT_MODEL = "gavrila38"
-VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
-"""By which files of a folder are taken for videos."""
 
 
 @dataclass(frozen=True)
@@ -304,75 +301,6 @@ def _source(request: NewSession, camera: Camera, footage: Footage, fps: float, n
         footage.n_frames if request.common_frames and footage.n_frames > n_frames + offset else None,
     )
     return source.starting_at(start)
-
-
-def footage_in(folder: Path) -> list[Path]:
-    """Return the videos of a folder, or its folders of images if it has no video.
-
-    Raises:
-        SessionError: there is neither.
-    """
-    try:
-        entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
-    except OSError as error:
-        raise SessionError(
-            f"expected a folder of videos, found that {folder} cannot be read ({error.strerror}); check the path"
-        ) from error
-    videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
-    found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
-    if not found:
-        raise SessionError(
-            f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
-            "choose the folder that holds the footage of all cameras"
-        )
-    return found
-
-
-def _has_image(folder: Path) -> bool:
-    return any(path.suffix.lower() in IMAGE_SUFFIXES for path in folder.iterdir())
-
-
-def find_background(folder: Path, camera: str) -> Path:
-    """Find the background of a camera by its name, an image or a video.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    for suffix in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES):
-        path = find_entry(folder, f"{camera}{suffix}")
-        if path.is_file():
-            return path
-    raise RecordingError(
-        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4",
-        Remedy("give_camera_background"),
-    )
-
-
-def find_masks(folder: Path, camera: str) -> Path:
-    """Find the folder of masks of a camera by its name.
-
-    Raises:
-        RecordingError: there is none, or it has no masks.
-    """
-    path = find_entry(folder, camera)
-    if not any(path.glob("[0-9]" * 6 + ".png")):
-        raise RecordingError(
-            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame",
-            Remedy("give_camera_masks"),
-        )
-    return path
-
-
-def check_side_files(source: CameraSource) -> None:
-    """Read the background and the first mask, so that a misfit shows before tracking starts.
-
-    Raises:
-        RecordingError: one is missing, unreadable or of another size than the camera.
-    """
-    read_background(source)
-    if source.masks is not None:
-        first = min(find_masks(source.masks.parent, source.masks.name).glob("[0-9]" * 6 + ".png"))
-        read_mask(source, int(first.stem) - source.offset)
 
 
 def _make_people(
