@@ -14,6 +14,7 @@ __all__ = [
     "proxy",
     "recording",
     "sound",
+    "start_times",
     "video",
     "video_writer",
 ]

@@ -16,6 +16,14 @@ from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS
+from tracker.session.footage_clocks import (
+    ClockStarts,
+    clock_notes,
+    disagreement,
+    find_clock_starts,
+    find_name_starts,
+    sound_disagreement,
+)
 from tracker.session.footage_files import check_side_files, find_background, find_masks
 from tracker.session.matching import (
     camera_name,
@@ -173,6 +181,9 @@ def check_parts(
         cameras = {name: _fitted(calibrated[name], footage[name], request.rescale) for name in names}
         report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
+        clocks, sentences = _clocks(request, footage, fps)
+        if clocks is not None:
+            request = replace(request, offsets=clocks.starts, common_frames=True)
         whole = {name: whole_frames(start) for name, start in request.offsets.items()}
         check_image_numbers(footage, whole, request.common_frames)
         if request.common_frames:
@@ -180,8 +191,12 @@ def check_parts(
             request = replace(request, offsets={**whole, **request.offsets})
         n_frames = common_length(footage, whole, request.common_frames)
         report(f"All cameras have {n_frames} frames at {fps:g} per second.")
-        sources = tuple(_source(request, cameras[name], footage[name], fps, n_frames) for name in names)
-        for sentence in (*_left_out(sources, n_frames), *footage_notes(footage, fps, whole)):
+        lost = {} if clocks is None else clocks.lost
+        sources = tuple(
+            _source(request, cameras[name], footage[name], fps, n_frames).with_lost_in_footage(lost.get(name, ()))
+            for name in names
+        )
+        for sentence in (*sentences, *_left_out(sources, n_frames), *footage_notes(footage, fps, whole)):
             note(sentence)
     finally:
         for f in footage.values():
@@ -278,6 +293,25 @@ def _fitted(entry: CameraEntry, footage: Footage, rescale: bool) -> Camera:
         )
     check_size(entry.name, footage.path, size, camera.size)
     return camera
+
+
+def _clocks(request: NewSession, footage: Mapping[str, Footage], fps: float) -> tuple[ClockStarts | None, list[str]]:
+    """Return the clocks by which frames are to be paired, if there are any, and sentences on them.
+
+    Raises:
+        RecordingError: the names of pictures do not show which are of one instant, or sound cannot be read.
+    """
+    by_names = None if request.offsets else find_name_starts(footage)
+    files = {name: f.path for name, f in footage.items()}
+    declared = [f.fps for f in footage.values() if f.fps is not None]
+    found = find_clock_starts(files, fps, declared) if by_names is None else [by_names]
+    clocks, notes = clock_notes(found, {name: f.n_frames for name, f in footage.items()})
+    if clocks is None or not (any(clocks.starts.values()) or any(clocks.lost.values())):
+        return None, notes
+    if request.offsets:
+        given = {name: request.offsets.get(name, 0.0) for name in footage}
+        return None, disagreement("offsets given", given, clocks.source, clocks.starts)
+    return clocks, [*notes, *sound_disagreement(clocks, files, fps)]
 
 
 def _left_out(sources: Sequence[CameraSource], n_frames: int) -> Iterator[str]:

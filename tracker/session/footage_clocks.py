@@ -1,0 +1,212 @@
+"""Pair the footage of cameras by their clocks: those in video files, and the times in names of pictures."""
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.errors import RecordingError, Remedy
+from tracker.footage.camera_source import LostFrames
+from tracker.footage.frame_rates import same_rate
+from tracker.footage.image_folder import ImageFolder
+from tracker.footage.sound import read_sound, sound_delay
+from tracker.footage.start_times import CREATION_TIME, GPS_TIME, TIME_CODE, StartTime, read_start_times
+from tracker.footage.video import Footage
+from tracker.geometry.arrays import Array, IntArray
+from tracker.session.clocks import AGREE
+
+
+class ClockStarts(NamedTuple):
+    """The starts of all cameras by one kind of clock."""
+
+    source: str
+    """Of `tracker.footage.start_times`, or `names of the pictures`."""
+    starts: Mapping[str, float]
+    """`CameraSource.start_frames` by camera; the last camera to begin has 0."""
+    doubt: str
+    """Why the starts are not taken, as the end of a sentence; empty if they are."""
+    text: str
+    """The clock of each camera, for a sentence."""
+    lost: Mapping[str, Sequence[LostFrames]] = {}
+    """Frames that cameras lost, with frames of the footage."""
+
+
+def find_clock_starts(files: Mapping[str, Path], fps: float, declared: Collection[float] = ()) -> list[ClockStarts]:
+    """Return the starts of cameras by each kind of clock that all their files have, the best kind first.
+
+    Args:
+        files: footage by camera name.
+        fps: frame rate of the session, 1/s.
+        declared: rates of the videos where they are not the session's, 1/s.
+    """
+    read = {name: read_start_times(path, f"camera '{name}'") for name, path in files.items()}
+    out = []
+    for source in (TIME_CODE, GPS_TIME, CREATION_TIME):
+        times = {name: s for name, own in read.items() for s in own if s.source == source}
+        if len(times) < len(files) or len(files) < 2:
+            continue
+        latest = max(times.values(), key=lambda s: _after(s, next(iter(times.values()))))
+        starts = {name: round(-_after(s, latest) * fps, 3) for name, s in times.items()}
+        text = ", ".join(f"'{name}' {s.text}" for name, s in times.items())
+        out.append(ClockStarts(source, starts, _doubt(list(times.values()), fps, declared), text))
+    return out
+
+
+def _after(time: StartTime, other: StartTime) -> float:
+    """Return how much later a clock shows than another, s; of clocks that begin again, at most half a round."""
+    apart = time.seconds - other.seconds
+    return apart - time.period_s * round(apart / time.period_s) if np.isfinite(time.period_s) else apart
+
+
+def _doubt(times: Sequence[StartTime], fps: float, declared: Collection[float]) -> str:
+    step = max(s.step_s for s in times) * fps
+    if step > 1 + AGREE:
+        return f"it is known to {step:.0f} frames only"
+    if times[0].source == TIME_CODE and any(not same_rate(rate, fps) for rate in declared):
+        return f"it counts at another rate than the session's {fps:g} per second"
+    if all(s.may_count_pairs for s in times) and len({s.text for s in times}) > 1:
+        return "it may count each two pictures as one, since no frame in it is in the upper half of its rate"
+    return ""
+
+
+def clock_notes(found: Sequence[ClockStarts], n_frames: Mapping[str, int]) -> tuple[ClockStarts | None, list[str]]:
+    """Choose the clocks by which cameras are paired, and say so.
+
+    Args:
+        found: by `find_clock_starts`.
+        n_frames: number of frames of each camera's footage.
+
+    Returns:
+        The clocks whose starts are to be taken, if any; sentences on them and on others that disagree.
+    """
+    chosen, notes = None, []
+    for clocks in found:
+        differs, doubt = max(clocks.starts.values()) > 1 + AGREE, clocks.doubt
+        if any(start > n_frames[name] - 1 for name, start in clocks.starts.items()):
+            doubt = "by it the cameras have no frame in common"
+            differs = clocks.source != CREATION_TIME  # as a copy or a conversion may set it
+        listed = listed_starts(clocks.starts)
+        if chosen is None and not doubt:
+            chosen = clocks
+            if any(clocks.starts.values()) or any(clocks.lost.values()):
+                notes.append(f"frames are paired by the {clocks.source} ({clocks.text}): offsets {listed}")
+            notes += [
+                f"camera '{name}' lost {sum(r.n for r in rows)} frames by it, the first before its frame {rows[0].since}"
+                for name, rows in clocks.lost.items()
+                if rows
+            ]
+        elif chosen is not None and not doubt:
+            notes += disagreement(chosen.source, chosen.starts, clocks.source, clocks.starts)
+        elif differs and chosen is None:
+            notes.append(
+                f"by the {clocks.source} ({clocks.text}) the offsets would be {listed}; they are not taken: {doubt}"
+            )
+    return chosen, notes
+
+
+def listed_starts(starts: Mapping[str, float]) -> str:
+    """List the starts of cameras as offsets: `front=12 left=0`."""
+    return " ".join(f"{name}={start:.6g}" for name, start in starts.items())
+
+
+def disagreement(one: str, starts: Mapping[str, float], other: str, others: Mapping[str, float]) -> list[str]:
+    """Return a sentence if two ways to find the starts of cameras differ by more than a frame; both are named."""
+    both = [name for name in starts if name in others]
+    apart = np.array([starts[name] - others[name] for name in both])
+    if len(both) < 2 or np.ptp(apart) <= 1 + AGREE:
+        return []
+    first = min(others[name] for name in both)
+    return [
+        f"the {one} and the {other} disagree by up to {np.ptp(apart):.1f} frames: offsets "
+        f"{listed_starts({name: starts[name] for name in both})} by the {one}, "
+        f"{listed_starts({name: others[name] - first for name in both})} by the {other}; look which is right"
+    ]
+
+
+def sound_disagreement(clocks: ClockStarts, files: Mapping[str, Path], fps: float) -> list[str]:
+    """Return a sentence if the sound of the videos, where it is clear, contradicts their clocks.
+
+    Raises:
+        RecordingError: the sound of a video cannot be read.
+    """
+    sounds = {name: read_sound(path, name) for name, path in files.items()}
+    with_sound = {name: sound for name, sound in sounds.items() if sound is not None}
+    first, *others = with_sound or [""]
+    heard = {first: 0.0}
+    for name in others:
+        delay = sound_delay(with_sound[first], with_sound[name])
+        if delay is not None and delay.is_clear:
+            heard[name] = round(delay.delay_s * fps, 2)
+    return disagreement(clocks.source, clocks.starts, "sound", heard)
+
+
+def find_name_starts(footage: Mapping[str, Footage]) -> ClockStarts | None:
+    """Return the starts of folders of pictures by the times in their names; None where numbers or order pair them.
+
+    Raises:
+        RecordingError: the names do not show which pictures are of one instant.
+    """
+    folders = {name: f for name, f in footage.items() if isinstance(f, ImageFolder) and f.n_frames > 1}
+    if len(folders) < 2:
+        return None
+    times = {name: np.array(f.named.times) for name, f in folders.items() if f.named.times is not None}
+    if all(f.numbers is not None for f in folders.values()):
+        for name, own in times.items():
+            _check_numbers(name, folders[name], own)
+        return None
+    if len(times) < len(footage):
+        if len({f.named.readings for f in folders.values()} | {f.numbers is None for f in folders.values()}) > 2:
+            name, folder = next((n, f) for n, f in folders.items() if f.numbers is None)
+            raise RecordingError(
+                f"camera '{name}': expected names of pictures in {folder.path} with one number that rises by one: "
+                f"{folder.named.reason}",
+                Remedy("pair_images"),
+            )
+        return None
+    return _paired_by_time(folders, times)
+
+
+def _steps(times: Array, interval: float) -> IntArray | None:
+    """Return the number of frames from each picture to the next; None if times are too uneven to show it."""
+    steps = np.diff(times) / interval
+    whole = np.round(steps).astype(np.int64)
+    is_even = (whole >= 1).all() and np.abs(steps - whole).max() <= AGREE and whole.sum() <= 2 * len(times)
+    return whole if is_even else None
+
+
+def _check_numbers(name: str, folder: ImageFolder, times: Array) -> None:
+    """Check that no picture is missing by the times in names whose numbers rise by one.
+
+    Raises:
+        RecordingError: one is.
+    """
+    steps = _steps(times, float(np.median(np.diff(times))))
+    numbers = np.array(folder.numbers)
+    if steps is not None and (gaps := np.flatnonzero((steps > 1) & (np.diff(numbers) == np.diff(numbers).min()))).size:
+        before, after = folder.files[gaps[0]].name, folder.files[gaps[0] + 1].name
+        raise RecordingError(
+            f"camera '{name}': by their numbers {before} and {after} follow one another, by their times "
+            f"{steps[gaps[0]] - 1} pictures are missing between them",
+            Remedy("pair_images"),
+        )
+
+
+def _paired_by_time(folders: Mapping[str, ImageFolder], times: Mapping[str, Array]) -> ClockStarts:
+    interval = float(np.median(np.concatenate([np.diff(own) for own in times.values()])))
+    begin = max(own[0] for own in times.values())
+    starts, lost = {}, {}
+    for name, own in times.items():
+        steps = _steps(own, interval)
+        first = int(np.abs(own - begin).argmin())
+        if steps is None or abs(own[first] - begin) > interval:
+            found = "too uneven to show" if steps is None else "without a common span, which would show"
+            raise RecordingError(
+                f"camera '{name}': the times in the names of {folders[name].path} are {found} which pictures are of "
+                "one instant",
+                Remedy("pair_images"),
+            )
+        starts[name] = round(first - (own[first] - begin) / interval, 3)
+        lost[name] = [LostFrames(int(k) + 1, int(steps[k]) - 1) for k in np.flatnonzero(steps > 1) if k >= first]
+    text = ", ".join(f"'{name}' from {folders[name].files[0].name} on" for name in folders)
+    return ClockStarts("times in the names of the pictures", starts, "", text, lost)
