@@ -88,11 +88,12 @@ def _tags(container: InputContainer, name: str) -> Iterator[str]:
 
 def _time_code(container: InputContainer, rate: float) -> StartTime | None:
     for text in _tags(container, "timecode"):
-        frames = time_code_frames(text, rate) if 0 < rate < 100 else None  # frames have two digits
-        if frames is not None:
-            whole = round(nominal_rate(rate))
-            in_pairs = whole >= 48 and int(text.strip()[-2:]) < whole / 2
-            return StartTime(TIME_CODE, text.strip(), frames / rate, 1 / rate, 86_400.0, in_pairs)
+        whole, text = round(nominal_rate(rate)), text.strip()
+        frames = time_code_frames(text, rate) if 0 < whole <= 100 else None  # frames have two digits
+        last = time_code_frames(f"23:59:59{text[8:9]}{whole - 1:02}", rate)
+        if frames is not None and last is not None:
+            in_pairs = whole >= 48 and int(text[-2:]) < whole / 2
+            return StartTime(TIME_CODE, text, frames / rate, 1 / rate, (last + 1) / rate, in_pairs)
     return None
 
 

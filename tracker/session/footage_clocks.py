@@ -10,7 +10,7 @@ from tracker.errors import RecordingError, Remedy
 from tracker.footage.camera_source import LostFrames
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.image_folder import ImageFolder
-from tracker.footage.sound import read_sound, sound_delay
+from tracker.footage.sound import SoundSettings, read_sound, sound_delay
 from tracker.footage.start_times import CREATION_TIME, GPS_TIME, TIME_CODE, StartTime, read_start_times
 from tracker.footage.video import Footage
 from tracker.geometry.arrays import Array, IntArray
@@ -47,7 +47,7 @@ def find_clock_starts(files: Mapping[str, Path], fps: float, declared: Collectio
         if len(times) < len(files) or len(files) < 2:
             continue
         latest = max(times.values(), key=lambda s: _after(s, next(iter(times.values()))))
-        starts = {name: round(-_after(s, latest) * fps, 3) for name, s in times.items()}
+        starts = {name: round(-_after(s, latest) * fps, 3) + 0.0 for name, s in times.items()}  # no -0
         text = ", ".join(f"'{name}' {s.text}" for name, s in times.items())
         out.append(ClockStarts(source, starts, _doubt(list(times.values()), fps, declared), text))
     return out
@@ -61,10 +61,10 @@ def _after(time: StartTime, other: StartTime) -> float:
 
 def _doubt(times: Sequence[StartTime], fps: float, declared: Collection[float]) -> str:
     step = max(s.step_s for s in times) * fps
-    if step > 1 + AGREE:
-        return f"it is known to {step:.0f} frames only"
     if times[0].source == TIME_CODE and any(not same_rate(rate, fps) for rate in declared):
         return f"it counts at another rate than the session's {fps:g} per second"
+    if step > 1 + AGREE:
+        return f"it is known to {step:.0f} frames only"
     if all(s.may_count_pairs for s in times) and len({s.text for s in times}) > 1:
         return "it may count each two pictures as one, since no frame in it is in the upper half of its rate"
     return ""
@@ -84,7 +84,7 @@ def clock_notes(found: Sequence[ClockStarts], n_frames: Mapping[str, int]) -> tu
     for clocks in found:
         differs, doubt = max(clocks.starts.values()) > 1 + AGREE, clocks.doubt
         if any(start > n_frames[name] - 1 for name, start in clocks.starts.items()):
-            doubt = "by it the cameras have no frame in common"
+            doubt = doubt or "by it the cameras have no frame in common"
             differs = clocks.source != CREATION_TIME  # as a copy or a conversion may set it
         listed = listed_starts(clocks.starts)
         if chosen is None and not doubt:
@@ -92,7 +92,7 @@ def clock_notes(found: Sequence[ClockStarts], n_frames: Mapping[str, int]) -> tu
             if any(clocks.starts.values()) or any(clocks.lost.values()):
                 notes.append(f"frames are paired by the {clocks.source} ({clocks.text}): offsets {listed}")
             notes += [
-                f"camera '{name}' lost {sum(r.n for r in rows)} frames by it, the first before its frame {rows[0].since}"
+                f"camera '{name}' lost {sum(r.n for r in rows)} frames by it, first before its frame {rows[0].since}"
                 for name, rows in clocks.lost.items()
                 if rows
             ]
@@ -130,7 +130,8 @@ def sound_disagreement(clocks: ClockStarts, files: Mapping[str, Path], fps: floa
     Raises:
         RecordingError: the sound of a video cannot be read.
     """
-    sounds = {name: read_sound(path, name) for name, path in files.items()}
+    settings = SoundSettings(max_s=120.0)  # nobody has asked for sound: it is to cost seconds
+    sounds = {name: read_sound(path, name, settings) for name, path in files.items()}
     with_sound = {name: sound for name, sound in sounds.items() if sound is not None}
     first, *others = with_sound or [""]
     heard = {first: 0.0}

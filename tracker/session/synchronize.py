@@ -1,6 +1,7 @@
 """Find and set when cameras of a session began, to a fraction of a frame."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import ceil
 from typing import NamedTuple
 
 from tracker.errors import SessionError
@@ -9,6 +10,14 @@ from tracker.footage.flash import find_flash
 from tracker.footage.recording import Recording
 from tracker.footage.sound import read_sound, sound_delay
 from tracker.footage.video import open_footage
+from tracker.session.footage_clocks import (
+    ClockStarts,
+    clock_notes,
+    disagreement,
+    find_clock_starts,
+    find_name_starts,
+    sound_disagreement,
+)
 from tracker.session.matching import check_names
 from tracker.session.session import Session, save_cameras
 
@@ -79,6 +88,53 @@ def starts_by_flash(session: Session, recording: Recording) -> list[FoundStart]:
         start = first.start_frames + in_footage - in_first
         out.append(FoundStart(source.camera.name, start, None, flash.ratio, flash.is_clear))
     return out
+
+
+def starts_by_clock(session: Session) -> tuple[list[FoundStart], list[str]]:
+    """Return the starts of all cameras by the clocks of their footage, and sentences on clocks that disagree.
+
+    Raises:
+        SessionError: not all footage has a clock of one kind, or it does not show the starts.
+        RecordingError: footage cannot be read, or the names of pictures do not show which are of one instant.
+    """
+    chosen, notes = _clocks(session)
+    if chosen is None:
+        kinds = "a time code, a GPS time or a creation time in the videos of all of two cameras or more"
+        raise SessionError(f"{notes[0] if notes else f'expected {kinds}'}; give offsets, or use sound or a flash")
+    files = {c.camera.name: c.footage for c in session.cameras}
+    first = session.cameras[0]
+    shift = first.start_frames - chosen.starts[first.camera.name]
+    shift += ceil(max(0.0, -shift - min(chosen.starts.values())))  # footage has no frame before its first
+    out = [FoundStart(name, start + shift, None, None, True) for name, start in chosen.starts.items()]
+    return out, [*notes, *sound_disagreement(chosen, files, session.fps)]
+
+
+def clock_disagreement(session: Session, source: str, found: Sequence[FoundStart]) -> list[str]:
+    """Return a sentence if starts that were found otherwise contradict the clocks of the footage.
+
+    Args:
+        session: of the cameras.
+        source: names the way in which they were found, such as `sound`.
+        found: those that are not clear do not count.
+    """
+    chosen = _clocks(session)[0]
+    clear = {f.camera: f.start_frames for f in found if f.is_clear and f.start_frames is not None}
+    if chosen is None or not clear:
+        return []
+    reference = next(c for c in session.cameras if c.camera.name not in {f.camera for f in found})
+    starts = {reference.camera.name: reference.start_frames} | clear
+    return disagreement(source, starts, chosen.source, chosen.starts)
+
+
+def _clocks(session: Session) -> tuple[ClockStarts | None, list[str]]:
+    files = {c.camera.name: c.footage for c in session.cameras}
+    n_frames = {c.camera.name: c.offset + session.n_frames for c in session.cameras}
+    by_names = None
+    if all(path.is_dir() for path in files.values()):
+        by_names = find_name_starts({name: open_footage(path, name) for name, path in files.items()})
+    declared = [c.declared_fps for c in session.cameras if c.declared_fps is not None]
+    found = find_clock_starts(files, session.fps, declared) if by_names is None else [by_names]
+    return clock_notes(found, n_frames)
 
 
 def with_starts(session: Session, starts: Mapping[str, float], rates: Mapping[str, float]) -> Session:

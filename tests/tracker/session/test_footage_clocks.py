@@ -1,13 +1,17 @@
 """Footage is paired by the clocks in files and names, or it is named why not."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
-from clips import write_images
+from clips import encode, number, write_images
 from new_sessions import assert_refused, new, noted, room
 
 from tracker.errors import RecordingError, Remedy
 from tracker.footage.camera_source import LostFrames
 from tracker.footage.recording import Recording
+from tracker.footage.sound import SoundSettings
+from tracker.session import footage_clocks
 
 __all__ = ["room"]
 
@@ -37,7 +41,7 @@ def test_times_pair_pictures_of_cameras_that_each_lost_another(room):
         assert taken == pytest.approx(shown - left[0], abs=1e-3)
     assert "paired by the times in the names" in notes[0]
     lost = (("front", 5), ("left", 11))
-    assert notes[1:] == [f"camera '{c}' lost 1 frames by it, the first before its frame {k}" for c, k in lost]
+    assert notes[1:] == [f"camera '{c}' lost 1 frames by it, first before its frame {k}" for c, k in lost]
 
 
 def test_times_pair_pictures_of_a_camera_that_began_later(room):
@@ -104,3 +108,92 @@ def test_names_that_do_not_show_the_instant(room, front, left, expected):
 def test_equal_names_need_no_reading(room):
     names = [f"14253{k // 9}_{k % 9}" for k in range(20)]
     assert new(room, videos=folders(room, front=names, left=names), fps=30.0).n_frames == 20
+
+
+def tagged(room, key="timecode", n=20, suffix="mp4", **values):
+    paths = []
+    for name, value in values.items():
+        (room / f"{name}.mp4").unlink(missing_ok=True)
+        paths.append(encode(room / f"{name}.{suffix}", n=n, rate=Fraction(30000, 1001), tags={key: value}))
+    return paths
+
+
+def test_time_codes_pair_videos(room):
+    videos = tagged(room, front="00:00:59;25", left="00:01:00;02")
+    session, notes = noted(room, videos=videos)
+    assert [(c.offset, c.clock.ahead_frames) for c in session.cameras] == [(5, 0.0), (0, 0.0)]
+    assert session.n_frames == 15
+    assert notes[0] == (
+        "frames are paired by the time code ('front' 00:00:59;25, 'left' 00:01:00;02): offsets front=5 left=0"
+    )
+    assert "'left': frames that other cameras lack are left out at its end: 5" in notes[1]
+    with Recording(session.cameras) as recording:
+        assert [number(image) for image in recording.read(0)] == [5, 0]
+
+
+def test_time_codes_across_midnight(room):
+    session, _ = noted(room, videos=tagged(room, front="23:59:59:27", left="00:00:00:01"))
+    assert [c.offset for c in session.cameras] == [4, 0]
+
+
+@pytest.mark.parametrize(
+    ("values", "more", "expected"),
+    [
+        (
+            {"front": "10:00:00:00", "left": "10:00:02:00"},
+            {},
+            ["not taken: by it the cameras have no frame in"],
+        ),
+        ({"front": "10:00:00:00", "left": "10:00:00:00"}, {}, []),
+        ({"front": "10:00:00:00", "left": "later"}, {}, []),
+        (
+            {"front": "10:00:00:00", "left": "10:00:00:05"},
+            {"offsets": {"front": 2}},
+            ["offsets given and the time code disagree by up to 3.0 frames: offsets front=2 left=0 by the offsets"],
+        ),
+        ({"front": "10:00:00:00", "left": "10:00:00:05"}, {"offsets": {"front": 5}}, []),
+    ],
+)
+def test_time_codes_that_are_not_taken(room, values, more, expected):
+    session, notes = noted(room, videos=tagged(room, **values), **more)
+    given = more.get("offsets", {})
+    assert [c.offset for c in session.cameras] == [given.get("front", 0), 0]
+    assert len(notes) == len(expected)
+    assert all(words in note for words, note in zip(expected, notes, strict=True))
+
+
+def test_time_codes_of_another_rate_or_of_pairs(room):
+    videos = tagged(room, front="10:00:00:00", left="10:00:00:05")
+    _, (note,) = noted(room, videos=videos, fps=120.0)
+    assert "they are not taken: it counts at another rate than the session's 120 per second" in note
+    for name, at in (("front", "10:00:00:00"), ("left", "10:00:00:05")):
+        encode(room / f"{name}.mp4", n=20, rate=50, tags={"timecode": at})
+    _, (note,) = noted(room, folder=room / "t")
+    assert "they are not taken: it may count each two pictures as one" in note
+
+
+def test_creation_times_are_named_for_what_they_are(room):
+    videos = tagged(room, "creation_time", 45, front="2026-01-02T03:04:05Z", left="2026-01-02T03:04:06Z")
+    session, (note,) = noted(room, videos=videos)
+    assert [c.offset for c in session.cameras] == [0, 0]
+    assert "offsets would be front=29.97 left=0; they are not taken: it is known to 30 frames only" in note
+
+
+def test_exact_creation_times_pair_videos(room):
+    times = {"front": "2026-01-02T03:04:05.101Z", "left": "2026-01-02T03:04:05.202Z"}
+    session, _ = noted(room, videos=tagged(room, "creation_time", suffix="mkv", **times))
+    assert [(c.offset, c.clock.ahead_frames) for c in session.cameras] == [
+        (3, pytest.approx(-0.027, abs=0.001)),
+        (0, 0),
+    ]
+
+
+@pytest.mark.parametrize(("late", "is_named"), [(5, False), (9, True)])
+def test_time_code_against_sound(room, late, is_named, monkeypatch):
+    rate = SoundSettings().rate
+    samples = np.random.default_rng(0).normal(size=4 * rate).astype(np.float32)
+    heard = {"front": samples, "left": samples[round(late * rate * 1001 / 30000) :]}
+    monkeypatch.setattr(footage_clocks, "read_sound", lambda path, name, settings: heard[name])
+    session, notes = noted(room, videos=tagged(room, front="10:00:00:00", left="10:00:00:05"))
+    assert session.cameras[0].offset == 5
+    assert any("time code and the sound disagree by up to 4.0 frames" in note for note in notes) == is_named
