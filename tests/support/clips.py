@@ -41,8 +41,9 @@ def encode(
     matrix=None,
     tags=None,
     telemetry=(),
+    first=0,
 ):
-    """A video; `tags` are of the file, `telemetry` has a piece of GoPro's telemetry for each second."""
+    """A video; its pictures count from `first`, `tags` are of the file, `telemetry` has a piece for each second."""
     with av.open(str(path), "w", options=container_options or {}) as container:
         container.metadata.update(tags or {})
         stream = container.add_stream(codec, rate=rate, options=options or {})
@@ -56,7 +57,7 @@ def encode(
             stream.set_display_matrix([a, b, 0, c, d, 0, 0, 0, 2**30])
         data = container.add_data_stream("bin_data") if telemetry else None
         for i in range(n):
-            frame = av.VideoFrame.from_ndarray(picture(i), format="rgb24")
+            frame = av.VideoFrame.from_ndarray(picture(first + i), format="rgb24")
             frame.pts = start + (i if times is None else times[i])
             container.mux(stream.encode(frame))
         container.mux(stream.encode())

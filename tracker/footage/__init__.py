@@ -6,6 +6,7 @@ A frame is bit-identical however it is reached. Imports `geometry`. Callers use 
 
 __all__ = [
     "camera_source",
+    "chapters",
     "flash",
     "frame_rates",
     "image_file",

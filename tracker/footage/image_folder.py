@@ -54,7 +54,7 @@ class ImageFolder:
                 f"{self._where}: expected images of one kind ({', '.join(IMAGE_SUFFIXES)}), "
                 f"found {' and '.join(kinds) or 'none'}; leave only the frames of this camera in it"
             )
-        self.files = sorted(images, key=_natural)
+        self.files = sorted(images, key=natural_order)
         self.n_frames = len(self.files)
         self.named = picture_numbers([f.stem for f in self.files])
         places = self.named.numbers or self.named.times
@@ -112,6 +112,6 @@ def missing_numbers(numbers: Sequence[int], at_most: int = 5) -> list[int]:
     return list(islice(gaps, at_most))
 
 
-def _natural(path: Path) -> list[tuple[int, int | str]]:
+def natural_order(path: Path) -> list[tuple[int, int | str]]:
     """Return a sort key that compares runs of digits as numbers."""
     return [(0, int(t)) if t.isdecimal() else (1, t) for t in re.split(r"(\d+)", path.name) if t]

@@ -16,6 +16,7 @@ import av
 from av.container import InputContainer
 
 from tracker.errors import RecordingError
+from tracker.footage.chapters import chapter_files
 from tracker.footage.frame_rates import nominal_rate
 from tracker.footage.video_decoder import open_container
 
@@ -42,15 +43,15 @@ class StartTime(NamedTuple):
 
 
 def read_start_times(path: Path, where: str) -> tuple[StartTime, ...]:
-    """Read the clocks of a video; none of a folder of images, or of a file that cannot be read.
+    """Read the clocks of a video or of its first chapter; none of images, or of a file that cannot be read.
 
     Args:
         path: of the footage.
         where: names it in messages.
     """
-    if path.is_dir():
-        return ()
     try:
+        if path.is_dir():
+            path = next(iter(chapter_files(path)), path)
         with open_container(path, where) as container:
             rate = float(container.streams.video[0].average_rate or 0) if container.streams.video else 0.0
             found = (_time_code(container, rate), _gps_time(container), _creation_time(container))

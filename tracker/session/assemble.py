@@ -18,6 +18,7 @@ from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS
 from tracker.session.footage_clocks import (
     ClockStarts,
+    check_chapters,
     clock_notes,
     disagreement,
     find_clock_starts,
@@ -181,6 +182,7 @@ def check_parts(
         cameras = {name: _fitted(calibrated[name], footage[name], request.rescale) for name in names}
         report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
+        chapters = check_chapters(footage)
         clocks, sentences = _clocks(request, footage, fps)
         if clocks is not None:
             request = replace(request, offsets=clocks.starts, common_frames=True)
@@ -196,7 +198,7 @@ def check_parts(
             _source(request, cameras[name], footage[name], fps, n_frames).with_lost_in_footage(lost.get(name, ()))
             for name in names
         )
-        for sentence in (*sentences, *_left_out(sources, n_frames), *footage_notes(footage, fps, whole)):
+        for sentence in (*chapters, *sentences, *_left_out(sources, n_frames), *footage_notes(footage, fps, whole)):
             note(sentence)
     finally:
         for f in footage.values():

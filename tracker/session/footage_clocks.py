@@ -1,6 +1,7 @@
 """Pair the footage of cameras by their clocks: those in video files, and the times in names of pictures."""
 
 from collections.abc import Collection, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,11 +9,12 @@ import numpy as np
 
 from tracker.errors import RecordingError, Remedy
 from tracker.footage.camera_source import LostFrames
+from tracker.footage.chapters import Chapter, ChapteredVideo, next_chapter
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.image_folder import ImageFolder
 from tracker.footage.sound import SoundSettings, read_sound, sound_delay
 from tracker.footage.start_times import CREATION_TIME, GPS_TIME, TIME_CODE, StartTime, read_start_times
-from tracker.footage.video import Footage
+from tracker.footage.video import Footage, VideoFile
 from tracker.geometry.arrays import Array, IntArray
 from tracker.session.clocks import AGREE
 
@@ -140,6 +142,65 @@ def sound_disagreement(clocks: ClockStarts, files: Mapping[str, Path], fps: floa
         if delay is not None and delay.is_clear:
             heard[name] = round(delay.delay_s * fps, 2)
     return disagreement(clocks.source, clocks.starts, "sound", heard)
+
+
+def check_chapters(footage: Mapping[str, Footage]) -> list[str]:
+    """Check that the files of each recording that is cut follow one another, and return sentences on them.
+
+    A video whose next chapter lies beside it is noted too.
+
+    Raises:
+        RecordingError: files in one folder do not follow one another, or have no clock that shows it.
+    """
+    notes = []
+    for name, f in footage.items():
+        if isinstance(f, ChapteredVideo) and len(f.chapters) > 1:
+            sources = {_followed_by(one, other, name, f.path) for one, other in pairwise(f.chapters)}
+            files = ", ".join(c.path.name for c in f.chapters)
+            notes.append(f"camera '{name}': {files} follow one another by their {' and '.join(sorted(sources))}")
+        following = next_chapter(f.path) if isinstance(f, VideoFile) else None
+        gap = _gap(f, following) if isinstance(f, VideoFile) and following is not None else None
+        if following is not None and (gap.is_none if gap is not None else following.stem[0] in "Gg"):
+            notes.append(
+                f"camera '{name}': {following.name} beside {f.path.name} is the next chapter of its recording and is "
+                "not used; put the chapters alone into a folder, and give that as the footage"
+            )
+    return notes
+
+
+class _Gap(NamedTuple):
+    """The time between two files of a recording."""
+
+    source: str
+    """Clock by which it is known."""
+    seconds: float
+    is_none: bool
+    """Whether it is none at the resolution of the clock."""
+
+
+def _gap(one: Chapter, path: Path) -> _Gap | None:
+    """Return the time from the end of a video to the start of another; None if no clock of both shows it."""
+    starts, others = ({s.source: s for s in read_start_times(p, p.name)} for p in (one.path, path))
+    for source in (TIME_CODE, GPS_TIME, CREATION_TIME):
+        if source in starts and source in others:
+            gap_s = _after(others[source], starts[source]) - one.n_frames / one.fps
+            step_s = max(starts[source].step_s, others[source].step_s, 1 / one.fps)
+            return _Gap(source, gap_s, abs(gap_s) <= (1 + AGREE) * step_s)
+    return None
+
+
+def _followed_by(one: Chapter, other: Chapter, camera: str, folder: Path) -> str:
+    gap = _gap(one, other.path)
+    if gap is not None and gap.is_none:
+        return gap.source
+    found = "no clock in both that shows it"
+    if gap is not None:
+        found = f"that {other.path.name} begins {abs(gap.seconds):.3g} s {'after' if gap.seconds > 0 else 'before'} "
+        found += f"{one.path.name} ends by its {gap.source}"
+    raise RecordingError(
+        f"camera '{camera}': expected the videos in {folder} to follow one another, found {found}; give one file, or "
+        "join them without a gap"
+    )
 
 
 def find_name_starts(footage: Mapping[str, Footage]) -> ClockStarts | None:

@@ -4,16 +4,14 @@ from pathlib import Path
 
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.chapters import VIDEO_SUFFIXES
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import read_background, read_mask
 from tracker.session.matching import find_entry
 
-VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
-"""By which files of a folder are taken for videos."""
-
 
 def footage_in(folder: Path) -> list[Path]:
-    """Return the videos of a folder, or its folders of images if it has no video.
+    """Return the videos of a folder, or its folders of images or of the chapters of a video if it has no video.
 
     Raises:
         SessionError: there is neither.
@@ -25,7 +23,7 @@ def footage_in(folder: Path) -> list[Path]:
             f"expected a folder of videos, found that {folder} cannot be read ({error.strerror}); check the path"
         ) from error
     videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
-    found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
+    found = videos or [path for path in entries if path.is_dir() and _has_footage(path)]
     if not found:
         raise SessionError(
             f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
@@ -34,8 +32,8 @@ def footage_in(folder: Path) -> list[Path]:
     return found
 
 
-def _has_image(folder: Path) -> bool:
-    return any(path.suffix.lower() in IMAGE_SUFFIXES for path in folder.iterdir())
+def _has_footage(folder: Path) -> bool:
+    return any(path.suffix.lower() in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES) for path in folder.iterdir())
 
 
 def find_background(folder: Path, camera: str) -> Path:

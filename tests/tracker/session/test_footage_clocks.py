@@ -12,6 +12,7 @@ from tracker.footage.camera_source import LostFrames
 from tracker.footage.recording import Recording
 from tracker.footage.sound import SoundSettings
 from tracker.session import footage_clocks
+from tracker.session.session import load_session
 
 __all__ = ["room"]
 
@@ -197,3 +198,61 @@ def test_time_code_against_sound(room, late, is_named, monkeypatch):
     session, notes = noted(room, videos=tagged(room, front="10:00:00:00", left="10:00:00:05"))
     assert session.cameras[0].offset == 5
     assert any("time code and the sound disagree by up to 4.0 frames" in note for note in notes) == is_named
+
+
+def chapters(room, codes, key="timecode", names=("GX010042.MP4", "GX020042.MP4")):
+    (room / "left.mp4").unlink()
+    (room / "left").mkdir()
+    for name, code in zip(names, codes, strict=True):
+        tags = {} if code is None else {key: code}
+        encode(room / "left" / name, n=10, rate=Fraction(30000, 1001), tags=tags)
+    encode(room / "front.mp4", n=20, rate=Fraction(30000, 1001))
+    return [room / "front.mp4", room / "left"]
+
+
+@pytest.mark.parametrize(
+    ("codes", "key", "clock"),
+    [
+        (("10:00:00:25", "10:00:01:05"), "timecode", "time code"),
+        (("2026-01-02T03:04:05Z", "2026-01-02T03:04:06Z"), "creation_time", "creation time"),
+    ],
+)
+def test_chapters_are_joined_by_their_clocks(room, codes, key, clock):
+    session, notes = noted(room, videos=chapters(room, codes, key))
+    assert session.n_frames == 20
+    assert notes == [f"camera 'left': GX010042.MP4, GX020042.MP4 follow one another by their {clock}"]
+    with Recording(load_session(room / "s").cameras) as recording:
+        assert [number(recording.read(k)[1]) for k in (0, 9, 10, 19)] == [0, 9, 0, 9]
+
+
+@pytest.mark.parametrize(
+    ("codes", "expected"),
+    [
+        ((None, None), r"in \S+left to follow one another, found no clock in both that shows it"),
+        (("10:00:00:00", None), "no clock in both"),
+        (("10:00:00:00", "10:00:00:20"), r"GX020042\.MP4 begins 0\.334 s after GX010042\.MP4 ends by its time code"),
+        (("10:00:00:00", "10:00:00:00"), r"GX020042\.MP4 begins 0\.334 s before GX010042\.MP4 ends by its time code"),
+    ],
+)
+def test_chapters_that_do_not_follow_one_another(room, codes, expected):
+    assert_refused(room, RecordingError, expected, videos=chapters(room, codes))
+
+
+@pytest.mark.parametrize(
+    ("names", "codes", "is_named"),
+    [
+        (("GX010042.MP4", "GX020042.MP4"), (None, None), True),
+        (("GX010042.MP4", "GX020042.MP4"), ("10:00:00:00", "10:00:00:10"), True),
+        (("GX010042.MP4", "GX020042.MP4"), ("10:00:00:00", "11:00:00:10"), False),
+        (("C0001.MP4", "C0002.MP4"), ("10:00:00:00", "10:00:00:10"), True),
+        (("C0001.MP4", "C0002.MP4"), (None, None), False),
+        (("C0001.MP4", "C0002.MP4"), ("10:00:00:00", "10:00:03:10"), False),
+    ],
+)
+def test_a_chapter_that_is_left_out_is_named(room, names, codes, is_named):
+    chapters(room, codes, names=names)
+    encode(room / "front.mp4", n=10, rate=Fraction(30000, 1001))
+    paths = {"left": room / "left" / names[0], "front": room / "front.mp4"}
+    _, notes = noted(room, videos=(), camera_paths=paths)
+    expected = f"camera 'left': {names[1]} beside {names[0]} is the next chapter of its recording and is not used"
+    assert [note.startswith(expected) for note in notes] == [True] * is_named
