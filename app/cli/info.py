@@ -43,6 +43,7 @@ def summarize(session: "Session") -> dict[str, Any]:
     if session.annotations_path.exists():
         with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
             poses = {name: store.frames(name) for name in poses}
+    clocks, notes = _clocks(session)
     revisions = read_posed_revisions(session.annotations_path, list(poses))
     outdated = {
         name: sum(revisions.of(name, r.frame) != revisions.present for r in rows) for name, rows in poses.items()
@@ -64,6 +65,7 @@ def summarize(session: "Session") -> dict[str, Any]:
                 "time_offset_s": c.clock.ahead_frames / session.fps,
                 "time_rate": c.clock.rate,
                 "lost_frames": [list(lost) for lost in c.clock.lost],
+                "clock": clocks.get(c.camera.name),
                 "missing": [m.kind for m in missing if m.camera == c.camera.name],
             }
             for c in session.cameras
@@ -82,7 +84,19 @@ def summarize(session: "Session") -> dict[str, Any]:
         ],
         "observations": [_observations(session, name) for name in list_observations(session)],
         "masks": [_masks(session, name) for name in list_masks(session)],
+        "notes": notes,
     }
+
+
+def _clocks(session: "Session") -> tuple[dict[str, str], list[str]]:
+    """Return the clock of each camera's footage, and sentences where they contradict the session or cannot be read."""
+    from app.remedies import command_line_text
+    from tracker.session.synchronize import footage_clocks
+
+    try:
+        return footage_clocks(session)
+    except TrackerError as error:
+        return {}, [command_line_text(error)]
 
 
 def _observations(session: "Session", name: str) -> dict[str, Any]:
@@ -134,6 +148,7 @@ def _format(summary: dict[str, Any]) -> str:
     for c in summary["cameras"]:
         extras = "".join(f", {name}" for name in ("background", "masks") if c[name])
         shift = f", offset {c['offset']}" if c["offset"] else ""
+        shift += f", {c['clock']}" if c["clock"] else ""
         missing = f"; missing: {', '.join(c['missing'])}" if c["missing"] else ""
         lines.append(f"  camera {c['name']}: {c['size'][0]}x{c['size'][1]}, {c['footage']}{extras}{shift}{missing}")
     for p in summary["people"]:
@@ -160,6 +175,7 @@ def _format(summary: dict[str, Any]) -> str:
     if any(c["missing"] for c in summary["cameras"]):
         command = f"quadrille relink {summary['folder']} --search FOLDER"
         lines.append(f"warning: files are missing: put them back, or run {command}")
+    lines += [f"note: {note}" for note in summary["notes"]]
     if summary["warning"] is not None:
         lines.append(f"warning: {summary['warning']}")
     return "\n".join(lines)

@@ -9,6 +9,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.flash import find_flash
 from tracker.footage.recording import Recording
 from tracker.footage.sound import read_sound, sound_delay
+from tracker.footage.start_times import read_start_times
 from tracker.footage.video import open_footage
 from tracker.session.footage_clocks import (
     ClockStarts,
@@ -124,6 +125,22 @@ def clock_disagreement(session: Session, source: str, found: Sequence[FoundStart
     reference = next(c for c in session.cameras if c.camera.name not in {f.camera for f in found})
     starts = {reference.camera.name: reference.start_frames} | clear
     return disagreement(source, starts, chosen.source, chosen.starts)
+
+
+def footage_clocks(session: Session) -> tuple[dict[str, str], list[str]]:
+    """Return the best clock of each camera's footage, for a person, and a sentence if they contradict the session.
+
+    Raises:
+        RecordingError: images cannot be read, or their names do not show which are of one instant.
+    """
+    read = {c.camera.name: read_start_times(c.footage, c.camera.name) for c in session.cameras}
+    found = {name: f"{starts[0].source} {starts[0].text}" for name, starts in read.items() if starts}
+    chosen = _clocks(session)[0]
+    if chosen is None:
+        return found, []
+    found = {name: found.get(name, chosen.source) for name in chosen.starts}
+    starts = {c.camera.name: c.start_frames for c in session.cameras}
+    return found, disagreement("session", starts, chosen.source, chosen.starts)
 
 
 def _clocks(session: Session) -> tuple[ClockStarts | None, list[str]]:
