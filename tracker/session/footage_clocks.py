@@ -92,9 +92,9 @@ def clock_notes(found: Sequence[ClockStarts], n_frames: Mapping[str, int]) -> tu
         if chosen is None and not doubt:
             chosen = clocks
             if any(clocks.starts.values()) or any(clocks.lost.values()):
-                notes.append(f"frames are paired by the {clocks.source} ({clocks.text}): offsets {listed}")
+                notes.append(f"the {clocks.source} of all cameras pairs frames ({clocks.text}): offsets {listed}")
             notes += [
-                f"camera '{name}' lost {sum(r.n for r in rows)} frames by it, first before its frame {rows[0].since}"
+                f"camera '{name}': frames lost by it: {sum(r.n for r in rows)}, first before its frame {rows[0].since}"
                 for name, rows in clocks.lost.items()
                 if rows
             ]
@@ -113,10 +113,11 @@ def listed_starts(starts: Mapping[str, float]) -> str:
 
 
 def disagreement(one: str, starts: Mapping[str, float], other: str, others: Mapping[str, float]) -> list[str]:
-    """Return a sentence if two ways to find the starts of cameras differ by more than a frame; both are named."""
+    """Return a sentence if two ways to find the starts of cameras differ by a frame or more; both are named."""
     both = [name for name in starts if name in others]
     apart = np.array([starts[name] - others[name] for name in both])
-    if len(both) < 2 or np.ptp(apart) <= 1 + AGREE:
+    # A clock that counts frames shows each start to less than a frame.
+    if len(both) < 2 or np.ptp(apart) < 1 - 1e-6:
         return []
     first = min(others[name] for name in both)
     return [
@@ -231,6 +232,8 @@ def find_name_starts(footage: Mapping[str, Footage]) -> ClockStarts | None:
 
 def _steps(times: Array, interval: float) -> IntArray | None:
     """Return the number of frames from each picture to the next; None if times are too uneven to show it."""
+    if interval <= 0:  # times of whole seconds
+        return None
     steps = np.diff(times) / interval
     whole = np.round(steps).astype(np.int64)
     is_even = (whole >= 1).all() and np.abs(steps - whole).max() <= AGREE and whole.sum() <= 2 * len(times)
@@ -271,4 +274,4 @@ def _paired_by_time(folders: Mapping[str, ImageFolder], times: Mapping[str, Arra
         starts[name] = round(first - (own[first] - begin) / interval, 3)
         lost[name] = [LostFrames(int(k) + 1, int(steps[k]) - 1) for k in np.flatnonzero(steps > 1) if k >= first]
     text = ", ".join(f"'{name}' from {folders[name].files[0].name} on" for name in folders)
-    return ClockStarts("times in the names of the pictures", starts, "", text, lost)
+    return ClockStarts("time in the names of the pictures", starts, "", text, lost)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import NamedTuple
 
-from tracker.errors import SessionError
+from tracker.errors import Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.flash import find_flash
 from tracker.footage.recording import Recording
@@ -20,6 +20,7 @@ from tracker.session.footage_clocks import (
     sound_disagreement,
 )
 from tracker.session.matching import check_names
+from tracker.session.missing_files import missing_files
 from tracker.session.session import Session, save_cameras
 
 
@@ -35,6 +36,22 @@ class FoundStart(NamedTuple):
     """How much the peak or the flash stands out from the next largest."""
     is_clear: bool
     """Whether it stands out enough to be taken."""
+
+
+def require_footage(session: Session) -> None:
+    """Check that there are two cameras to compare, and that their footage is there.
+
+    Raises:
+        SessionError: one camera, or a file is missing.
+    """
+    if len(session.cameras) < 2:
+        raise SessionError("expected two cameras or more, found one, which has nothing to be compared with")
+    for missing in missing_files(session):
+        if missing.kind == "footage":
+            raise SessionError(
+                f"camera '{missing.camera}': its footage {missing.path} is not there",
+                Remedy("relink", session=session.folder),
+            )
 
 
 def starts_by_sound(session: Session) -> list[FoundStart]:

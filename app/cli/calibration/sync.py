@@ -58,6 +58,7 @@ def synchronize(
     from tracker.session.session import load_session
     from tracker.session.synchronize import (
         clock_disagreement,
+        require_footage,
         starts_by_clock,
         starts_by_flash,
         starts_by_sound,
@@ -69,6 +70,8 @@ def synchronize(
             "expected one of --sound, --flash, --timecode, or --offset and --drift; say how to find the offsets"
         )
     session, found, notes = load_session(folder), [], []
+    if ways:
+        require_footage(session)
     if "time code" in ways:
         found, notes = starts_by_clock(session)
     elif ways:
@@ -121,4 +124,6 @@ def _format(found: dict[str, Any]) -> str:
         ]
     elif any(f["is_clear"] for f in found["found"]):
         lines.append("nothing written; say --apply to write what is clear")
+    elif found["found"]:
+        lines.append("nothing written: nothing that was found is clear")
     return "\n".join(lines)

@@ -1,14 +1,16 @@
 """`quadrille sync` from end to end."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from command_line import assert_refused
 
+from tracker.errors import SessionError
 from tracker.footage import sound, start_times
 from tracker.session import footage_clocks, synchronize
-from tracker.session.session import load_session
+from tracker.session.session import load_session, save_cameras
 
 
 def clocks(session):
@@ -90,7 +92,7 @@ def test_time_codes(run, timed):
     status, out, _ = run("sync", session, "--timecode")
     assert status == 0
     assert f"{name}: offset 3.000 frames, clear" in out
-    assert "note: frames are paired by the time code (" in out
+    assert "note: the time code of all cameras pairs frames (" in out
     assert "nothing written; say --apply" in out
     assert_refused(run("sync", session, "--timecode", "--apply"), [f"'{name}'", "an offset of at most 0"])
     codes[name] = "10:00:09:00"
@@ -112,3 +114,23 @@ def test_sound_against_time_codes(run, heard, timed):
 def test_videos_without_clock(run, session):
     assert_refused(run("sync", session, "--timecode"), ["expected a time code, a GPS time or a creation time"])
     assert_refused(run("sync", session, "--timecode", "--sound"), ["one of --sound, --flash, --timecode"])
+
+
+@pytest.mark.parametrize("way", ["--sound", "--flash", "--timecode"])
+def test_nothing_to_compare(run, session, way):
+    loaded = load_session(session)
+    name = loaded.cameras[0].camera.name
+    save_cameras(loaded, [replace(c, footage=session / "missing.mp4") for c in loaded.cameras])
+    assert_refused(run("sync", session, way), [f"camera '{name}': its footage", "missing.mp4 is not there", "relink"])
+
+
+def test_one_camera_has_nothing_to_be_compared_with(session):
+    loaded = load_session(session)
+    with pytest.raises(SessionError, match="expected two cameras or more, found one"):
+        synchronize.require_footage(replace(loaded, cameras=loaded.cameras[:1]))
+
+
+def test_a_static_scene_shows_nothing(run, session, monkeypatch):
+    monkeypatch.setattr(synchronize, "find_flash", lambda recording, i, n_frames: None)
+    status, out, _ = run("sync", session, "--flash", "--apply")
+    assert (status, out.splitlines()[-1]) == (0, "nothing written: nothing that was found is clear")

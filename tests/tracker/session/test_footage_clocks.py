@@ -40,9 +40,9 @@ def test_times_pair_pictures_of_cameras_that_each_lost_another(room):
         shown = own[0] + (own[camera.offset :] - own[0])
         taken = [(k + camera.clock.ahead(k)) / 30 for k in range(session.n_frames)]
         assert taken == pytest.approx(shown - left[0], abs=1e-3)
-    assert "paired by the times in the names" in notes[0]
+    assert notes[0].startswith("the time in the names of the pictures of all cameras pairs frames ('front' from ")
     lost = (("front", 5), ("left", 11))
-    assert notes[1:] == [f"camera '{c}' lost 1 frames by it, first before its frame {k}" for c, k in lost]
+    assert notes[1:] == [f"camera '{c}': frames lost by it: 1, first before its frame {k}" for c, k in lost]
 
 
 def test_times_pair_pictures_of_a_camera_that_began_later(room):
@@ -55,6 +55,7 @@ def test_times_pair_pictures_of_a_camera_that_began_later(room):
         assert [int(image[0, 0, 1]) for image in recording.read(0)] == [16, 0]
 
 
+@pytest.mark.filterwarnings("error")
 def test_index_beside_a_clock(room):
     names = {c: [f"20240311_1425{30 + k // 9}_{k:06d}" for k in range(3, 20)] for c in ("front", "left")}
     session, notes = noted(room, videos=folders(room, **names), fps=30.0)
@@ -125,7 +126,7 @@ def test_time_codes_pair_videos(room):
     assert [(c.offset, c.clock.ahead_frames) for c in session.cameras] == [(5, 0.0), (0, 0.0)]
     assert session.n_frames == 15
     assert notes[0] == (
-        "frames are paired by the time code ('front' 00:00:59;25, 'left' 00:01:00;02): offsets front=5 left=0"
+        "the time code of all cameras pairs frames ('front' 00:00:59;25, 'left' 00:01:00;02): offsets front=5 left=0"
     )
     assert "'left': frames that other cameras lack are left out at its end: 5" in notes[1]
     with Recording(session.cameras) as recording:
@@ -153,6 +154,7 @@ def test_time_codes_across_midnight(room):
             ["offsets given and the time code disagree by up to 3.0 frames: offsets front=2 left=0 by the offsets"],
         ),
         ({"front": "10:00:00:00", "left": "10:00:00:05"}, {"offsets": {"front": 5}}, []),
+        ({"front": "10:00:00:00", "left": "10:00:00:05"}, {"offsets": {"front": 4}}, ["disagree by up to 1.0 frames"]),
     ],
 )
 def test_time_codes_that_are_not_taken(room, values, more, expected):
