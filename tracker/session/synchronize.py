@@ -144,8 +144,12 @@ def clock_disagreement(session: Session, source: str, found: Sequence[FoundStart
     return disagreement(source, starts, chosen.source, chosen.starts)
 
 
-def footage_clocks(session: Session) -> tuple[dict[str, str], list[str]]:
+def footage_clocks(session: Session, starts_by: str = "session") -> tuple[dict[str, str], list[str]]:
     """Return the best clock of each camera's footage, for a person, and a sentence if they contradict the session.
+
+    Args:
+        session: of the cameras.
+        starts_by: names what its starts are from, for the sentence.
 
     Raises:
         RecordingError: images cannot be read, or their names do not show which are of one instant.
@@ -157,7 +161,7 @@ def footage_clocks(session: Session) -> tuple[dict[str, str], list[str]]:
         return found, []
     found = {name: found.get(name, chosen.source) for name in chosen.starts}
     starts = {c.camera.name: c.start_frames for c in session.cameras}
-    return found, disagreement("session", starts, chosen.source, chosen.starts)
+    return found, disagreement(starts_by, starts, chosen.source, chosen.starts)
 
 
 def _clocks(session: Session) -> tuple[ClockStarts | None, list[str]]:
