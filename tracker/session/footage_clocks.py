@@ -227,6 +227,10 @@ def find_name_starts(footage: Mapping[str, Footage]) -> ClockStarts | None:
                 Remedy("pair_images"),
             )
         return None
+    if len({f.n_frames for f in folders.values()}) == 1:
+        apart = np.ptp(np.stack([*times.values()]), axis=0)
+        if apart.max() < AGREE * np.diff(next(iter(times.values()))).min():
+            return None  # pictures of one instant have one place in the order
     return _paired_by_time(folders, times)
 
 
@@ -234,10 +238,12 @@ def _steps(times: Array, interval: float) -> IntArray | None:
     """Return the number of frames from each picture to the next; None if times are too uneven to show it."""
     if interval <= 0:  # times of whole seconds
         return None
-    steps = np.diff(times) / interval
-    whole = np.round(steps).astype(np.int64)
-    is_even = (whole >= 1).all() and np.abs(steps - whole).max() <= AGREE and whole.sum() <= 2 * len(times)
-    return whole if is_even else None
+    steps = np.maximum(np.round(np.diff(times) / interval), 0).astype(np.int64)
+    n = np.concatenate([[0], np.cumsum(steps)])
+    if not steps.all() or n[-1] > 2 * len(times):
+        return None
+    slope, first = np.polyfit(n, times - times[0], 1) if len(n) > 2 else (interval, 0.0)
+    return steps if np.abs(times - times[0] - first - slope * n).max() <= AGREE * interval else None
 
 
 def _check_numbers(name: str, folder: ImageFolder, times: Array) -> None:

@@ -95,3 +95,16 @@ def test_odd_names(names):
 
 def test_one_file():
     assert picture_numbers(["000012_keypoints"]).numbers == (12,)
+
+
+@given(
+    st.lists(st.text("0129_-. aFé²١", max_size=12), min_size=1, max_size=8, unique=True),
+    st.booleans(),
+)
+def test_any_names(names, may_repeat):
+    found = picture_numbers(names, may_repeat)
+    assert (found.numbers is None) == bool(found.reason)
+    for values in (found.numbers, found.times):
+        assert values is None or len(values) == len(names)
+    if found.numbers is not None and not may_repeat:
+        assert len(set(found.numbers)) == len(names)

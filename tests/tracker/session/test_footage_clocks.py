@@ -107,6 +107,22 @@ def test_names_that_do_not_show_the_instant(room, front, left, expected):
     assert new(room, videos=videos, fps=30.0, offsets={"left": 0, "front": 0}).n_frames == n
 
 
+def test_jitter_hides_no_loss(room):
+    """Stamps on arrival lie up to 8 ms from even ones, a quarter of a frame."""
+    rng = np.random.default_rng(3)
+    late = [rng.uniform(-0.008, 0.008, 20) for _ in range(2)]
+    front, left = (np.delete(TIMES + late[i], k) for i, k in enumerate((5, 11)))
+    videos = folders(room, front=seconds_and_microseconds(front), left=seconds_and_microseconds(left))
+    session, _ = noted(room, videos=videos, fps=30.0)
+    assert [c.clock.lost for c in session.cameras] == [(LostFrames(5, 1),), (LostFrames(11, 1),)]
+
+
+def test_uneven_times_of_one_trigger(room):
+    names = seconds_and_microseconds(TIMES[0] + np.cumsum(np.random.default_rng(0).uniform(0.1, 1, 20)))
+    session, notes = noted(room, videos=folders(room, front=names, left=names), fps=30.0)
+    assert (session.n_frames, notes) == (20, [])
+
+
 def test_equal_names_need_no_reading(room):
     names = [f"14253{k // 9}_{k % 9}" for k in range(20)]
     assert new(room, videos=folders(room, front=names, left=names), fps=30.0).n_frames == 20
