@@ -265,19 +265,25 @@ def _check_numbers(name: str, folder: ImageFolder, times: Array) -> None:
 
 def _paired_by_time(folders: Mapping[str, ImageFolder], times: Mapping[str, Array]) -> ClockStarts:
     interval = float(np.median(np.concatenate([np.diff(own) for own in times.values()])))
-    begin = max(own[0] for own in times.values())
+    steps = {name: _steps(own, interval) for name, own in times.items()}
+    latest = max(times.values(), key=lambda own: float(own[0]))
+    nearest = {n: np.minimum(np.searchsorted(t, latest - interval / 2), len(t) - 1) for n, t in times.items()}
+    apart = np.stack([np.abs(own[nearest[name]] - latest) for name, own in times.items()])
+    common = np.flatnonzero(apart.max(axis=0) < interval / 2)  # pictures near which no camera lost one
     starts, lost = {}, {}
     for name, own in times.items():
-        steps = _steps(own, interval)
-        first = int(np.abs(own - begin).argmin())
-        if steps is None or abs(own[first] - begin) > interval:
-            found = "too uneven to show" if steps is None else "without a common span, which would show"
+        own_steps = steps[name]
+        if own_steps is None or not len(common):
+            found = "too uneven to show" if own_steps is None else "without a common span, which would show"
             raise RecordingError(
                 f"camera '{name}': the times in the names of {folders[name].path} are {found} which pictures are of "
                 "one instant",
                 Remedy("pair_images"),
             )
+        first, begin = int(nearest[name][common[0]]), latest[common[0]]
         starts[name] = round(first - (own[first] - begin) / interval, 3)
-        lost[name] = [LostFrames(int(k) + 1, int(steps[k]) - 1) for k in np.flatnonzero(steps > 1) if k >= first]
+        lost[name] = [
+            LostFrames(int(k) + 1, int(own_steps[k]) - 1) for k in np.flatnonzero(own_steps > 1) if k >= first
+        ]
     text = ", ".join(f"'{name}' from {folders[name].files[0].name} on" for name in folders)
     return ClockStarts("time in the names of the pictures", starts, "", text, lost)

@@ -49,11 +49,11 @@ def picture_numbers(names: Sequence[str], may_repeat: bool = False) -> PictureNu
         alone = next(iter(places)) if len(places) == 1 else None
         return PictureNumbers(alone, reason="" if alone else f"'{names[0]}' alone does not show which number counts")
     running = [c for c in places if len(set(c)) > 1]
-    own = [c for c in running if len(set(c)) == len(names)]
+    own = [c for c in running if len(set(c)) == len(names) and _follows(c, _times(words, ()))]
     by_one = [c for c in own if _usual_step(c) == 1]
     found = by_one or [c for c in own if _usual_step(c)]
-    times = _times(words, {places[c] for c in (found if len(found) == 1 else by_one)})
-    if not by_one and len(found) > 1 and times is not None:
+    times = _times(words, {places[c] for c in by_one})
+    if not by_one and times is not None:
         found = []  # parts of a time
     if not found and times is None and own and len(running) == 1:
         times = tuple(map(float, own[0]))
@@ -92,6 +92,11 @@ def _usual_step(values: Sequence[int]) -> int:
     steps = Counter(b - a for a, b in pairwise(sorted(set(values))))
     step = min(steps, key=lambda s: (-steps[s], s))
     return step if steps[step] >= _REGULAR_SHARE * steps.total() and not any(s % step for s in steps) else 0
+
+
+def _follows(values: Sequence[int], times: Sequence[float] | None) -> bool:
+    """Return whether times, if there are any, do not go back where numbers rise: thousandths of a second do."""
+    return times is None or all(a <= b for a, b in pairwise(t for _, t in sorted(zip(values, times, strict=True))))
 
 
 def _of_several(running: Sequence[tuple[int, ...]], names: Sequence[str]) -> list[tuple[int, ...]]:
