@@ -301,19 +301,21 @@ def _clocks(request: NewSession, footage: Mapping[str, Footage], fps: float) -> 
     """Return the clocks by which frames are to be paired, if there are any, and sentences on them.
 
     Raises:
-        RecordingError: the names of pictures do not show which are of one instant, or sound cannot be read.
+        RecordingError: the names of pictures do not show which are of one instant.
     """
     by_names = None if request.offsets else find_name_starts(footage)
     files = {name: f.path for name, f in footage.items()}
     declared = [f.fps for f in footage.values() if f.fps is not None]
     found = find_clock_starts(files, fps, declared) if by_names is None else [by_names]
     clocks, notes = clock_notes(found, {name: f.n_frames for name, f in footage.items()})
-    if clocks is None or not (any(clocks.starts.values()) or any(clocks.lost.values())):
+    if clocks is None:
         return None, notes
     if request.offsets:
         given = {name: request.offsets.get(name, 0.0) for name in footage}
         return None, disagreement("offsets given", given, clocks.source, clocks.starts)
-    return clocks, [*notes, *sound_disagreement(clocks, files, fps)]
+    if by_names is None:
+        notes += sound_disagreement(clocks, files, fps)
+    return (clocks if any(clocks.starts.values()) or any(clocks.lost.values()) else None), notes
 
 
 def _left_out(sources: Sequence[CameraSource], n_frames: int) -> Iterator[str]:

@@ -23,7 +23,7 @@ class ClockStarts(NamedTuple):
     """The starts of all cameras by one kind of clock."""
 
     source: str
-    """Of `tracker.footage.start_times`, or `names of the pictures`."""
+    """Of `tracker.footage.start_times`, or the time in names of pictures."""
     starts: Mapping[str, float]
     """`CameraSource.start_frames` by camera; the last camera to begin has 0."""
     doubt: str
@@ -128,13 +128,12 @@ def disagreement(one: str, starts: Mapping[str, float], other: str, others: Mapp
 
 
 def sound_disagreement(clocks: ClockStarts, files: Mapping[str, Path], fps: float) -> list[str]:
-    """Return a sentence if the sound of the videos, where it is clear, contradicts their clocks.
-
-    Raises:
-        RecordingError: the sound of a video cannot be read.
-    """
+    """Return a sentence if the sound of the videos, where it is clear, contradicts their clocks or cannot be read."""
     settings = SoundSettings(max_s=120.0)  # nobody has asked for sound: it is to cost seconds
-    sounds = {name: read_sound(path, name, settings) for name, path in files.items()}
+    try:
+        sounds = {name: read_sound(path, name, settings) for name, path in files.items()}
+    except RecordingError as error:
+        return [str(error)]
     with_sound = {name: sound for name, sound in sounds.items() if sound is not None}
     first, *others = with_sound or [""]
     heard = {first: 0.0}

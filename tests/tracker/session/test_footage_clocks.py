@@ -207,14 +207,14 @@ def test_exact_creation_times_pair_videos(room):
     ]
 
 
-@pytest.mark.parametrize(("late", "is_named"), [(5, False), (9, True)])
-def test_time_code_against_sound(room, late, is_named, monkeypatch):
+@pytest.mark.parametrize(("late", "apart", "is_named"), [(5, 5, False), (9, 5, True), (4, 0, True), (0, 0, False)])
+def test_time_code_against_sound(room, late, apart, is_named, monkeypatch):
     rate = SoundSettings().rate
     samples = np.random.default_rng(0).normal(size=4 * rate).astype(np.float32)
     heard = {"front": samples, "left": samples[round(late * rate * 1001 / 30000) :]}
     monkeypatch.setattr(footage_clocks, "read_sound", lambda path, name, settings: heard[name])
-    session, notes = noted(room, videos=tagged(room, front="10:00:00:00", left="10:00:00:05"))
-    assert session.cameras[0].offset == 5
+    session, notes = noted(room, videos=tagged(room, front="10:00:00:00", left=f"10:00:00:{apart:02}"))
+    assert session.cameras[0].offset == apart
     assert any("time code and the sound disagree by up to 4.0 frames" in note for note in notes) == is_named
 
 
