@@ -1,6 +1,8 @@
 """`quadrille info`: show the contents of a session."""
 
+from collections.abc import Mapping, Sequence
 from contextlib import closing
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from app.cli.arguments import SessionArg
@@ -17,21 +19,30 @@ def command(session: SessionArg, /, check: bool = True, json: bool = False) -> N
 
     Args:
         session: session folder.
-        check: look at a few frames, whether the footage of two cameras is exchanged.
+        check: look at the footage: its clocks, and at a few frames, whether two cameras are exchanged.
         json: print one JSON object.
     """
     from app.session.camera_check import exchange_note
     from tracker.session.session import load_session
 
     loaded = load_session(session)
-    summary = summarize(loaded)
+    clocks, notes = _clocks(loaded) if check else ({}, [])
+    summary = summarize(loaded, clocks, notes)
     is_complete = not any(c["missing"] for c in summary["cameras"])
     summary["warning"] = exchange_note(loaded) if check and is_complete else None
     print(format_json(summary) if json else _format(summary))
 
 
-def summarize(session: "Session") -> dict[str, Any]:
-    """Summarize the cameras, people and poses of a session."""
+def summarize(
+    session: "Session", clocks: Mapping[str, str] = MappingProxyType({}), notes: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Summarize the cameras, people and poses of a session.
+
+    Args:
+        session: as it was loaded.
+        clocks: of the footage, by camera.
+        notes: sentences on them.
+    """
     from tracker.observations.stored import list_observations
     from tracker.observations.stored_masks import list_masks
     from tracker.session.missing_files import missing_files
@@ -43,7 +54,6 @@ def summarize(session: "Session") -> dict[str, Any]:
     if session.annotations_path.exists():
         with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
             poses = {name: store.frames(name) for name in poses}
-    clocks, notes = _clocks(session)
     revisions = read_posed_revisions(session.annotations_path, list(poses))
     outdated = {
         name: sum(revisions.of(name, r.frame) != revisions.present for r in rows) for name, rows in poses.items()
@@ -84,7 +94,7 @@ def summarize(session: "Session") -> dict[str, Any]:
         ],
         "observations": [_observations(session, name) for name in list_observations(session)],
         "masks": [_masks(session, name) for name in list_masks(session)],
-        "notes": notes,
+        "notes": list(notes),
     }
 
 

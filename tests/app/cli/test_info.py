@@ -37,17 +37,18 @@ def test_clocks_of_the_footage(run, session, monkeypatch):
     def read(path, where):
         return (StartTime("time code", codes[path.stem], time_code_frames(codes[path.stem], 25.0) / 25, 1 / 25),)
 
+    monkeypatch.setattr("app.session.camera_check.exchange_note", lambda loaded: None)
     for module in (footage_clocks, synchronize):
         monkeypatch.setattr(module, "read_start_times", read)
-    status, out, _ = run("info", session, "--no-check")
+    status, out, _ = run("info", session)
     assert (status, out.count(", time code 10:00:00:12\n"), out.count("note:")) == (0, 4, 0)
     codes[name] = "10:00:00:07"
-    _, out, _ = run("info", session, "--no-check", "--json")
+    _, out, _ = run("info", session, "--json")
     summary = json.loads(out)
     assert next(c["clock"] for c in summary["cameras"] if c["name"] == name) == "time code 10:00:00:07"
     assert summary["notes"][0].startswith("the session and the time code disagree by up to 5.0 frames: offsets FRONT=0")
-    assert "note: the session and the time code" in run("info", session, "--no-check")[1]
+    assert "note: the session and the time code" in run("info", session)[1]
     monkeypatch.setattr(footage_clocks, "read_start_times", lambda path, where: ())
     monkeypatch.setattr(synchronize, "read_start_times", lambda path, where: ())
-    _, out, _ = run("info", session, "--no-check", "--json")
+    _, out, _ = run("info", session, "--json")
     assert [c["clock"] for c in json.loads(out)["cameras"]] == [None] * 4
