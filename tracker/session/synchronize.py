@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import NamedTuple
 
-from tracker.errors import Remedy, SessionError
+from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.flash import find_flash
 from tracker.footage.recording import Recording
@@ -135,7 +135,10 @@ def clock_disagreement(session: Session, source: str, found: Sequence[FoundStart
         source: names the way in which they were found, such as `sound`.
         found: those that are not clear do not count.
     """
-    chosen = _clocks(session)[0]
+    try:
+        chosen = _clocks(session)[0]
+    except RecordingError:  # names of pictures that show nothing contradict nothing
+        return []
     clear = {f.camera: f.start_frames for f in found if f.is_clear and f.start_frames is not None}
     if chosen is None or not clear:
         return []

@@ -13,6 +13,7 @@ from tracker.footage.recording import Recording
 from tracker.footage.sound import SoundSettings
 from tracker.session import footage_clocks
 from tracker.session.session import load_session
+from tracker.session.synchronize import FoundStart, clock_disagreement
 
 __all__ = ["room"]
 
@@ -274,3 +275,9 @@ def test_a_chapter_that_is_left_out_is_named(room, names, codes, is_named):
     _, notes = noted(room, videos=(), camera_paths=paths)
     expected = f"camera 'left': {names[1]} beside {names[0]} is the next chapter of its recording and is not used"
     assert [note.startswith(expected) for note in notes] == [True] * is_named
+
+
+def test_names_that_show_nothing_contradict_no_flash(room):
+    videos = folders(room, front=[f"f{k}" for k in range(9)], left=list("abcdefghi"))
+    session = new(room, videos=videos, fps=30.0, offsets={"left": 0, "front": 0})
+    assert clock_disagreement(session, "flash", [FoundStart("left", 5.0, None, 9.0, True)]) == []
