@@ -31,6 +31,7 @@ from app.cli import (
 )
 from app.cli import open as open_
 from app.cli.annotation import assign, compare, merge, next_, share, tasks
+from app.cli.arguments import gather_repeated
 from app.cli.batches import batch
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
@@ -105,6 +106,8 @@ def main() -> None:
     out = nullcontext() if set(words) & {*_HELP} else redirect_stdout(cast(TextIO, PlainOutput(sys.stdout)))
     try:
         with out:
+            if words[0] in _COMMANDS:
+                words = gather_repeated(words, _COMMANDS[words[0]])
             _command_line(words).cli(
                 prog="quadrille", description=_ABOUT, args=words, config=(tyro.conf.FlagCreatePairsOff,)
             )

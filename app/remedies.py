@@ -50,6 +50,10 @@ PHRASES = {
         "restore it, choose Common frames to take those that all have, or enter the offset of a camera that began "
         "earlier: its number of images",
     ),
+    "pair_images": Phrases(
+        "rename them so that one number counts, or say --offset CAM=0 to pair them in their order",
+        "rename them so that one number counts",
+    ),
     "give_camera_background": Phrases(
         "add it or leave out --background", "add it, or leave the field Background empty"
     ),

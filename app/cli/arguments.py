@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import tyro
 
 from tracker.errors import TrackerError
+from tracker.validation import same_form
 
 T = TypeVar("T")
 
@@ -26,9 +28,61 @@ NamedValues = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE ...",
 CommonOrNamed = Annotated[tuple[str, ...], tyro.conf.arg(metavar="VALUE | NAME=VALUE ...", help_behavior_hint="")]
 
 
+def gather_repeated(words: Sequence[str], command: Callable[..., None]) -> list[str]:
+    """Return the words of a command line with the values of an option that is repeated behind the first of them.
+
+    Args:
+        words: the command's name and its arguments.
+        command: takes them.
+
+    Raises:
+        TrackerError: an option that takes one value is repeated.
+    """
+    groups: list[tuple[str, list[str]]] = [("", [])]
+    for word in words:
+        if word.startswith("--"):
+            groups.append((word.partition("=")[0].replace("_", "-"), []))
+        groups[-1][1].append(word)
+    gathered: dict[str, list[str]] = {}
+    for option, group in groups:
+        first = gathered.setdefault(option, group)
+        values = _values(group)
+        if first is group or not values:
+            continue
+        if option not in repeatable(command):
+            raise TrackerError(
+                f"expected {option} once, found it with {' '.join(_values(first))} and with {' '.join(values)}; "
+                "leave one out"
+            )
+        first += values
+    return [word for group in gathered.values() for word in group]
+
+
+def _values(group: Sequence[str]) -> list[str]:
+    """Return the values of an option, given as the words `--option=VALUE` or `--option VALUE ...`."""
+    _, equals, value = group[0].partition("=")
+    return [*([value] if equals else []), *group[1:]]
+
+
+def repeatable(function: Callable[..., object]) -> set[str]:
+    """Return the options of a command that take any number of values; its parameters may be dataclasses of options."""
+    found = set[str]()
+    for name, hint in get_type_hints(function).items():
+        if is_dataclass(hint) and isinstance(hint, type):
+            found |= repeatable(hint)
+        elif any(get_origin(h) is tuple and Ellipsis in get_args(h) for h in (hint, *get_args(hint))):
+            found.add(f"--{name.replace('_', '-')}")
+    return found
+
+
 def parse_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> dict[str, T]:
-    """Parse NAME=VALUE words."""
+    """Parse NAME=VALUE words.
+
+    Raises:
+        TrackerError: one is none, or a name has two values.
+    """
     out: dict[str, T] = {}
+    given: dict[str, str] = {}
     for word in words:
         name, equals, value = word.partition("=")
         try:
@@ -37,6 +91,11 @@ def parse_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> 
             out[name] = kind(value)
         except ValueError:
             raise TrackerError(f"expected {option} as NAME=VALUE, found '{word}'") from None
+        if same_form(name) in given:
+            raise TrackerError(
+                f"expected {option} once for '{name}', found {given[same_form(name)]} and {word}; leave one out"
+            )
+        given[same_form(name)] = word
     return out
 
 

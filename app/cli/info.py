@@ -1,6 +1,8 @@
 """`quadrille info`: show the contents of a session."""
 
+from collections.abc import Mapping, Sequence
 from contextlib import closing
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from app.cli.arguments import SessionArg
@@ -17,21 +19,30 @@ def command(session: SessionArg, /, check: bool = True, json: bool = False) -> N
 
     Args:
         session: session folder.
-        check: look at a few frames, whether the footage of two cameras is exchanged.
+        check: look at the footage: its clocks, and at a few frames, whether two cameras are exchanged.
         json: print one JSON object.
     """
     from app.session.camera_check import exchange_note
     from tracker.session.session import load_session
 
     loaded = load_session(session)
-    summary = summarize(loaded)
+    clocks, notes = _clocks(loaded) if check else ({}, [])
+    summary = summarize(loaded, clocks, notes)
     is_complete = not any(c["missing"] for c in summary["cameras"])
     summary["warning"] = exchange_note(loaded) if check and is_complete else None
     print(format_json(summary) if json else _format(summary))
 
 
-def summarize(session: "Session") -> dict[str, Any]:
-    """Summarize the cameras, people and poses of a session."""
+def summarize(
+    session: "Session", clocks: Mapping[str, str] = MappingProxyType({}), notes: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Summarize the cameras, people and poses of a session.
+
+    Args:
+        session: as it was loaded.
+        clocks: of the footage, by camera.
+        notes: sentences on them.
+    """
     from tracker.observations.stored import list_observations
     from tracker.observations.stored_masks import list_masks
     from tracker.session.missing_files import missing_files
@@ -64,6 +75,7 @@ def summarize(session: "Session") -> dict[str, Any]:
                 "time_offset_s": c.clock.ahead_frames / session.fps,
                 "time_rate": c.clock.rate,
                 "lost_frames": [list(lost) for lost in c.clock.lost],
+                "clock": clocks.get(c.camera.name),
                 "missing": [m.kind for m in missing if m.camera == c.camera.name],
             }
             for c in session.cameras
@@ -82,7 +94,19 @@ def summarize(session: "Session") -> dict[str, Any]:
         ],
         "observations": [_observations(session, name) for name in list_observations(session)],
         "masks": [_masks(session, name) for name in list_masks(session)],
+        "notes": list(notes),
     }
+
+
+def _clocks(session: "Session") -> tuple[dict[str, str], list[str]]:
+    """Return the clock of each camera's footage, and sentences where they contradict the session or cannot be read."""
+    from app.remedies import command_line_text
+    from tracker.session.synchronize import footage_clocks
+
+    try:
+        return footage_clocks(session)
+    except TrackerError as error:
+        return {}, [command_line_text(error)]
 
 
 def _observations(session: "Session", name: str) -> dict[str, Any]:
@@ -134,6 +158,7 @@ def _format(summary: dict[str, Any]) -> str:
     for c in summary["cameras"]:
         extras = "".join(f", {name}" for name in ("background", "masks") if c[name])
         shift = f", offset {c['offset']}" if c["offset"] else ""
+        shift += f", {c['clock']}" if c["clock"] else ""
         missing = f"; missing: {', '.join(c['missing'])}" if c["missing"] else ""
         lines.append(f"  camera {c['name']}: {c['size'][0]}x{c['size'][1]}, {c['footage']}{extras}{shift}{missing}")
     for p in summary["people"]:
@@ -160,6 +185,7 @@ def _format(summary: dict[str, Any]) -> str:
     if any(c["missing"] for c in summary["cameras"]):
         command = f"quadrille relink {summary['folder']} --search FOLDER"
         lines.append(f"warning: files are missing: put them back, or run {command}")
+    lines += [f"note: {note}" for note in summary["notes"]]
     if summary["warning"] is not None:
         lines.append(f"warning: {summary['warning']}")
     return "\n".join(lines)

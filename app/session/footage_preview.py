@@ -9,8 +9,8 @@ import numpy as np
 from app.drawing.pictures import footage as footage_jpeg
 from app.session.footage_indices import footage_indices
 from tracker.errors import RecordingError
+from tracker.footage.chapters import VIDEO_SUFFIXES
 from tracker.footage.video import open_footage
-from tracker.session.assemble import VIDEO_SUFFIXES
 
 _LONGER_SIDE_PX = 320
 

@@ -12,7 +12,8 @@ from app.session.path_choice import TypedPath, TypedPaths, typed_path, typed_pat
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.camera_section import Units
-from tracker.session.assemble import DEFAULT_MODEL, NewSession, SessionParts, check_parts, footage_in
+from tracker.session.assemble import DEFAULT_MODEL, NewSession, SessionParts, check_parts
+from tracker.session.footage_files import footage_in
 from tracker.validation import FrameRate, Name
 
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]

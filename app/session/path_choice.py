@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from app.session.recent_sessions import is_session
 from tracker.errors import SessionError
-from tracker.session.assemble import VIDEO_SUFFIXES
+from tracker.footage.chapters import VIDEO_SUFFIXES
 
 TypedPath = Annotated[str, Meta(min_length=1, max_length=4096, description="a path")]
 """A path as it comes from the page; `typed_path` checks it."""

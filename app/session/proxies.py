@@ -8,7 +8,6 @@ from app.runtime.progress import Reporter
 from tracker.errors import RecordingError
 from tracker.files import refuse_links
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.image_folder import ImageFolder
 from tracker.footage.proxy import FOLDER, Proxy
 from tracker.footage.video import open_footage
 from tracker.session.lock import SessionLock
@@ -42,10 +41,9 @@ def index(session: Session, progress: Reporter) -> dict[str, Any]:
     with SessionLock(folder):
         for source in session.cameras:
             name = source.camera.name
-            if source.footage.is_dir():  # a folder of images needs no proxy
+            if source.footage.is_dir():  # images need no proxy, and chapters have none
                 continue
             with closing(open_footage(source.footage, name)) as footage:
-                assert not isinstance(footage, ImageFolder)
                 proxy = Proxy(folder, name)
                 there = proxy.n_frames if proxy.fits(source.footage) else 0
                 try:

@@ -14,7 +14,7 @@ from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import TrackerError
 from tracker.formats.camera_section import CameraEntry, Units
-from tracker.session.assemble import footage_in
+from tracker.session.footage_files import footage_in
 from tracker.session.matching import camera_name
 from tracker.session.rig_summary import RigSummary, summarize_rig
 

@@ -1,5 +1,6 @@
 """Small videos and image folders in which every frame encodes its number."""
 
+import struct
 from fractions import Fraction
 from pathlib import Path
 
@@ -38,8 +39,13 @@ def encode(
     rotation=None,
     start=0,
     matrix=None,
+    tags=None,
+    telemetry=(),
+    first=0,
 ):
+    """A video; its pictures count from `first`, `tags` are of the file, `telemetry` has a piece for each second."""
     with av.open(str(path), "w", options=container_options or {}) as container:
+        container.metadata.update(tags or {})
         stream = container.add_stream(codec, rate=rate, options=options or {})
         stream.width, stream.height, stream.pix_fmt = *SIZE, pix_fmt
         stream.codec_context.gop_size = gop
@@ -49,12 +55,22 @@ def encode(
         if matrix is not None:  # a, b, c, d: (x, y) goes to (a x + c y, b x + d y)
             a, b, c, d = (round(v * 2**16) for v in matrix)
             stream.set_display_matrix([a, b, 0, c, d, 0, 0, 0, 2**30])
+        data = container.add_data_stream("bin_data") if telemetry else None
         for i in range(n):
-            frame = av.VideoFrame.from_ndarray(picture(i), format="rgb24")
+            frame = av.VideoFrame.from_ndarray(picture(first + i), format="rgb24")
             frame.pts = start + (i if times is None else times[i])
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
+        for i, piece in enumerate(telemetry):
+            packet = av.Packet(piece)
+            packet.stream, packet.time_base, packet.pts, packet.dts, packet.duration = data, Fraction(1), i, i, 1
+            container.mux(packet)
     return path
+
+
+def gpmf(key, kind, size, values):
+    """An item of GoPro's telemetry: key, type, size of a value, their number, and the values, padded to four bytes."""
+    return struct.pack(">4scBH", key, kind, size, len(values) // size) + values + bytes(-len(values) % 4)
 
 
 def encode_stamped(path, stamps):

@@ -11,6 +11,7 @@ from tracker.exports.keypoints import Keypoints, keypoints_in_views
 from tracker.exports.motion import ExportedMotion, PersonMotion
 from tracker.exports.options import ExportOptions, file_from_world, up_in_file
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.chapters import chapter_files
 from tracker.footage.image_folder import ImageFolder
 from tracker.formats.bvh import UPRIGHT_Y, BvhFrame, write_bvh
 from tracker.formats.file_names import identifier
@@ -193,8 +194,8 @@ class _FileNames:
     def __init__(self, source: CameraSource) -> None:
         """List the images of a folder."""
         self._source = source
-        folder = source.footage.is_dir()
-        self._names = [p.name for p in ImageFolder(source.footage, source.camera.name).files] if folder else None
+        is_folder = source.footage.is_dir() and not chapter_files(source.footage)
+        self._names = [p.name for p in ImageFolder(source.footage, source.camera.name).files] if is_folder else None
 
     def image(self, id: int, frame: int) -> CocoImage:
         """Return the entry of a frame."""

@@ -6,6 +6,7 @@ A frame is bit-identical however it is reached. Imports `geometry`. Callers use 
 
 __all__ = [
     "camera_source",
+    "chapters",
     "flash",
     "frame_rates",
     "image_file",
@@ -14,6 +15,7 @@ __all__ = [
     "proxy",
     "recording",
     "sound",
+    "start_times",
     "video",
     "video_writer",
 ]

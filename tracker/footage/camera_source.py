@@ -1,5 +1,6 @@
 """One camera of a session: its calibration and the paths of its images."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import floor
@@ -94,6 +95,11 @@ class CameraSource:
         ahead = round(float(offset - start_frames), 9)
         clock = replace(self.clock, ahead_frames=ahead, rate=self.clock.rate if rate is None else rate)
         return replace(self, offset=offset, clock=clock)
+
+    def with_lost_in_footage(self, lost: Sequence[LostFrames]) -> "CameraSource":
+        """Return the camera with frames that it lost, given by the frames of its footage."""
+        rows = tuple(LostFrames(row.since - self.offset, row.n) for row in lost if row.since > self.offset)
+        return replace(self, clock=replace(self.clock, lost=rows))
 
 
 def whole_frames(start_frames: float) -> int:

@@ -10,14 +10,12 @@ import numpy as np
 
 from tracker.errors import RecordingError
 from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_image_or_none
+from tracker.formats.keypoints.picture_numbers import PictureNumbers, picture_numbers
 from tracker.geometry.arrays import Image, IntArray
-
-_REGULAR_SHARE = 0.5
-"""Share of equal steps between the numbers of images; the names are times if fewer are equal."""
 
 
 class ImageFolder:
-    """A folder of images of one kind, in the natural order of their names (2 before 10)."""
+    """A folder of images of one kind, in the order of their numbers or times, else of their names (2 before 10)."""
 
     path: Path
     size: tuple[int, int]
@@ -25,8 +23,8 @@ class ImageFolder:
     n_frames: int
     files: list[Path]
     """The images, in order."""
-    numbers: tuple[int, ...] | None
-    """Number of each image according to its name; None if the names are not numbered in equal steps."""
+    named: PictureNumbers
+    """Numbers and times in the names of the images, in their order."""
     is_mirrored: bool = False
     fps: None = None
     """Images have no frame rate."""
@@ -56,11 +54,20 @@ class ImageFolder:
                 f"{self._where}: expected images of one kind ({', '.join(IMAGE_SUFFIXES)}), "
                 f"found {' and '.join(kinds) or 'none'}; leave only the frames of this camera in it"
             )
-        self.files = sorted(images, key=_natural)
+        self.files = sorted(images, key=natural_order)
         self.n_frames = len(self.files)
-        self.numbers = image_numbers([f.stem for f in self.files])
+        self.named = picture_numbers([f.stem for f in self.files])
+        places = self.named.numbers or self.named.times
+        if places is not None:
+            self.files = [self.files[i] for i in np.argsort(places, kind="stable")]
+            self.named = picture_numbers([f.stem for f in self.files])
         height, width = read_image(self.files[0], self._where).shape[:2]
         self.size = (width, height)
+
+    @property
+    def numbers(self) -> tuple[int, ...] | None:
+        """Number of each image according to its name; None if the names do not show it, and of a lone image."""
+        return self.named.numbers if self.n_frames > 1 else None
 
     @property
     def key_frames(self) -> IntArray:
@@ -97,24 +104,6 @@ class ImageFolder:
         """Do nothing: no file stays open."""
 
 
-def image_numbers(stems: Sequence[str]) -> tuple[int, ...] | None:
-    """Return the numbers of images by their names without suffix: the one run of digits in which all names differ.
-
-    Returns:
-        The numbers, in the order of the names; None if the names differ otherwise, or are times rather than numbers.
-    """
-    rows = [re.split(r"(\d+)", stem) for stem in stems]
-    if len({len(row) for row in rows}) != 1:
-        return None
-    varying = [i for i, column in enumerate(zip(*rows, strict=True)) if len(set(column)) > 1]
-    if len(varying) != 1 or varying[0] % 2 == 0:  # odd places hold digits
-        return None
-    numbers = tuple(int(row[varying[0]]) for row in rows)
-    steps = Counter(b - a for a, b in pairwise(numbers))
-    step, count = steps.most_common(1)[0]
-    return numbers if step > 0 and count >= _REGULAR_SHARE * sum(steps.values()) else None
-
-
 def missing_numbers(numbers: Sequence[int], at_most: int = 5) -> list[int]:
     """Return the first few numbers that a numbered folder leaves out; the usual step may be more than 1."""
     steps = Counter(b - a for a, b in pairwise(numbers))
@@ -123,6 +112,6 @@ def missing_numbers(numbers: Sequence[int], at_most: int = 5) -> list[int]:
     return list(islice(gaps, at_most))
 
 
-def _natural(path: Path) -> list[tuple[int, int | str]]:
+def natural_order(path: Path) -> list[tuple[int, int | str]]:
     """Return a sort key that compares runs of digits as numbers."""
-    return [(0, int(t)) if t.isdigit() else (1, t) for t in re.split(r"(\d+)", path.name) if t]
+    return [(0, int(t)) if t.isdecimal() else (1, t) for t in re.split(r"(\d+)", path.name) if t]

@@ -30,6 +30,8 @@ class SoundSettings:
     of both halves. Early echoes lie nearer."""
     min_s: float = 1.0
     """Shortest sound that is compared, s."""
+    max_s: float = 300.0
+    """Longest sound that is read, s. Its correlation takes 0.6 gigabytes; that of an hour would take 8."""
 
 
 class Delay(NamedTuple):
@@ -57,7 +59,8 @@ def read_sound(path: Path, name: str, settings: SoundSettings | None = None) -> 
     """
     import av  # imported lazily: PyAV takes 0.1 s to load
 
-    rate = (settings or SoundSettings()).rate
+    settings = settings or SoundSettings()
+    rate = settings.rate
     if path.is_dir():
         return None
     try:
@@ -69,6 +72,8 @@ def read_sound(path: Path, name: str, settings: SoundSettings | None = None) -> 
             for frame in container.decode(sound):
                 if first_s is None:
                     first_s = frame.time or 0.0
+                if (frame.time or 0.0) > first_s + settings.max_s:
+                    break
                 pieces += [np.asarray(f.to_ndarray()[0], np.float32) for f in resampler.resample(frame)]
             pieces += [np.asarray(f.to_ndarray()[0], np.float32) for f in resampler.resample(None)]
             begin_s = float((video.start_time or 0) * video.time_base) if video.time_base is not None else 0.0

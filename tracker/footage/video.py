@@ -17,6 +17,7 @@ from av.video.reformatter import VideoReformatter
 
 from tracker.errors import RecordingError
 from tracker.footage import frame_index, packet_scan
+from tracker.footage.chapters import ChapteredVideo, chapter_files
 from tracker.footage.display import display_turn, displayed_size
 from tracker.footage.frame_index import FileVersion, Index
 from tracker.footage.frame_reader import FrameReader
@@ -134,7 +135,7 @@ class VideoFile:
             RecordingError: k is out of range, or the file cannot be read, is missing, or is not what it was.
         """
         self.look_again()  # a file that is back has its frames again
-        self._wait_for(k)
+        self.wait_for(k)
         if not 0 <= k < self.n_frames:
             raise RecordingError(f"{self._where}: expected a frame from 0 to {self.n_frames - 1}, found {k}")
         with self._lock:
@@ -329,7 +330,7 @@ class VideoFile:
                 self._failure = error
             self._grown.notify_all()
 
-    def _wait_for(self, k: int) -> None:
+    def wait_for(self, k: int) -> None:
         """Wait until frame k is listed, or the list is complete."""
         with self._grown:
             self._grown.wait_for(
@@ -344,7 +345,7 @@ class VideoFile:
         return packet_scan.check_order(index, decoder, self._where)
 
 
-Footage = VideoFile | ImageFolder
+Footage = VideoFile | ImageFolder | ChapteredVideo
 
 
 def open_footage(
@@ -354,11 +355,21 @@ def open_footage(
     in_background: bool = False,
     passed_bytes: int = MAX_BYTES,
 ) -> Footage:
-    """Open a video file or a folder of images; `indices` and the following as for `VideoFile`.
+    """Open a video file, a folder of images, or one of the chapters of a video.
+
+    Args:
+        path: the file or folder.
+        camera: name of its camera, for messages.
+        indices: this and the following as for `VideoFile`.
+        in_background: of each file.
+        passed_bytes: of all files together.
 
     Raises:
         RecordingError: it is missing, unreadable, truncated or empty.
     """
+    if path.is_dir() and (files := chapter_files(path)):
+        of_each = passed_bytes // len(files)
+        return ChapteredVideo(path, camera, [VideoFile(f, camera, indices, in_background, of_each) for f in files])
     if path.is_dir():
         return ImageFolder(path, camera)
     return VideoFile(path, camera, indices, in_background, passed_bytes)

@@ -8,6 +8,7 @@ __all__ = [
     "assemble",
     "clocks",
     "folder",
+    "footage_files",
     "frame_list",
     "holder",
     "lock",

@@ -10,13 +10,22 @@ from tracker.calibrations.reading import CalibratedCameras, read_cameras
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
-from tracker.footage.image_file import IMAGE_SUFFIXES
-from tracker.footage.recording import check_size, read_background, read_mask
+from tracker.footage.recording import check_size
 from tracker.footage.video import Footage, open_footage
 from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS
+from tracker.session.footage_clocks import (
+    ClockStarts,
+    check_chapters,
+    clock_notes,
+    disagreement,
+    find_clock_starts,
+    find_name_starts,
+    sound_disagreement,
+)
+from tracker.session.footage_files import check_side_files, find_background, find_masks
 from tracker.session.matching import (
     camera_name,
     check_image_numbers,
@@ -24,7 +33,6 @@ from tracker.session.matching import (
     common_length,
     common_offsets,
     common_rate,
-    find_entry,
     footage_notes,
     match_footage,
 )
@@ -35,8 +43,6 @@ from tracker.validation import same_form
 T = TypeVar("T")
 
 DEFAULT_MODEL = "gavrila38"
-VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
-"""By which files of a folder are taken for videos."""
 
 
 @dataclass(frozen=True)
@@ -176,6 +182,10 @@ def check_parts(
         cameras = {name: _fitted(calibrated[name], footage[name], request.rescale) for name in names}
         report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
+        chapters = check_chapters(footage)
+        clocks, sentences = _clocks(request, footage, fps)
+        if clocks is not None:
+            request = replace(request, offsets=clocks.starts, common_frames=True)
         whole = {name: whole_frames(start) for name, start in request.offsets.items()}
         check_image_numbers(footage, whole, request.common_frames)
         if request.common_frames:
@@ -183,8 +193,12 @@ def check_parts(
             request = replace(request, offsets={**whole, **request.offsets})
         n_frames = common_length(footage, whole, request.common_frames)
         report(f"All cameras have {n_frames} frames at {fps:g} per second.")
-        sources = tuple(_source(request, cameras[name], footage[name], fps, n_frames) for name in names)
-        for sentence in (*_left_out(sources, n_frames), *footage_notes(footage, fps, whole)):
+        lost = {} if clocks is None else clocks.lost
+        sources = tuple(
+            _source(request, cameras[name], footage[name], fps, n_frames).with_lost_in_footage(lost.get(name, ()))
+            for name in names
+        )
+        for sentence in (*chapters, *sentences, *_left_out(sources, n_frames), *footage_notes(footage, fps, whole)):
             note(sentence)
     finally:
         for f in footage.values():
@@ -283,6 +297,27 @@ def _fitted(entry: CameraEntry, footage: Footage, rescale: bool) -> Camera:
     return camera
 
 
+def _clocks(request: NewSession, footage: Mapping[str, Footage], fps: float) -> tuple[ClockStarts | None, list[str]]:
+    """Return the clocks by which frames are to be paired, if there are any, and sentences on them.
+
+    Raises:
+        RecordingError: the names of pictures do not show which are of one instant.
+    """
+    by_names = None if request.offsets else find_name_starts(footage)
+    files = {name: f.path for name, f in footage.items()}
+    declared = [f.fps for f in footage.values() if f.fps is not None]
+    found = find_clock_starts(files, fps, declared) if by_names is None else [by_names]
+    clocks, notes = clock_notes(found, {name: f.n_frames for name, f in footage.items()})
+    if clocks is None:
+        return None, notes
+    if request.offsets:
+        given = {name: request.offsets.get(name, 0.0) for name in footage}
+        return None, disagreement("offsets given", given, clocks.source, clocks.starts)
+    if by_names is None:
+        notes += sound_disagreement(clocks, files, fps)
+    return (clocks if any(clocks.starts.values()) or any(clocks.lost.values()) else None), notes
+
+
 def _left_out(sources: Sequence[CameraSource], n_frames: int) -> Iterator[str]:
     """Say which frames are left out because other cameras lack them."""
     for source in sources:
@@ -304,75 +339,6 @@ def _source(request: NewSession, camera: Camera, footage: Footage, fps: float, n
         footage.n_frames if request.common_frames and footage.n_frames > n_frames + offset else None,
     )
     return source.starting_at(start)
-
-
-def footage_in(folder: Path) -> list[Path]:
-    """Return the videos of a folder, or its folders of images if it has no video.
-
-    Raises:
-        SessionError: there is neither.
-    """
-    try:
-        entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
-    except OSError as error:
-        raise SessionError(
-            f"expected a folder of videos, found that {folder} cannot be read ({error.strerror}); check the path"
-        ) from error
-    videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
-    found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
-    if not found:
-        raise SessionError(
-            f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
-            "choose the folder that holds the footage of all cameras"
-        )
-    return found
-
-
-def _has_image(folder: Path) -> bool:
-    return any(path.suffix.lower() in IMAGE_SUFFIXES for path in folder.iterdir())
-
-
-def find_background(folder: Path, camera: str) -> Path:
-    """Find the background of a camera by its name, an image or a video.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    for suffix in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES):
-        path = find_entry(folder, f"{camera}{suffix}")
-        if path.is_file():
-            return path
-    raise RecordingError(
-        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4",
-        Remedy("give_camera_background"),
-    )
-
-
-def find_masks(folder: Path, camera: str) -> Path:
-    """Find the folder of masks of a camera by its name.
-
-    Raises:
-        RecordingError: there is none, or it has no masks.
-    """
-    path = find_entry(folder, camera)
-    if not any(path.glob("[0-9]" * 6 + ".png")):
-        raise RecordingError(
-            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame",
-            Remedy("give_camera_masks"),
-        )
-    return path
-
-
-def check_side_files(source: CameraSource) -> None:
-    """Read the background and the first mask, so that a misfit shows before tracking starts.
-
-    Raises:
-        RecordingError: one is missing, unreadable or of another size than the camera.
-    """
-    read_background(source)
-    if source.masks is not None:
-        first = min(find_masks(source.masks.parent, source.masks.name).glob("[0-9]" * 6 + ".png"))
-        read_mask(source, int(first.stem) - source.offset)
 
 
 def _make_people(

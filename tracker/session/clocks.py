@@ -23,7 +23,7 @@ Clock = Literal["frames", "time"]
 _BLOCK = 10_000
 """Number of frames that are resampled together. A table of 60,000 frames and 30 points takes 1.7 times the memory of
 the result; with half and double the number 1.4 and 2.4 times, all at once 5.1 times."""
-_AGREE = 0.35
+AGREE = 0.35
 """Difference of Frame# and Time, frames, at which both still name one frame: less than half, so that counting from 0
 and from 1 stay apart. Stamps in hundredths of a second are off by up to 0.3 at 60 per second."""
 _ROWS_OF_COARSE_STAMPS = 24
@@ -219,8 +219,8 @@ def _readings(table: MarkerTable, rates: Sequence[float]) -> dict[int, str]:
     # The mean over many rows has less of the rounding than the first stamp.
     by_time = [float((table.times * rate - (table.frames - number)).mean()) for rate in rates]
     rounding = _rounding_s(table) * rates[0]
-    is_coarse = rounding > _AGREE and len(table.times) < _ROWS_OF_COARSE_STAMPS
-    agree = _AGREE + rounding * is_coarse
+    is_coarse = rounding > AGREE and len(table.times) < _ROWS_OF_COARSE_STAMPS
+    agree = AGREE + rounding * is_coarse
     found = {round(by_time[0]): stamps} if is_coarse else {}
     if any(abs(number - 1 - at) <= agree for at in by_time):
         found[number - 1] = f"Frame# {number}, counted from 1, and {stamps}"
@@ -283,7 +283,7 @@ def _notes(table: MarkerTable, rows: Array, placed: MarkerTable, fps: float, is_
     """Say how rows were placed where it is not one row for each frame from 0 on at the session's rate."""
     notes = []
     number, time_s, first = int(table.frames[0]), float(table.times[0]), float(rows[0])
-    begins_at_0 = first == 0 and (time_s == 0 or (number == 0 and abs(time_s) * fps <= 1 + _AGREE))
+    begins_at_0 = first == 0 and (time_s == 0 or (number == 0 and abs(time_s) * fps <= 1 + AGREE))
     if is_chosen or not begins_at_0:
         notes.append(f"the first row of the file, Frame# {number} at {time_s:.3f} s, is frame {first:.6g}")
     if placed.points is not table.points:

@@ -15,7 +15,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
-from tracker.session.assemble import check_side_files, find_background, find_masks
+from tracker.session.footage_files import check_side_files, find_background, find_masks
 from tracker.session.matching import check_names, find_entry
 from tracker.session.missing_files import Kind, MissingFile, missing_files
 from tracker.session.session import Session, save_cameras

@@ -1,15 +1,26 @@
 """Find and set when cameras of a session began, to a fraction of a frame."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import ceil
 from typing import NamedTuple
 
-from tracker.errors import SessionError
+from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.flash import find_flash
 from tracker.footage.recording import Recording
 from tracker.footage.sound import read_sound, sound_delay
+from tracker.footage.start_times import read_start_times
 from tracker.footage.video import open_footage
+from tracker.session.footage_clocks import (
+    ClockStarts,
+    clock_notes,
+    disagreement,
+    find_clock_starts,
+    find_name_starts,
+    sound_disagreement,
+)
 from tracker.session.matching import check_names
+from tracker.session.missing_files import missing_files
 from tracker.session.session import Session, save_cameras
 
 
@@ -25,6 +36,22 @@ class FoundStart(NamedTuple):
     """How much the peak or the flash stands out from the next largest."""
     is_clear: bool
     """Whether it stands out enough to be taken."""
+
+
+def require_footage(session: Session) -> None:
+    """Check that there are two cameras to compare, and that their footage is there.
+
+    Raises:
+        SessionError: one camera, or a file is missing.
+    """
+    if len(session.cameras) < 2:
+        raise SessionError("expected two cameras or more, found one, which has nothing to be compared with")
+    for missing in missing_files(session):
+        if missing.kind == "footage":
+            raise SessionError(
+                f"camera '{missing.camera}': its footage {missing.path} is not there",
+                Remedy("relink", session=session.folder),
+            )
 
 
 def starts_by_sound(session: Session) -> list[FoundStart]:
@@ -79,6 +106,76 @@ def starts_by_flash(session: Session, recording: Recording) -> list[FoundStart]:
         start = first.start_frames + in_footage - in_first
         out.append(FoundStart(source.camera.name, start, None, flash.ratio, flash.is_clear))
     return out
+
+
+def starts_by_clock(session: Session) -> tuple[list[FoundStart], list[str]]:
+    """Return the starts of all cameras by the clocks of their footage, and sentences on clocks that disagree.
+
+    Raises:
+        SessionError: not all footage has a clock of one kind, or it does not show the starts.
+        RecordingError: footage cannot be read, or the names of pictures do not show which are of one instant.
+    """
+    chosen, notes = _clocks(session)
+    if chosen is None:
+        kinds = "a time code, a GPS time or a creation time in the videos of all of two cameras or more"
+        raise SessionError(f"{notes[0] if notes else f'expected {kinds}'}; give offsets, or use sound or a flash")
+    files = {c.camera.name: c.footage for c in session.cameras}
+    first = session.cameras[0]
+    shift = first.start_frames - chosen.starts[first.camera.name]
+    shift += ceil(max(0.0, -shift - min(chosen.starts.values())))  # footage has no frame before its first
+    out = [FoundStart(name, start + shift, None, None, True) for name, start in chosen.starts.items()]
+    return out, [*notes, *sound_disagreement(chosen, files, session.fps)]
+
+
+def clock_disagreement(session: Session, source: str, found: Sequence[FoundStart]) -> list[str]:
+    """Return a sentence if starts that were found otherwise contradict the clocks of the footage.
+
+    Args:
+        session: of the cameras.
+        source: names the way in which they were found, such as `sound`.
+        found: those that are not clear do not count.
+    """
+    try:
+        chosen = _clocks(session)[0]
+    except RecordingError:  # names of pictures that show nothing contradict nothing
+        return []
+    clear = {f.camera: f.start_frames for f in found if f.is_clear and f.start_frames is not None}
+    if chosen is None or not clear:
+        return []
+    reference = next(c for c in session.cameras if c.camera.name not in {f.camera for f in found})
+    starts = {reference.camera.name: reference.start_frames} | clear
+    return disagreement(source, starts, chosen.source, chosen.starts)
+
+
+def footage_clocks(session: Session, starts_by: str = "session") -> tuple[dict[str, str], list[str]]:
+    """Return the best clock of each camera's footage, for a person, and a sentence if they contradict the session.
+
+    Args:
+        session: of the cameras.
+        starts_by: names what its starts are from, for the sentence.
+
+    Raises:
+        RecordingError: images cannot be read, or their names do not show which are of one instant.
+    """
+    read = {c.camera.name: read_start_times(c.footage, c.camera.name) for c in session.cameras}
+    found = {name: f"{starts[0].source} {starts[0].text}" for name, starts in read.items() if starts}
+    chosen = _clocks(session)[0]
+    if chosen is None:
+        return found, []
+    found = {name: found.get(name, chosen.source) for name in chosen.starts}
+    starts = {c.camera.name: c.start_frames for c in session.cameras}
+    return found, disagreement(starts_by, starts, chosen.source, chosen.starts)
+
+
+def _clocks(session: Session) -> tuple[ClockStarts | None, list[str]]:
+    files = {c.camera.name: c.footage for c in session.cameras}
+    n_frames = {c.camera.name: c.offset + session.n_frames for c in session.cameras}
+    by_names = None
+    if all(path.is_dir() for path in files.values()):
+        by_names = find_name_starts({name: open_footage(path, name) for name, path in files.items()})
+    declared = [c.declared_fps for c in session.cameras if c.declared_fps is not None]
+    found = find_clock_starts(files, session.fps, declared) if by_names is None else [by_names]
+    return clock_notes(found, n_frames)
 
 
 def with_starts(session: Session, starts: Mapping[str, float], rates: Mapping[str, float]) -> Session:

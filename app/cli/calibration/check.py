@@ -8,6 +8,7 @@ import tyro
 
 from app.cli.arguments import OptionalRange, SessionArg
 from app.cli.target import parse_frames
+from app.remedies import command_line_text
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
@@ -76,11 +77,22 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
         posed = PosedRecording.of_session(session, Observer(session.cameras, recording).in_time())
         found = check_calibration(posed, frames, n, report)
         scores = held_out_scores(posed, found, n, report) if found.named else []
-    out = _as_json(found, scores)
+    out = _as_json(found, scores) | {"clocks": clock_notes(session, found) if found.named else []}
     if applies:
         out["applied"] = list(found.named)
         out["outdated_sizes"] = _apply(session, found, scores) if found.named else []
     return out
+
+
+def clock_notes(session: "Session", found: "CalibrationCheck") -> list[str]:
+    """Return a sentence if the motion of the people contradicts the clocks in the files of the footage."""
+    from tracker.pipeline.calibration_revisions import with_corrections
+    from tracker.session.synchronize import footage_clocks
+
+    try:
+        return footage_clocks(with_corrections(session, found.corrections, found.middle_s, found.lost), "motion")[1]
+    except TrackerError as error:
+        return [command_line_text(error)]
 
 
 def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameScore"]]) -> list[str]:
@@ -139,6 +151,7 @@ def _format(found: dict[str, Any]) -> str:
     for camera in found["cameras"]:
         if camera["kind"] is not None:
             lines = [*lines, *_correction_lines(camera)]
+    lines += [f"note: {note}" for note in found["clocks"]]
     n = found["explained"]["held_out_frames"]
     if n:
         lines = [*lines, f"of {n} other frames, {found['explained']['held_out_better']} fit better with it"]

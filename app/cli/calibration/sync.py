@@ -1,5 +1,6 @@
 """`quadrille sync`: find and set when the cameras of a session began."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ def command(
     drift: NamedValues = (),
     sound: bool = False,
     flash: bool = False,
+    timecode: bool = False,
     apply: bool = False,
     json: bool = False,
 ) -> None:
@@ -28,22 +30,25 @@ def command(
         drift: CAM=R: the clock of this camera changes against the session's by R seconds a second.
         sound: compare the sound of the videos.
         flash: compare when a light goes on in all pictures.
-        apply: write what sound or flash show clearly into session.toml.
+        timecode: compare the time codes of the videos, else GPS or creation times; of images, the times in their names.
+        apply: write what is found clearly into session.toml.
         json: print one JSON object.
     """
+    ways = [way for way, is_asked in (("sound", sound), ("flash", flash), ("time code", timecode)) if is_asked]
     found = synchronize(
-        session, parse_pairs(offset, "--offset", finite), parse_pairs(drift, "--drift", finite), sound, flash, apply
+        session, parse_pairs(offset, "--offset", finite), parse_pairs(drift, "--drift", finite), ways, apply
     )
     print(format_json(found) if json else _format(found))
 
 
 def synchronize(
-    folder: Path, offsets: dict[str, float], drifts: dict[str, float], sound: bool, flash: bool, apply: bool
+    folder: Path, offsets: dict[str, float], drifts: dict[str, float], ways: Sequence[str], apply: bool
 ) -> dict[str, Any]:
     """Find and set the clocks of a session's cameras; see `command`.
 
     Returns:
-        `found` lists what sound or flash show, `cameras` the clocks of all cameras, `written` whether they are new.
+        `found` lists what was found, `notes` sentences on it, `cameras` the clocks of all cameras, `written` whether
+        they are new.
 
     Raises:
         TrackerError: nothing is asked for, or too much; footage cannot be read, or an offset does not fit it.
@@ -51,16 +56,31 @@ def synchronize(
     from tracker.footage.recording import Recording
     from tracker.session.lock import SessionLock
     from tracker.session.session import load_session
-    from tracker.session.synchronize import starts_by_flash, starts_by_sound, with_starts
+    from tracker.session.synchronize import (
+        clock_disagreement,
+        require_footage,
+        starts_by_clock,
+        starts_by_flash,
+        starts_by_sound,
+        with_starts,
+    )
 
-    if (sound and flash) or ((sound or flash) == bool(offsets or drifts)):
-        raise TrackerError("expected one of --sound, --flash, or --offset and --drift; say how to find the offsets")
-    session, found = load_session(folder), []
-    if sound:
-        found = starts_by_sound(session)
-    elif flash:
-        with Recording(session.cameras) as recording:
-            found = starts_by_flash(session, recording)
+    if len(ways) + bool(offsets or drifts) != 1:
+        raise TrackerError(
+            "expected one of --sound, --flash, --timecode, or --offset and --drift; say how to find the offsets"
+        )
+    session, found, notes = load_session(folder), [], []
+    if ways:
+        require_footage(session)
+    if "time code" in ways:
+        found, notes = starts_by_clock(session)
+    elif ways:
+        if "sound" in ways:
+            found = starts_by_sound(session)
+        else:
+            with Recording(session.cameras) as recording:
+                found = starts_by_flash(session, recording)
+        notes = clock_disagreement(session, ways[0], found)
     if apply:
         offsets = {f.camera: f.start_frames for f in found if f.is_clear and f.start_frames is not None} or offsets
     written = bool(drifts or (offsets and (apply or not found)))
@@ -70,6 +90,7 @@ def synchronize(
     return {
         "folder": str(session.folder),
         "found": [f._asdict() for f in found],
+        "notes": notes,
         "written": written,
         "cameras": [
             {
@@ -92,8 +113,9 @@ def _format(found: dict[str, Any]) -> str:
             continue
         sigma = "" if f["sigma_ms"] is None else f" +- {f['sigma_ms']:.2g} ms"
         verdict = "clear" if f["is_clear"] else "not clear, so not taken"
-        stands = f"{f['ratio']:.1f} times the next: {verdict}"
+        stands = verdict if f["ratio"] is None else f"{f['ratio']:.1f} times the next: {verdict}"
         lines.append(f"{f['camera']}: offset {f['start_frames']:.3f} frames{sigma}, {stands}")
+    lines += [f"note: {note}" for note in found["notes"]]
     if found["written"]:
         lines += ["written to session.toml; track again, since poses are of the former times"]
         lines += [
@@ -102,4 +124,6 @@ def _format(found: dict[str, Any]) -> str:
         ]
     elif any(f["is_clear"] for f in found["found"]):
         lines.append("nothing written; say --apply to write what is clear")
+    elif found["found"]:
+        lines.append("nothing written: nothing that was found is clear")
     return "\n".join(lines)

@@ -2,14 +2,19 @@
 
 import json
 from contextlib import closing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from command_line import WITH_POSE, assert_refused
 
+from app.cli.calibration.check import clock_notes
 from app.cli.track_report import format_summary
-from tracker.calibration.camera_correction import corrected
+from tracker.calibration.camera_correction import N_CORRECTIONS, TIME, corrected
+from tracker.footage.start_times import StartTime, time_code_frames
 from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.session import footage_clocks, synchronize
+from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import MarkChange
 
@@ -85,3 +90,20 @@ def test_frames_outside_of_the_poses_are_refused(run, session):
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:
         store.commit("nothing", [MarkChange("person", 0, False, False)])
     assert_refused(run("check", session, "--frames", "0:10"), ["expected at least 3 frames", "found 0"])
+
+
+def test_motion_against_time_codes(session, monkeypatch):
+    """The time codes agree with the session; the motion says that a camera is three frames late."""
+    codes = dict.fromkeys((c.camera.name for c in load_session(session).cameras), "10:00:00:12")
+
+    def read(path, where):
+        return (StartTime("time code", codes[path.stem], time_code_frames(codes[path.stem], 25.0) / 25, 1 / 25),)
+
+    for module in (footage_clocks, synchronize):
+        monkeypatch.setattr(module, "read_start_times", read)
+    corrections = np.zeros((len(codes), N_CORRECTIONS))
+    found = SimpleNamespace(corrections=corrections, middle_s=0.0, lost={})
+    assert clock_notes(load_session(session), found) == []
+    corrections[1, TIME] = 3 / 25  # s later
+    (note,) = clock_notes(load_session(session), found)
+    assert note.startswith("the motion and the time code disagree by up to 3.0 frames: offsets FRONT=0 RIGHT=-3")

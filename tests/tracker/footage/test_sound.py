@@ -37,6 +37,13 @@ def test_other_sound_is_not_clear():
     assert not sound_delay(one, np.zeros_like(one)).is_clear
 
 
+def test_long_sound_is_cut(tmp_path):
+    one, _ = recordings(0.0, seconds=4.0)
+    path = filmed(tmp_path / "a.mp4", one)
+    assert len(read_sound(path, "a")) == pytest.approx(4 * RATE, rel=0.1)
+    assert len(read_sound(path, "a", SoundSettings(max_s=1.0))) == pytest.approx(RATE, rel=0.1)
+
+
 def test_short_sound_has_no_delay():
     one, other = recordings(0.0, seconds=0.5)
     assert sound_delay(one, other) is None
@@ -58,6 +65,7 @@ def filmed(path, samples, rate=RATE):
             frame.sample_rate, frame.pts = rate, first
             container.mux(sound.encode(frame))
         container.mux(sound.encode())
+    return path
     return path
 
 

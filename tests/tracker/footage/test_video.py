@@ -10,8 +10,9 @@ from clips import SIZE, N, encode, encode_stamped, number, picture, write_images
 
 from tracker.errors import RecordingError
 from tracker.footage.frame_reader import FrameReader
-from tracker.footage.image_folder import ImageFolder, image_numbers, missing_numbers
+from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.video import VideoFile, open_footage
+from tracker.formats.keypoints.picture_numbers import picture_numbers
 
 
 def decode_all(path):
@@ -316,12 +317,19 @@ def test_images_in_natural_order(tmp_path, suffix):
         (["17-03-11", "17-04-02", "18-04-59"], None, []),  # names of times
         (["1698000017", "1698000054", "1698000083", "1698000125"], None, []),
         (["a", "b"], None, []),
-        (["img5"], None, []),
     ],
 )
 def test_numbers_of_images(stems, numbers, missing):
-    assert image_numbers(stems) == numbers
+    assert picture_numbers(stems).numbers == numbers
     assert missing_numbers(numbers or (1,)) == missing
+
+
+def test_images_in_the_order_of_the_number_that_runs(tmp_path):
+    names = [f"{i}_{k:04d}.png" for k, i in enumerate([7, 913, 55, 128, 6, 3001, 2])]
+    images = ImageFolder(write_images(tmp_path / "f", names), "cam")
+    assert [f.name for f in images.files] == names
+    assert images.numbers == tuple(range(7))
+    assert ImageFolder(write_images(tmp_path / "g", ["img5.png"]), "cam").numbers is None
 
 
 def test_image_folder_out_of_range(tmp_path):

@@ -12,5 +12,6 @@ __all__ = [
     "deeplabcut",
     "hdf5",
     "openpose",
+    "picture_numbers",
     "picture_table",
 ]

@@ -1,0 +1,79 @@
+"""Files of the footage of a new session: videos of a folder, backgrounds and masks by the names of cameras."""
+
+from pathlib import Path
+
+from tracker.errors import RecordingError, Remedy, SessionError
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.chapters import VIDEO_SUFFIXES
+from tracker.footage.image_file import IMAGE_SUFFIXES
+from tracker.footage.recording import read_background, read_mask
+from tracker.session.matching import find_entry
+
+
+def footage_in(folder: Path) -> list[Path]:
+    """Return the videos of a folder, or its folders of images or of the chapters of a video if it has no video.
+
+    Raises:
+        SessionError: there is neither.
+    """
+    try:
+        entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError as error:
+        raise SessionError(
+            f"expected a folder of videos, found that {folder} cannot be read ({error.strerror}); check the path"
+        ) from error
+    videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
+    found = videos or [path for path in entries if path.is_dir() and _has_footage(path)]
+    if not found:
+        raise SessionError(
+            f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
+            "choose the folder that holds the footage of all cameras"
+        )
+    return found
+
+
+def _has_footage(folder: Path) -> bool:
+    return any(path.suffix.lower() in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES) for path in folder.iterdir())
+
+
+def find_background(folder: Path, camera: str) -> Path:
+    """Find the background of a camera by its name, an image or a video.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    for suffix in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES):
+        path = find_entry(folder, f"{camera}{suffix}")
+        if path.is_file():
+            return path
+    raise RecordingError(
+        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4",
+        Remedy("give_camera_background"),
+    )
+
+
+def find_masks(folder: Path, camera: str) -> Path:
+    """Find the folder of masks of a camera by its name.
+
+    Raises:
+        RecordingError: there is none, or it has no masks.
+    """
+    path = find_entry(folder, camera)
+    if not any(path.glob("[0-9]" * 6 + ".png")):
+        raise RecordingError(
+            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame",
+            Remedy("give_camera_masks"),
+        )
+    return path
+
+
+def check_side_files(source: CameraSource) -> None:
+    """Read the background and the first mask, so that a misfit shows before tracking starts.
+
+    Raises:
+        RecordingError: one is missing, unreadable or of another size than the camera.
+    """
+    read_background(source)
+    if source.masks is not None:
+        first = min(find_masks(source.masks.parent, source.masks.name).glob("[0-9]" * 6 + ".png"))
+        read_mask(source, int(first.stem) - source.offset)
