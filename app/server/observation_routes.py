@@ -8,7 +8,7 @@ import math
 import tempfile
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
 import msgspec
@@ -23,12 +23,16 @@ from app.session.import_summary import import_summary
 from app.session.path_choice import TypedPaths, typed_paths
 from tracker.errors import TrackerError
 from tracker.formats.file_names import identifier
+from tracker.formats.joint_maps import known_joint_maps
+from tracker.formats.trc import METRES_BY_WORD
 from tracker.observations.request import ImportRequest
 from tracker.validation import FileStem, Name
 
 _Size = Annotated[int, Meta(ge=1, le=100_000, title="Picture size", description="a width and a height in pixels")]
 _Confidence = Annotated[float, Meta(gt=0, le=1, title="Confidence", description="a confidence above 0 and at most 1")]
-_Frame = Annotated[int, Meta(ge=0, le=10_000_000, title="First frame", description="a frame of the session")]
+_Frame = Annotated[int, Meta(ge=-10_000_000, le=10_000_000, title="First frame", description="a frame of the session")]
+_Skeleton = Annotated[str, Meta(max_length=40, title="Names of points", description="the name of a known skeleton")]
+_Axes = Annotated[str, Meta(max_length=12, title="Axes", description="axes such as x,-z,y")]
 
 _Offset = Annotated[int, Meta(ge=-10_000_000, le=10_000_000, title="Offset", description="a number of frames")]
 
@@ -50,6 +54,14 @@ class ImportForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Confidence of points in files without one."""
     picture_size: tuple[_Size, _Size] | None = None
     """Width and height of the pictures that the points are of; 1, 1 for normalized points."""
+    names_of_points: _Skeleton | None = None
+    """Name of a known skeleton, in whose order or by whose names the points are; null to guess it."""
+    axes: _Axes = "x,y,z"
+    """Axes of the file that are the session's x, y and z."""
+    units: Literal["m", "cm", "mm", "in", "ft"] | None = None
+    """Unit of joints in space in a file that states none."""
+    unusual: bool = False
+    """Whether points are kept that fit no person of the recording, or fit one better in another way."""
 
 
 class ObservationRoutes:
@@ -87,8 +99,10 @@ class ObservationRoutes:
         if strange := [n for n in form.people if n not in known]:
             raise TrackerError(f"expected people of {', '.join(known)}, found '{strange[0]}'; reload the page")
         request = ImportRequest(
-            form.name, tuple(typed_paths(form.paths)), tuple(form.people), first_frame=form.first_frame,
-            offsets=form.offsets, confidence=form.confidence, picture_size=form.picture_size,
+            form.name, tuple(typed_paths(form.paths)), tuple(form.people), _known_map(form.names_of_points),
+            first_frame=form.first_frame, offsets=form.offsets, axes=form.axes,
+            unit_m=METRES_BY_WORD[form.units] if form.units else None, confidence=form.confidence,
+            picture_size=form.picture_size, unusual=form.unusual,
         )  # fmt: skip
         found = import_summary(session, self._controller.observing.plan(request), page_text)
         for view in found["views"]:
@@ -128,3 +142,15 @@ class ObservationRoutes:
             path = Path(folder.path) / name
             write_report(session, found.judged, found.judgements, path)
             return name, path.read_bytes()
+
+
+def _known_map(name: str | None) -> Path | None:
+    """Return the name of a known skeleton as the file of a joint map; the page names no files of joint maps.
+
+    Raises:
+        TrackerError: there is none of this name.
+    """
+    known = [m.name for m in known_joint_maps()]
+    if name is not None and name not in known:
+        raise TrackerError(f"expected as Names of points one of {', '.join(known)}, found '{name}'; correct it")
+    return None if name is None else Path(name)

@@ -39,6 +39,12 @@ export function importForm(store, paths, discard) {
   const late = field("offsets", "Offsets", "Frames by which the key points of a camera are late, such as cam2=3; several are separated by semicolons");
   const size = field("picture_size", "Picture size", "Width x height of the pictures that points or masks are of, such as 1920x1080, if not the footage's; 1x1 for normalized points");
   const confidence = field("confidence", "Confidence", "Confidence of all points, 0 to 1, where the files have none");
+  const skeleton = field("names_of_points", "Names of points", "A known skeleton by whose names, or in whose order, the points are, such as BODY_25B; guessed if empty");
+  const axes = field("axes", "Axes", "Joints in space: axes of the file that are the session's x, y and z, such as x,-z,y; x,y,z if empty");
+  const units = field("units", "Units", "Joints in space: unit of a file that states none: m, cm, mm, in or ft");
+  const unusual = Object.assign(document.createElement("label"), { className: "import-field", title: "Keep points also where they fit no person of the recording, or fit one better in another way" });
+  const keep = Object.assign(document.createElement("input"), { type: "checkbox", name: "unusual" });
+  unusual.append(span("Keep unusual points"), keep);
   const people = Object.assign(document.createElement("label"), { className: "import-field", title: "Person of whom they are" });
   const person = Object.assign(document.createElement("select"), { name: "person" });
   people.append(span("Person"), person);
@@ -51,7 +57,7 @@ export function importForm(store, paths, discard) {
   const result = Object.assign(document.createElement("div"), { className: "import-result" });
   result.setAttribute("role", "status");
   const further = document.createElement("details");
-  further.append(Object.assign(document.createElement("summary"), { textContent: "Where the files do not tell", title: "First frame, offsets, size of the pictures, confidence" }), first.label, late.label, size.label, confidence.label);
+  further.append(Object.assign(document.createElement("summary"), { textContent: "Where the files do not tell", title: "First frame, offsets, size of the pictures, confidence, names, axes and unit" }), first.label, late.label, size.label, confidence.label, skeleton.label, axes.label, units.label, unusual);
   form.append(path.label, name.label, people, further, buttons, result);
   fold.append(head, form);
   paths.completes(path.input);
@@ -109,6 +115,10 @@ export function importForm(store, paths, discard) {
           offsets: offsetsOf(late.input.value),
           confidence: sure ? Number(sure) : null,
           picture_size: pixels ? [Number(pixels[1]), Number(pixels[2])] : null,
+          names_of_points: skeleton.input.value.trim() || null,
+          axes: axes.input.value.trim() || "x,y,z",
+          units: units.input.value.trim() || null,
+          unusual: keep.checked,
         })
       );
       result.replaceChildren(...describe(plan));

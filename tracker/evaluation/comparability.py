@@ -9,6 +9,7 @@ from tracker.errors import Remedy
 from tracker.evaluation.metrics import LOST_M, best_rigid, gather_joints
 from tracker.formats.file_axes import axes_matrix
 from tracker.formats.joint_maps import LIMB_JOINTS, JointMap
+from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array

@@ -18,7 +18,7 @@ from tracker.geometry.arrays import Array
 
 GROSS = 0.1
 """Share of joints that are grossly wrong: between those of a network of a slow person (3%) and of a fast one (25%)."""
-_ERROR = 0.02
+ERROR = 0.02
 """Standard deviation of a joint of another program from that of a body, share of its height: 3 cm of a network."""
 _RANGE = float(np.log(100.0))
 """Range of the logarithm of a length between points of anything: from 2 cm to 2 m."""
@@ -84,7 +84,7 @@ def bones(places: Places) -> Bones:
         usual = np.log([lengths[name] / body.height_m for name, _ in known])[:, None]
         stature = np.exp(np.nanmedian(logs - usual))
     priors = SizePriors()
-    of_joints = np.sqrt(2) * np.hypot(priors.joint, _ERROR) / np.exp(usual)
+    of_joints = np.sqrt(2) * np.hypot(priors.joint, ERROR) / np.exp(usual)
     ratios = _RANGE * norm.pdf(logs, usual + np.log(stature), np.hypot(priors.length, of_joints))
     nats = np.nanmean(np.log((1 - GROSS) * ratios + GROSS), axis=1)
     oddest = int(nats.argmin())
@@ -151,7 +151,7 @@ def bend_nats(places: Places) -> float:
                 along = np.sum((b - a) * line, axis=-1) / np.sum(line * line, axis=-1)
             foot = a + np.nan_to_num(along)[:, None] * line
             # The trunk is 30% of the height.
-            ahead = sign * np.sum((b - foot) * forward, axis=-1) / (_ERROR * height / 0.3)
+            ahead = sign * np.sum((b - foot) * forward, axis=-1) / (ERROR * height / 0.3)
             total += _mean(np.log(2 * (1 - wrong) * norm.cdf(ahead) + wrong))
     return total
 

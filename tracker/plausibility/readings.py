@@ -15,7 +15,17 @@ from tracker.formats.joint_maps import JointMap
 from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.observations.shifts import vertex
-from tracker.plausibility.body_likelihood import Bones, Places, bend_nats, bones, is_stature, stature_nats, upright_nats
+from tracker.observations.triangulation import INLIER_M
+from tracker.plausibility.body_likelihood import (
+    ERROR,
+    Bones,
+    Places,
+    bend_nats,
+    bones,
+    is_stature,
+    stature_nats,
+    upright_nats,
+)
 
 
 class Witness(Protocol):
@@ -211,9 +221,12 @@ class ReadPoints:
     def _weight(self) -> float:
         """Log likelihood of people who are far from those of the recording.
 
-        Distances are normal with a standard deviation of half of the largest one. Each limb counts in each view.
+        Distances are normal with the standard deviation of joints, up to `INLIER_M`. Each limb counts in each view.
         """
-        return 0.0 if self.witness is None else -2.0 * _LIMBS * self.witness.n_views * self.n_postures
+        if self.witness is None:
+            return 0.0
+        sigma_m = ERROR * float(np.mean(self.statures_m))
+        return -0.5 * (INLIER_M / sigma_m) ** 2 * _LIMBS * self.witness.n_views * self.n_postures
 
     def _costs(self, reading: Reading) -> Array:
         """Return how far each person is from those of the recording, (n_people * F,), 0 to 1; NaN if unknown."""
