@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from tracker.errors import FormatError
+from tracker.files import open_regular
 from tracker.text_files import TABLE_BYTES, TextKind, read_json, read_lines
 
 _TEXT = TextKind("file", TABLE_BYTES, FormatError)
 _HEAD_LINES = 12
-"""Lines in which all known tables have shown their columns: the header of a C3D export by QTM takes 10."""
+"""Lines in which all known tables have shown their columns: the header of a C3D export by QTM takes 10. As many bytes
+tell binary files apart."""
 T = TypeVar("T")
 
 
@@ -21,6 +23,20 @@ class Sample:
     """A file of an import, looked at to tell which program wrote it. Nothing is read twice."""
 
     path: Path
+
+    @property
+    def suffix(self) -> str:
+        """End of its name, in lower case: `.json`."""
+        return self.path.suffix.lower()
+
+    @cached_property
+    def begin(self) -> bytes:
+        """First bytes; none if it cannot be read."""
+        try:
+            with open_regular(self.path) as file:
+                return file.read(_HEAD_LINES)
+        except OSError:
+            return b""
 
     @cached_property
     def head(self) -> tuple[str, ...]:
@@ -50,7 +66,12 @@ class ObservationLayout(Generic[T]):
     recognized_by: str
     """Content by which it is recognized, for documents."""
     recognizes: Callable[[Sample], bool]
-    read: Callable[..., T] | None = None
+    reader: Callable[..., T] | None = None
     """Reads it; None for a layout that is known by name alone."""
     instead: str = ""
     """For a layout that is not read: the file to export instead, as the end of a sentence."""
+
+    def read(self, *arguments: Any) -> T:
+        """Read files; the arguments are those of its table."""
+        assert self.reader is not None, "a layout that is not read is refused before"
+        return self.reader(*arguments)

@@ -68,7 +68,7 @@ def store_import(session: Session, plan: ImportPlan | MaskPlan) -> Session:
 def _plan_of_pictures(
     session: Session, request: ImportRequest, format_name: str, files: list[Found], calibrated: bool
 ) -> ImportPlan:
-    groups = PICTURE_FORMATS[format_name].read(files)
+    groups = PICTURE_FORMATS[format_name].read(files, session.camera_names)
     names = match_cameras([(g.labels, g.place) for g, _ in groups], session.camera_names, request.cameras)
     unmatched = [g for (g, _), name in zip(groups, names, strict=True) if not name]
     problems = [no_camera(session.camera_names, g) for g in unmatched]
@@ -104,7 +104,8 @@ def _plan_of_pictures(
 
 
 def _scaled(table: PictureTable, size: tuple[int, int], given: tuple[int, int] | None) -> PictureTable:
-    """Return points in the pixels of the camera, if they are said to be of pictures of another size."""
+    """Return points in the pixels of the camera, if they are said to be of pictures of another size, or are shares."""
+    given = (1, 1) if table.size == (1, 1) else given
     if given is None:
         return table
     points = table.points.copy()
@@ -121,9 +122,9 @@ def _with_confidence(table: PictureTable, confidence: float) -> PictureTable:
 
 
 def _with_certain_points(table: PictureTable) -> PictureTable:
-    """Return points that are certain where they alone state no confidence, as those that a person set."""
+    """Return points that are certain where a person set them, or where they alone state no confidence."""
     is_certain = table.is_found & np.isnan(table.points[..., 2])
-    if not table.has_confidence or not is_certain.any():
+    if not (table.has_confidence or table.is_by_hand) or not is_certain.any():
         return table
     points = table.points.copy()
     points[is_certain, 2] = 1.0

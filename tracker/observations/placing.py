@@ -21,7 +21,8 @@ def place_pictures(
 ) -> tuple[dict[str, IntArray], list[FormatError], list[str]]:
     """Return the frame of the session of each picture by camera, what contradicts the session, and notes.
 
-    A number counts the pictures of the footage, from 0 or from 1; the offset of a camera is taken off. With
+    A number counts the pictures of the footage, from 0 or from 1; the offset of a camera is taken off. Points that a
+    person set may be in some pictures alone. With
     `first_frame`, the lowest number of all cameras is that frame of the session, and equal numbers are one instant.
 
     Args:
@@ -109,7 +110,8 @@ def _wrong_lengths(tables: Mapping[str, PictureTable], session: Session, base: i
     lengths, problems = footage_lengths(session), []
     for name, table in tables.items():
         first, last = (int(table.numbers[0]), int(table.numbers[-1])) if len(table.numbers) else (0, -1)
-        if (first, last) == (base, base + lengths[name] - 1):
+        end = base + lengths[name] - 1
+        if (first, last) == (base, end) or (table.is_by_hand and base <= first <= last <= end):
             continue
         problems.append(
             FormatError(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from tracker.errors import FormatError, Remedy
-from tracker.formats.keypoints.openpose import numbered_name
+from tracker.formats.keypoints.picture_numbers import PictureName, picture_names
 from tracker.observations.observed import SourceFile, checksum
 from tracker.session.matching import check_names
 from tracker.validation import same_form
@@ -26,6 +26,13 @@ class FileGroup:
     """Names after which the camera may be called, best first."""
     root: Path
     """Folder to which the paths of the stored files are relative."""
+    pictures: tuple[PictureName, ...] = ()
+    """For files with one picture each: the label and number of each, ascending by number. Several may have a number."""
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the pictures, each once, ascending."""
+        return sorted({picture.number for picture in self.pictures})
 
     @property
     def place(self) -> Path:
@@ -65,33 +72,37 @@ def folder_labels(path: Path, root: Path) -> tuple[str, ...]:
     return (path.stem, *folders)
 
 
-def numbered_groups(files: Sequence[Found]) -> list[FileGroup]:
-    """Group files with one picture each, by their folder and by the name before the number.
+def numbered_groups(files: Sequence[Found], cameras: Sequence[str]) -> list[FileGroup]:
+    """Group files with one picture each by their folder, and by the camera in their names or else the rest of them.
 
     Raises:
-        FormatError: a name has no number, or two of a group have the same.
+        FormatError: a name has no number, or two that differ in nothing else have the same.
     """
-    groups: dict[tuple[Path, str], dict[int, Found]] = {}
+    folders: dict[Path, list[Found]] = {}
     for path, root in files:
-        named = numbered_name(path.name)
-        if named is None:
-            raise FormatError(
-                f"expected the number of the picture in the file's name, as in CAMERA_000000000000_keypoints.json, "
-                f"found {path.name}; rename it or leave it out"
-            )
-        stem, number = named
-        group = groups.setdefault((path.parent, stem), {})
-        if number in group:
-            raise FormatError(
-                f"expected one file for each picture, found {group[number][0].name} and {path.name}; leave one out"
-            )
-        group[number] = (path, root)
+        folders.setdefault(path.parent, []).append((path, root))
+    groups: dict[tuple[Path, str], dict[PictureName, Found]] = {}
+    for some in folders.values():
+        names = picture_names([path.stem.removesuffix("_keypoints") for path, _ in some])
+        for (path, root), name in zip(some, names, strict=True):
+            if name is None:
+                raise FormatError(
+                    f"expected the number of the picture in the file's name, as in CAMERA_000000000012_keypoints.json, "
+                    f"found {path.name}; rename it or leave it out"
+                )
+            camera = _camera_of((name.label, *folder_labels(path, root)[1:]), cameras)
+            group = groups.setdefault((path.parent, camera or name.label), {})
+            if name in group:
+                raise FormatError(
+                    f"expected one file for each picture, found {group[name][0].name} and {path.name}; leave one out"
+                )
+            group[name] = (path, root)
     out = []
-    for (_, stem), group in groups.items():
-        ordered = [group[n] for n in sorted(group)]
-        root = ordered[0][1]
-        labels = (stem, *folder_labels(ordered[0][0], root)[1:])
-        out.append(FileGroup(tuple(p for p, _ in ordered), labels, root))
+    for group in groups.values():
+        pictures = tuple(sorted(group, key=lambda picture: (picture.number, picture.label)))
+        first, root = group[pictures[0]]
+        labels = (*dict.fromkeys(p.label for p in pictures), *folder_labels(first, root)[1:])
+        out.append(FileGroup(tuple(group[p][0] for p in pictures), labels, root, pictures))
     return out
 
 

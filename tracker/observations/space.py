@@ -43,7 +43,7 @@ def read_space(
     tables, notes, problems = list[MarkerTable](), list[str](), list[FormatError]()
     rows = list[Array]()
     for path in paths:
-        where = f"{SPACE_FORMATS[format_name].title} file {path}"
+        where = f"{SPACE_FORMATS[format_name].program} file {path}"
         read = remap_axes(SPACE_FORMATS[format_name].read(path, request.unit_m, session.fps), request.axes)
         if tables and tables[0].names != read.names:
             raise FormatError(f"{where}: expected the points of {paths[0].name}, found others; import them apart")

@@ -36,7 +36,7 @@ def stored_pictures(session: Session, observations: ObservationSet) -> list[Stor
     """
     of_path = {source_path(session, observations.name, s): s for s in observations.sources}
     root = files_folder(session, observations.name)
-    groups = PICTURE_FORMATS[observations.format].read([(path, root) for path in of_path])
+    groups = PICTURE_FORMATS[observations.format].read([(path, root) for path in of_path], session.camera_names)
     labels = [() if of_path[g.files[0]].camera else g.labels for g, _ in groups]
     matched = match_cameras([(n, g.place) for n, (g, _) in zip(labels, groups, strict=True)], session.camera_names, {})
     cameras = [of_path[g.files[0]].camera or name for (g, _), name in zip(groups, matched, strict=True)]

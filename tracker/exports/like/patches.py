@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.errors import SessionError
+from tracker.errors import FormatError, Remedy, SessionError
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like.mended_points import MendedPoints
 from tracker.formats.bvh_patching import patch_bvh
@@ -25,6 +25,7 @@ from tracker.motion.velocity import velocity
 from tracker.observations.joints import side_pairs, triangulate_observations
 from tracker.observations.observed import ObservationSet
 from tracker.observations.placing import rescaled
+from tracker.observations.readers import PICTURE_FORMATS
 from tracker.observations.request import picture_size
 from tracker.observations.stored import source_path
 from tracker.observations.stored_files import StoredPictures, stored_pictures
@@ -104,16 +105,27 @@ def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Chan
     out: dict[Path, bytes] = {}
     if format_name == "openpose":
         for pictures, changes in found:
+            if len(pictures.files) > len(pictures.table.numbers):
+                raise _not_sent_back("files with one picture each, found several of one")
             of_row = {pictures.files[row]: c for row, c in changes.items()}
             out |= {path: patch_openpose(path.read_bytes(), c) for path, c in of_row.items()}
         return out
+    patch = {"coco": patch_coco, "alphapose": patch_coco, "hdf5": patch_hdf5_apart}
+    if format_name != "deeplabcut" and format_name not in patch:
+        raise _not_sent_back(
+            f"files of a program to which points are sent back, found {PICTURE_FORMATS[format_name].program}"
+        )
     for path in {pictures.files[0] for pictures, _ in found}:  # a file may hold several cameras
         of_file = {p.part: changes for p, changes in found if p.files[0] == path}
         if format_name == "deeplabcut":
             out[path] = patch_deeplabcut_csv(path, of_file[0])
         else:
-            out[path] = (patch_coco if format_name == "coco" else patch_hdf5_apart)(path, of_file)
+            out[path] = patch[format_name](path, of_file)
     return out
+
+
+def _not_sent_back(difference: str) -> FormatError:
+    return FormatError(f"expected {difference}", Remedy("export_other_format"))
 
 
 def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Array:

@@ -205,7 +205,7 @@ def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind):
         before, after = read_trc(path).points[EDITED], read_trc(done.paths[0]).points[EDITED]
     else:
         name = f"cam1/cam1_{EDITED:012d}_keypoints.json"
-        before, after = (read_openpose(folder / name)[0] for folder in (path, tmp_path / "back"))
+        before, after = (read_openpose(folder / name)[0].points for folder in (path, tmp_path / "back"))
     differ = {n for n, a, b in zip(BODY_25.points, before, after, strict=True) if not np.array_equal(a, b)}
     assert differ == {"LWrist", "RKnee", "RAnkle", "RHeel", "RBigToe"}
 
@@ -238,8 +238,8 @@ def test_a_mended_frame_alone_differs_in_pictures(session, tmp_path, kind):
         if kind == "openpose":
             name = f"{camera.name}/{camera.name}_{EDITED:012d}_keypoints.json"
             (person,) = read_openpose(tmp_path / "back" / name)
-            found, nose = person[knee], person[0]
-            before_nose = read_openpose(path / name)[0][0]
+            found, nose = person.points[knee], person.points[0]
+            before_nose = read_openpose(path / name)[0].points[0]
         else:
             name = f"{camera.name}.csv"
             table = read_deeplabcut_csv(tmp_path / "back" / name)
@@ -449,8 +449,8 @@ def test_a_person_who_was_not_found_is_added(session, tmp_path):
     store(session, bodies)
     export_like(session, imported(session, path), tmp_path / "back")
     (person,) = read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json")
-    assert len(person) == 25
-    assert np.isnan(person[0]).tolist() == [True, True, False]  # the nose is no joint of the body
+    assert len(person.points) == 25
+    assert np.isnan(person.points[0]).tolist() == [True, True, False]  # the nose is no joint of the body
 
 
 def test_nobody_is_added_who_is_not_in_the_picture(session, tmp_path):
@@ -483,7 +483,7 @@ def test_choices_of_the_import_hold_on_the_way_back(session, tmp_path):
     observations = imported(session, path, first_frame=2, picture_size=(320, 240))
     export_like(session, observations, tmp_path / "back")
     name = f"cam0/cam0_{EDITED - 2:012d}_keypoints.json"
-    one, other = (read_openpose(folder / name)[0] for folder in (path, tmp_path / "back"))
+    one, other = (read_openpose(folder / name)[0].points for folder in (path, tmp_path / "back"))
     assert np.abs(one[:, :2] - other[:, :2]).max() < 0.01
 
 
