@@ -164,8 +164,8 @@ PHRASES = {
         "rename it after its camera, or leave it out",
     ),
     "give_point_order": Phrases(
-        "give a --joint-map FILE.toml whose 'points' lists the names of the {n} points in order "
-        "(docs/observations.md has an example)",
+        "give a --joint-map FILE.toml whose 'points' lists the names of the {n} points in order, or the name of a known "
+        "one (docs/observations.md has an example)",
         "list the names of the points in a joint map",
     ),
     "place_first_picture": Phrases(

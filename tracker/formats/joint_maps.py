@@ -97,15 +97,19 @@ def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:
     return best
 
 
+def joint_maps_of_size(n_points: int) -> tuple[JointMap, ...]:
+    """Return the known conventions with a number of points; by name, which puts the more common one first."""
+    return tuple(known for known in known_joint_maps() if len(known.points) == n_points)
+
+
 def joint_map_of_size(n_points: int, source: str) -> JointMap:
-    """Return the known convention of a file that names no points, by their number.
+    """Return the known convention of a file that names no points, by their number; the first of several.
 
     Raises:
         FormatError: no convention has so many points.
     """
-    for known in known_joint_maps():
-        if len(known.points) == n_points:
-            return known
+    if found := joint_maps_of_size(n_points):
+        return found[0]
     sizes = ", ".join(f"{len(m.points)} ({m.name})" for m in known_joint_maps() if m.points)
     raise FormatError(
         f"{source}: expected the number of points of a known skeleton, {sizes}, found {n_points}",
@@ -119,7 +123,7 @@ def _quoted(marker: str) -> str:
 
 
 def read_joint_map(path: str | Path) -> JointMap:
-    """Read a convention from TOML: one line `left_shoulder = "LSHO"` for each joint that a file has.
+    """Return a known convention by its name, or read one from TOML: one line `left_shoulder = "LSHO"` for each joint.
 
     `points = ["LSHO", ...]` lists the markers of files without names, in order. `[means]` has a line
     `MidHip = ["left_hip", "right_hip"]` for each marker that is a mean.
@@ -127,6 +131,9 @@ def read_joint_map(path: str | Path) -> JointMap:
     Raises:
         FormatError: the file is missing or malformed, or names an unknown joint.
     """
+    for known in known_joint_maps():
+        if known.name == str(path) and not Path(path).exists():
+            return known
     return parse_joint_map(Path(path).name, read_toml(Path(path), _KIND), str(path))
 
 
