@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from tracker.errors import FormatError
-from tracker.files import open_regular
 from tracker.text_files import TABLE_BYTES, TextKind, read_json, read_lines
 
 _TEXT = TextKind("file", TABLE_BYTES, FormatError)
 _HEAD_LINES = 12
-"""Lines in which all known tables have shown their columns: the header of a C3D export by QTM takes 10. As many bytes
-tell binary files apart."""
+"""Lines in which all known tables have shown their columns: the header of a C3D export by QTM takes 10."""
 T = TypeVar("T")
 
 
@@ -28,15 +26,6 @@ class Sample:
     def suffix(self) -> str:
         """End of its name, in lower case: `.json`."""
         return self.path.suffix.lower()
-
-    @cached_property
-    def begin(self) -> bytes:
-        """First bytes; none if it cannot be read."""
-        try:
-            with open_regular(self.path) as file:
-                return file.read(_HEAD_LINES)
-        except OSError:
-            return b""
 
     @cached_property
     def head(self) -> tuple[str, ...]:

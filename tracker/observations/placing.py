@@ -58,6 +58,8 @@ def place_pictures(
         base = _base(tables, session, lowest)
         if base:
             notes.append("the files count pictures from 1: number 1 is the first picture of the footage")
+        elif any(table.is_by_hand for table in tables.values()):
+            notes.append("labels were placed by the numbers of their pictures, of which 0 is the first of the footage")
         frames = {name: table.numbers - base - offsets[name] for name, table in tables.items()}
         problems += _wrong_lengths(tables, session, base)
     frames = {name: placed - late.get(name, 0) for name, placed in frames.items()}

@@ -3,6 +3,7 @@
 import json
 import multiprocessing
 import random
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -21,6 +22,7 @@ from observed_files import (
     write_sleap,
 )
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
+from program_files import WRITERS
 
 from tracker.errors import TrackerError
 from tracker.footage.recording import read_mask
@@ -52,13 +54,26 @@ KINDS = {
     "coco polygon": ("c.json", None),
     "coco runs": ("c.json", None),
     "coco text": ("c.json", "pycocotools"),
+    "easymocap": ("f/annots/cam1/000002.json", None),
+    "mmpose": ("f/cam1.json", None),
+    "mmpose pictures": ("f/cam1/000002.json", None),
+    "alphapose": ("f/cam1/alphapose-results.json", None),
+    "roboflow": ("f/_annotations.coco.json", None),
+    "label studio": ("f/project-1.json", None),
+    "cvat images": ("f/cam1.xml", None),
+    "cvat video": ("f/cam1.xml", None),
+    "yolo": ("f/cam1/cam1_000002.txt", None),
+    "sleap csv": ("f/labels.v001.000_cam1.analysis.csv", None),
+    "eks": ("f/multicam_cam1_results.csv", None),
+    "hand labels": ("f/labeled-data/cam1/CollectedData_ann.csv", None),
+    "masks by object": ("m/cam1/mask_00002_obj1.png", None),
     "stored masks": ("masks.toml", None),
     "stored text": ("observations.toml", None),
     "stored numbers": ("points.npz", None),
 }
 """For each kind: the file that is mutated, and the package that it needs."""
 OF_JOINTS = ("trc", "c3d", "bvh", "csv")
-OF_MASKS = ("masks", "coco polygon", "coco runs", "coco text", "stored masks")
+OF_MASKS = ("masks", "masks by object", "coco polygon", "coco runs", "coco text", "stored masks")
 APART = ("h5py", "sleap_io")
 """Packages that read in a process of their own."""
 SECONDS = 10.0
@@ -69,10 +84,17 @@ def write(kind, session, folder):
     """Write the files of a kind; return the path to import."""
     if kind in ("masks", "stored masks"):
         return write_masks(folder / "m", session.camera_names, person_masks(N, 4))
+    if kind == "masks by object":
+        for k in (1, 2):
+            write_masks(folder / f"m{k}", session.camera_names, person_masks(N, 4), f"mask_{{k:05d}}_obj{k}.png")
+        shutil.copytree(folder / "m2", folder / "m1", dirs_exist_ok=True)
+        return (folder / "m1").rename(folder / "m")
     if kind in OF_MASKS:
         return write_coco_masks(folder / "c.json", session.camera_names, person_masks(N, 4), kind.split()[1])
     points = seen(session, [TRUTH])
-    if kind == "openpose":
+    if kind in WRITERS:
+        WRITERS[kind](folder / "f", session.camera_names, list(BODY_25.points), points)
+    elif kind == "openpose":
         write_openpose(folder / "k", session.camera_names, points)
     elif kind == "coco":
         write_coco_images(folder / "c.json", session.camera_names, BODY_25.points, points, "scores")
@@ -143,7 +165,7 @@ def run_forked(path, folder):
     [
         pytest.param(kind, n, marks=[pytest.mark.slow] if n > 50 or package in APART else [])
         for kind, (_, package) in KINDS.items()
-        for n in ((1000,) if package in APART else (50, 1000))
+        for n in ((1000,) if package in APART or kind in WRITERS else (50, 1000))
     ],
 )
 def test_mutated_observations_are_imported_or_refused(kind, n, tmp_path, monkeypatch):

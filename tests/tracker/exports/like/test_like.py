@@ -13,6 +13,7 @@ from observed_files import (
     write_sleap,
 )
 from observed_people import BODY_25, make_session, seen, write_openpose
+from program_files import write_alphapose, write_sleap_csv
 
 from tracker.body.model import PosedBody
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
@@ -404,6 +405,29 @@ def test_mended_points_of_coco_alone_differ(session, tmp_path, kind):
         expected = project_through_lens(source.camera, truth[EDITED, knee : knee + 1])[0]
         assert np.abs(new[knee, :2] - expected).max() < 0.1
         assert new[knee, 2] == (2 if kind == "coco cameras" else 1)  # a flag, or a confidence
+
+
+def test_mended_points_of_alphapose_alone_differ(session, tmp_path):
+    bodies = poses(session)
+    write_alphapose(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
+    store(session, bodies)
+    export_like(session, imported(session, tmp_path / "f"), tmp_path / "back")
+    for camera in session.camera_names:
+        name = f"{camera}/alphapose-results.json"
+        before, after = (json.loads((tmp_path / folder / name).read_text()) for folder in ("f", "back"))
+        assert [a == b for a, b in zip(before, after, strict=True)] == [k != EDITED for k in range(N)]
+        assert before[EDITED] | {"keypoints": []} == after[EDITED] | {"keypoints": []}
+
+
+def test_programs_to_which_nothing_is_sent_back(session, tmp_path):
+    bodies = poses(session)
+    write_sleap_csv(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
+    found = imported(session, tmp_path / "f")
+    export_like(session, found, tmp_path / "untouched")
+    store(session, bodies)
+    with pytest.raises(FormatError, match="to which points are sent back, found SLEAP's analysis in CSV") as caught:
+        export_like(session, found, tmp_path / "back")
+    assert caught.value.remedy == Remedy("export_other_format")
 
 
 @pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])

@@ -1,0 +1,229 @@
+"""Key points of detectors and of programs for labels: each is known by content, and read as it was written."""
+
+import numpy as np
+import pytest
+from mask_files import SIZE, image_of, person_masks
+from observed_people import BODY_25, make_session, seen, walking, write_openpose
+from program_files import (
+    BY_HAND,
+    FORMATS,
+    WRITERS,
+    write_cvat_points,
+    write_eks,
+    write_hand_labels,
+    write_sleap_csv,
+)
+
+from tracker.errors import FormatError
+from tracker.observations.importing import plan_import, store_import
+from tracker.observations.joints import observed_joints
+from tracker.observations.readers import PICTURE_FORMATS, UNREAD, find_files, markdown_table
+from tracker.observations.request import ImportRequest
+
+N = 8
+TRUTH = walking(N)
+POINTS = BODY_25.points
+
+
+@pytest.fixture
+def session(tmp_path):
+    return make_session(tmp_path / "s", N)
+
+
+def planned(session, path, **choices):
+    return plan_import(session, ImportRequest("mp", (path,), ("ann",), **choices))
+
+
+def imported(session, path, **choices):
+    plan = planned(session, path, **choices)
+    assert not plan.problems, plan.problems
+    return plan.observations
+
+
+def in_space(session, observations):
+    return observed_joints(observations, [c.camera for c in session.cameras]).joints_world[:, 0]
+
+
+@pytest.mark.parametrize("program", WRITERS)
+def test_programs(session, tmp_path, program):
+    WRITERS[program](tmp_path / "f", session.camera_names, list(POINTS), seen(session, [TRUTH]))
+    found = imported(session, tmp_path / "f", confidence=1.0 if program == "roboflow" else None)
+    assert found.format == FORMATS.get(program, program)
+    rows = [k for k in range(N) if program != "hand labels" or k % 3 == 1]
+    assert np.abs(in_space(session, found)[rows] - TRUTH[rows]).max() < 1e-3
+    expected = 1.0 if program in BY_HAND else 0.97 if program == "eks" else 0.9
+    assert np.allclose(found.points.confidence[found.points.is_known], expected)
+
+
+@pytest.mark.parametrize("program", [name for name in WRITERS if name not in ("eks", "hand labels")])
+def test_two_people(session, tmp_path, program):
+    others = walking(N, start=(0.6, 0.8, 0.0))
+    WRITERS[program](tmp_path / "f", session.camera_names, list(POINTS), seen(session, [TRUTH, others]))
+    plan = planned(session, tmp_path / "f", confidence=1.0 if program == "roboflow" else None)
+    assert not plan.problems
+    assert {view.n_people for view in plan.views} == {2}
+
+
+@pytest.mark.parametrize("n_cells", [1, 3])
+def test_labels_of_a_person_lie_at_their_pictures(session, tmp_path, n_cells):
+    write_hand_labels(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]), n_cells)
+    found = imported(session, tmp_path / "f")
+    assert np.flatnonzero(found.points.is_known.any(axis=(1, 2, 3))).tolist() == [1, 4, 7]
+    wrong = tmp_path / "f" / "labeled-data" / "cam0" / "CollectedData_ann.csv"
+    wrong.write_text(wrong.read_text().replace("img007", "img009"))
+    (problem,) = planned(session, tmp_path / "f").problems
+    assert "expected the 8 pictures of the footage, numbers 0 to 7, found numbers 1 to 9" in str(problem)
+
+
+def test_single_points_of_cvat(session, tmp_path):
+    write_cvat_points(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]))
+    found = imported(session, tmp_path / "f")
+    assert np.abs(in_space(session, found)[1::2] - TRUTH[1::2]).max() < 1e-3
+    assert not found.points.is_known[::2].any()
+
+
+def test_likelihoods_that_are_a_placeholder(session, tmp_path):
+    write_eks(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]), likelihood=0)
+    found = imported(session, tmp_path / "f")
+    assert (found.points.confidence[found.points.is_known] == 1).all()
+    assert sum("likelihoods are 0 throughout" in note for note in found.notes) == 4
+    assert sum("columns x_ens_median, y_posterior_var were left out" in note for note in found.notes) == 4
+
+
+def test_a_labelled_table_that_is_there_twice(session, tmp_path):
+    """DeepLabCut writes each table as CSV and as HDF5."""
+    write_hand_labels(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]))
+    for path in [*(tmp_path / "f").rglob("*.csv")]:
+        path.with_suffix(".h5").write_bytes(b"the same")
+    assert imported(session, tmp_path / "f").format == "deeplabcut"
+    (tmp_path / "f" / "other.h5").write_bytes(b"another")
+    with pytest.raises(FormatError, match="expected files of one format"):
+        find_files((tmp_path / "f",))
+
+
+def test_two_files_of_one_picture_are_two_people(session, tmp_path):
+    others = walking(N, start=(0.6, 0.8, 0.0))
+    for name, motion in (("a", TRUTH), ("b", others)):
+        write_openpose(tmp_path / name, session.camera_names, seen(session, [motion]))
+    for path in (tmp_path / "b").rglob("*.json"):
+        number = path.name.split("_")[1]
+        path.rename(tmp_path / "a" / path.parent.name / f"{path.parent.name}_{number}_person2.json")
+    plan = planned(session, tmp_path / "a")
+    assert not plan.problems
+    assert [view.n_people for view in plan.views] == [2] * 4
+    store_import(session, plan)
+    assert len(list((session.folder / "observations" / "mp" / "files").rglob("*.json"))) == 2 * 4 * N
+
+
+def test_masks_of_two_objects_are_two_values(tmp_path):
+    session = make_session(tmp_path / "s", 3, people=("ann", "bob"), size=SIZE)
+    masks = person_masks(3, 4, people=2)
+    for v, camera in enumerate(session.camera_names):
+        (tmp_path / "m" / camera).mkdir(parents=True)
+        for k in range(3):
+            for value in (1, 2) if k else (2,):  # the first object is not in the first picture
+                one = np.where(masks[k, v] == value, 255, 0).astype(np.uint8)
+                image_of(one).save(tmp_path / "m" / camera / f"mask_{k:05d}_obj{value}.png")
+    plan = plan_import(session, ImportRequest("sam", (tmp_path / "m",), ("ann", "bob"), values={"ann": 1, "bob": 2}))
+    assert not plan.problems
+    assert plan.format == "masks"
+    assert any("mask__obj1 = 1, mask__obj2 = 2" in note for note in plan.notes)
+    assert np.array_equal(plan.mask("cam1", 2, SIZE), masks[2, 1])
+    assert set(np.unique(plan.mask("cam1", 0, SIZE)).tolist()) == {0, 2}
+
+
+def test_one_object_for_each_picture_needs_no_values(tmp_path):
+    session = make_session(tmp_path / "s", 3, size=SIZE)
+    masks = person_masks(3, 4)
+    for v, camera in enumerate(session.camera_names):
+        (tmp_path / "m" / camera).mkdir(parents=True)
+        for k in range(3):
+            image_of(masks[k, v] * 255).save(tmp_path / "m" / camera / f"{k:06d}_0.png")
+    plan = plan_import(session, ImportRequest("sam", (tmp_path / "m",), ("ann",)))
+    assert (plan.problems, plan.notes) == ((), ())
+
+
+def test_names_with_a_rate(session, tmp_path):
+    write_openpose(tmp_path / "k", session.camera_names, seen(session, [TRUTH]))
+    for path in (tmp_path / "k").rglob("*.json"):
+        path.rename(path.with_name(path.name.replace("keypoints", "30fps")))
+    found = imported(session, tmp_path / "k")
+    assert np.abs(in_space(session, found) - TRUTH).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("a_1.json", '{"annots": 3}', "EasyMocap file .*'annots'"),
+        ("a.json", '{"instance_info": [{"frame_id": 1, "instances": 2}]}', "mmpose file .*instances"),
+        (
+            "a.json",
+            '[{"frame_id": 1, "instances": []}, {"frame_id": 1, "instances": []}]',
+            "mmpose file .*each frame_id once",
+        ),
+        ("a_1.json", '[{"keypoints": [[1, 2]], "keypoint_scores": []}]', "mmpose file .*a score for each of 1 points"),
+        ("a.json", '[{"image_id": "1.jpg", "keypoints": ["x"]}]', "AlphaPose file .*keypoints"),
+        ("a.json", '[{"image_id": "x.jpg", "keypoints": [1, 2, 1]}]', "AlphaPose file .*the number of the picture"),
+        ("a.json", '[{"data": {}, "annotations": [{"result": 1}]}]', "Label Studio file .*result"),
+        ("a.json", '[{"data": {}, "annotations": []}]', "Label Studio file .*points with names.*found none"),
+        ("a.xml", "<annotations><track><points frame='x'/></track></annotations>", "CVAT file .*whole number"),
+        ("a.xml", "<annotations>", "CVAT file .*not valid XML"),
+        (
+            "a.xml",
+            "<annotations><track label='n'><points frame='1' points='1,2;3,4'/></track></annotations>",
+            "CVAT file .*x and y of a point",
+        ),
+        (
+            "a.xml",
+            "<annotations><track label='n'><points frame='1' points='1,2'/><points frame='1' points='1,2'/></track>"
+            "</annotations>",
+            "CVAT file .*'n' twice in a picture",
+        ),
+        ("a_1.txt", "0 .5 .5 .1 .1 .2 .3 1 .2 .3 x .4 .4 1\n", "YOLO file .*line 1: expected numbers"),
+        ("a.csv", "track,frame_idx,instance.score,n.x,n.y\n", "SLEAP file .*NAME.x, NAME.y, NAME.score"),
+        ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\nt,0,1,1,2\n", "SLEAP file .*line 2: expected 6 col"),
+        ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\nt,0.5,1,1,2,1\n", "SLEAP file .*frame_idx"),
+        ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\n", "SLEAP file .*no rows"),
+    ],
+)
+def test_messages_name_the_program_that_wrote_the_file(tmp_path, name, text, expected):
+    (tmp_path / name).write_text(text)
+    found, files = find_files((tmp_path / name,))
+    with pytest.raises(FormatError, match=expected):
+        PICTURE_FORMATS[found].read(files, ("a", "b"))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("a.json", '{"version": 0.7, "bodies": []}', "is of AlphaPose's formats of OpenPose, which is not read; write"),
+        ("a.json", '{"shapes": [], "imagePath": "a.png"}', "is of LabelMe, which is not read; export COCO"),
+        ("a.mat", "MATLAB", "is of MATLAB, which is not read; write CSV"),
+        ("a.json", '{"a": 1, "b": 2}', "found JSON with the keys 'a, b'; export it in one of its formats"),
+        ("a.json", "{", "a.json is not valid JSON"),
+        ("a.json", "[[1, 2]]", r"found JSON with a list of 1, the first \[1, 2\]"),
+        ("notes.txt", "hello", "found one that begins with 'hello'"),
+    ],
+)
+def test_files_that_are_not_read_are_named(tmp_path, name, text, expected):
+    (tmp_path / name).write_text(text)
+    for path in (tmp_path, tmp_path / name):
+        with pytest.raises(FormatError, match=expected):
+            find_files((path,))
+
+
+def test_notes_beside_files_are_left_out(session, tmp_path):
+    write_sleap_csv(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]))
+    (tmp_path / "f" / "notes.txt").write_text("hello")
+    (tmp_path / "f" / "camera.xml").write_text("<opencv_storage/>")
+    assert find_files((tmp_path / "f",))[0] == "sleap csv"
+    (tmp_path / "f" / "settings.json").write_text("{}")
+    with pytest.raises(FormatError, match=r"settings\.json: expected key points"):
+        find_files((tmp_path / "f",))
+
+
+def test_the_documents_list_all_programs():
+    from architecture import ROOT
+
+    assert markdown_table() in (ROOT / "docs" / "observations.md").read_text()
+    assert all(row.instead for row in UNREAD)
