@@ -17,7 +17,7 @@ from tracker.observations.placing import place_pictures, rescaled
 from tracker.observations.plans import ImportPlan, MaskPlan, ViewPreview
 from tracker.observations.readers import MASK_FORMATS, PICTURE_FORMATS, find_files
 from tracker.observations.request import ImportRequest, refuse_choices
-from tracker.observations.sources import FileGroup, Found, match_cameras, no_camera, source_files
+from tracker.observations.sources import FileGroup, Found, match_cameras, no_camera, source_files, videos_of_footage
 from tracker.observations.space import read_space
 from tracker.observations.stored import new_folder, save_observations
 from tracker.observations.stored_masks import store_masks
@@ -69,6 +69,9 @@ def _plan_of_pictures(
     session: Session, request: ImportRequest, format_name: str, files: list[Found], calibrated: bool
 ) -> ImportPlan:
     groups = PICTURE_FORMATS[format_name].read(files, session.camera_names)
+    is_own = videos_of_footage([g for g, _ in groups], {c.camera.name: c.footage for c in session.cameras})
+    others = [str(g.video) for (g, _), own in zip(groups, is_own, strict=True) if not own]
+    groups = [pair for pair, own in zip(groups, is_own, strict=True) if own]
     names = match_cameras([(g.labels, g.place) for g, _ in groups], session.camera_names, request.cameras)
     unmatched = [g for (g, _), name in zip(groups, names, strict=True) if not name]
     problems = [no_camera(session.camera_names, g) for g in unmatched]
@@ -93,6 +96,8 @@ def _plan_of_pictures(
         problems.append(disagreement)
     notes += [f"{name}: {note}" for name, table in tables.items() for note in table.notes]
     notes += _notes(tables)
+    if others:
+        notes.append(f"points of videos of other footage were left out: {', '.join(others[:3])}")
     sources, by_path = source_files([(g, name) for (g, _), name in zip(groups, names, strict=True)])
     rows = np.unique(np.concatenate([f for f in frames.values()])).astype(np.float64)
     observations = ObservationSet(

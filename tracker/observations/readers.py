@@ -73,7 +73,7 @@ def _read_hdf5(files: Sequence[Found], cameras: Sequence[str]) -> Groups:
             of_video = (video.stem, video.parent.name)
             own = folder_labels(path, root)
             labels = (*own, *of_video) if len(found) == 1 else of_video
-            out.append((FileGroup((path,), labels, root), table))
+            out.append((FileGroup((path,), labels, root, video=video), table))
     return out
 
 

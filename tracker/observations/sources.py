@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import TypeAlias
 
@@ -28,6 +29,8 @@ class FileGroup:
     """Folder to which the paths of the stored files are relative."""
     pictures: tuple[PictureName, ...] = ()
     """For files with one picture each: the label and number of each, ascending by number. Several may have a number."""
+    video: Path | None = None
+    """Video that the points are of, as a file names it that may be of several; None for other files."""
 
     @property
     def numbers(self) -> list[int]:
@@ -106,6 +109,32 @@ def numbered_groups(files: Sequence[Found], cameras: Sequence[str]) -> list[File
     return out
 
 
+def videos_of_footage(groups: Sequence[FileGroup], footage: Mapping[str, Path]) -> list[bool]:
+    """Return whether each group is of the session, where a file holds the videos of several.
+
+    Of several videos of one camera it is the one whose path is most like that of the footage from its end on.
+
+    Args:
+        groups: files, perhaps with their videos.
+        footage: of each camera.
+    """
+    names = [_camera_of(group.labels, [*footage]) if group.video else "" for group in groups]
+    out = [True] * len(groups)
+    for camera, path in footage.items():
+        likeness = {i: _common_end(groups[i].video or path, path) for i, name in enumerate(names) if name == camera}
+        most = max(likeness.values(), default=0)
+        if list(likeness.values()).count(most) == 1:
+            for i, n in likeness.items():
+                out[i] = n == most
+    return out
+
+
+def _common_end(one: Path, other: Path) -> int:
+    """Return how many parts two paths have in common from their ends on; the suffix may differ."""
+    ends = [[path.stem, *(p.name for p in path.parents)] for path in (one, other)]
+    return len([*takewhile(lambda pair: pair[0].casefold() == pair[1].casefold(), zip(*ends, strict=False))])
+
+
 def match_cameras(
     labels: Sequence[tuple[tuple[str, ...], Path]], cameras: Sequence[str], chosen: Mapping[str, Path]
 ) -> list[str]:
@@ -130,6 +159,11 @@ def match_cameras(
     for name in dict.fromkeys(n for n in found if n):
         if found.count(name) > 1:
             both = [str(places[i]) for i, n in enumerate(found) if n == name]
+            if len(set(both)) < len(both):
+                raise FormatError(
+                    f"{both[0]}: expected the pictures of camera '{name}' once, found those of several videos of its "
+                    "name; export those of this session alone"
+                )
             raise FormatError(
                 f"expected one file or folder for camera '{name}', found {' and '.join(both[:2])}",
                 Remedy("name_observed_camera", camera=name),

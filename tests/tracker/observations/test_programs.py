@@ -227,3 +227,32 @@ def test_the_documents_list_all_programs():
 
     assert markdown_table() in (ROOT / "docs" / "observations.md").read_text()
     assert all(row.instead for row in UNREAD)
+
+
+@pytest.mark.slow
+def test_several_sessions_in_one_project_of_sleap(tmp_path):
+    """The videos of each session have the same names."""
+    sleap_io = pytest.importorskip("sleap_io")
+    (tmp_path / "day2").mkdir()
+    session = make_session(tmp_path / "day2" / "s", N)
+    skeleton = sleap_io.Skeleton(list(POINTS), name="person")
+    frames = []
+    for day, motion in (("day1", TRUTH + 1), ("day2", TRUTH)):
+        for v, camera in enumerate(session.camera_names):
+            video = sleap_io.Video(f"D:\\lab\\{day}\\{camera}.mp4", open_backend=False)
+            for k, (person,) in enumerate(seen(session, [motion])[:, v]):
+                one = sleap_io.PredictedInstance.from_numpy(
+                    person[:, :2], skeleton=skeleton, point_scores=person[:, 2], score=0.9
+                )
+                frames.append(sleap_io.LabeledFrame(video, k, [one]))
+    (tmp_path / "p").mkdir()
+    sleap_io.save_file(sleap_io.Labels(frames), str(tmp_path / "p" / "labels.slp"))
+    plan = planned(session, tmp_path / "p")
+    assert not plan.problems, plan.problems
+    assert np.abs(in_space(session, plan.observations) - TRUTH).max() < 1e-4
+    assert (
+        sum("points of videos of other footage were left out: D:/lab/day1" in n for n in plan.observations.notes) == 1
+    )
+    elsewhere = make_session(tmp_path / "day3" / "s", N)
+    with pytest.raises(FormatError, match="expected the pictures of camera 'cam0' once, found those of several videos"):
+        planned(elsewhere, tmp_path / "p")

@@ -42,7 +42,7 @@ def read_hdf5(path: Path) -> Tables:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            _check_datasets(path, where)
+            check_datasets(path)
             if path.suffix.lower() == ".h5" and is_deeplabcut_hdf5(path):
                 return [(path, read_deeplabcut_hdf5(path))]
             if path.suffix.lower() == ".nwb":
@@ -55,7 +55,7 @@ def read_hdf5(path: Path) -> Tables:
         raise FormatError(f"{where} cannot be read: {words}; export it again") from error
 
 
-def _check_datasets(path: Path, where: str) -> None:
+def check_datasets(path: Path) -> None:
     """Check the sizes of all data that are read later, and that they lie in the file as they are.
 
     Raises:
@@ -64,34 +64,31 @@ def _check_datasets(path: Path, where: str) -> None:
     """
     import h5py
 
-    def check_link(name: str, link: Any) -> None:
-        if isinstance(link, h5py.ExternalLink) and not _PICTURES.fullmatch(name):
-            raise FormatError(
-                f"{where}: expected all data in one file, found {quoted(name)} in another; export it again"
-            )
-
-    def check_dataset(name: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset) or _PICTURES.fullmatch(name):
-            return
-        if path.suffix.lower() == ".nwb" and not is_of_points(item.parent):
-            return  # NWB has the recordings of other instruments too
-        n_numbers = -(-item.dtype.itemsize // np.dtype(float).itemsize)  # of eight bytes, in one entry
-        check_size((*(item.shape or ()), max(n_numbers, 1)), f"{where}, {quoted(name)}")
-        if item.is_virtual or item.external:
-            raise FormatError(
-                f"{where}: expected all data in one file, found {quoted(name)} in another; export it again"
-            )
-        properties = item.id.get_create_plist()
-        filters = {properties.get_filter(i)[0] for i in range(properties.get_nfilters())}
-        if any(code >= h5py.h5z.FILTER_RESERVED for code in filters - {h5py.h5z.FILTER_LZF}):
-            raise FormatError(f"{where}: expected data packed by gzip or LZF, found {quoted(name)} in another way")
-
+    where = f"file {path}"
+    links, items = list[tuple[str, Any]](), list[tuple[str, Any]]()
     with h5py.File(path, "r") as file:
-        file.visititems_links(check_link)
-        file.visititems(check_dataset)
+        file.visititems_links(lambda name, link: links.append((name, link)))
+        file.visititems(lambda name, item: items.append((name, item)))
+        elsewhere = [name for name, link in links if isinstance(link, h5py.ExternalLink)]
+        for name, item in items:
+            if not isinstance(item, h5py.Dataset) or _PICTURES.fullmatch(name):
+                continue
+            if path.suffix.lower() == ".nwb" and not is_of_points(item.parent):
+                continue  # NWB has the recordings of other instruments too
+            n_numbers = -(-item.dtype.itemsize // np.dtype(float).itemsize)  # of eight bytes, in one entry
+            check_size((*(item.shape or ()), max(n_numbers, 1)), f"{where}, {quoted(name)}")
+            properties = item.id.get_create_plist()
+            filters = {properties.get_filter(i)[0] for i in range(properties.get_nfilters())}
+            if max(filters - {h5py.h5z.FILTER_LZF}, default=0) >= h5py.h5z.FILTER_RESERVED:
+                raise FormatError(f"{where}: expected data packed by gzip or LZF, found {quoted(name)} in another way")
+            elsewhere += [name] * bool(item.is_virtual or item.external)
+    if elsewhere := [name for name in elsewhere if not _PICTURES.fullmatch(name)]:
+        raise FormatError(
+            f"{where}: expected all data in one file, found {quoted(elsewhere[0])} in another; export it again"
+        )
 
 
-def _limit_memory() -> None:
+def limit_memory() -> None:
     """Limit the memory of this process, where the system can."""
     with suppress(ImportError, ValueError, OSError):
         import resource
@@ -180,5 +177,5 @@ def main(path: Path, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    _limit_memory()
+    limit_memory()
     main(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -35,7 +35,7 @@ def read_sleap(path: Path) -> list[tuple[Path, PictureTable]]:
 def _video_path(video: Any, path: Path) -> Path:
     name = video.filename
     name = name[0] if isinstance(name, list) and name else name
-    return Path(str(name)) if name else path
+    return Path(str(name).replace("\\", "/")) if name else path
 
 
 def _table(labels: Any, video: Any, where: str) -> PictureTable:
