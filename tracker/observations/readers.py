@@ -133,6 +133,9 @@ def _coco_masks(found: SegmentedPictures, group: FileGroup) -> MaskFiles:
     )
 
 
+_END = "the end of the name"
+
+
 def _has(*keys: str) -> Callable[[Sample], bool]:
     """Return whether a JSON file is a group of keys with some of them all."""
     return _is_json(lambda data: isinstance(data, dict) and data.keys() >= {*keys})
@@ -153,98 +156,61 @@ def _is_json(recognizes: Callable[[Any], bool]) -> Callable[[Sample], bool]:
 def _in_space(name: str, read: Callable[[Path, float | None, float], MarkerTable]) -> ObservationLayout[MarkerTable]:
     """Return the row of a format that is known by the end of its files' names alone."""
     suffix = f".{name.lower()}"
-    return ObservationLayout(name, f"a `{suffix}` for each person", "the end of the name", _ends(suffix), read)
+    return ObservationLayout(name, f"a `{suffix}` for each person", _END, _ends(suffix), read)
 
 
-_FOR_EACH_CAMERA, _FOR_EACH_PICTURE = "for each camera", "for each picture, as `CAMERA/CAMERA_000012`"
-_OF_CAMERAS = "one `.json` for all cameras, or one for each"
+_CAMERA, _PICTURE = "for each camera", "for each picture, as `CAMERA/CAMERA_000012`"
+_ALL = "one `.json` for all cameras, or one for each"
 
 PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
     "openpose": ObservationLayout(
-        "OpenPose, Pose2Sim",
-        f"a `.json` {_FOR_EACH_PICTURE}",
-        "`people`",
-        _has("people"),
-        _by_picture(read_openpose),
+        "OpenPose, Pose2Sim", f"a `.json` {_PICTURE}", "`people`", _has("people"), _by_picture(read_openpose)
     ),
     "easymocap": ObservationLayout(
-        "EasyMocap",
-        f"a `.json` {_FOR_EACH_PICTURE}",
-        "`annots`",
-        _has("annots"),
-        _by_picture(detections.read_easymocap),
+        "EasyMocap", f"a `.json` {_PICTURE}", "`annots`", _has("annots"), _by_picture(detections.read_easymocap)
     ),
     "mmpose": ObservationLayout(
-        "mmpose, of videos",
-        f"a `.json` {_FOR_EACH_CAMERA}",
-        "`frame_id` and `instances`, perhaps in `instance_info`",
-        _is_json(detections.is_mmpose_video),
-        _by_file(detections.read_mmpose_video),
+        "mmpose, of videos", f"a `.json` {_CAMERA}", "`frame_id` and `instances`, perhaps in `instance_info`",
+        _is_json(detections.is_mmpose_video), _by_file(detections.read_mmpose_video),
     ),
     "mmpose pictures": ObservationLayout(
-        "mmpose, of pictures",
-        f"a `.json` {_FOR_EACH_PICTURE}",
-        "a list of `keypoints` and `keypoint_scores`",
-        _is_json(detections.is_mmpose_picture),
-        _by_picture(detections.read_mmpose_picture),
+        "mmpose, of pictures", f"a `.json` {_PICTURE}", "a list of `keypoints` and `keypoint_scores`",
+        _is_json(detections.is_mmpose_picture), _by_picture(detections.read_mmpose_picture),
     ),
     "alphapose": ObservationLayout(
-        "AlphaPose",
-        f"a `.json` {_FOR_EACH_CAMERA}",
-        "a list of `image_id` in words",
-        _is_json(is_alphapose),
-        _by_cameras(lambda path: read_coco(path, "AlphaPose")),
+        "AlphaPose", f"a `.json` {_CAMERA}", "a list of `image_id` in words",
+        _is_json(is_alphapose), _by_cameras(lambda path: read_coco(path, "AlphaPose")),
     ),
     "label studio": ObservationLayout(
-        "Label Studio",
-        _OF_CAMERAS,
-        "a list of `data` and `annotations`",
-        _is_json(hand_labels.is_label_studio),
-        _by_cameras(hand_labels.read_label_studio),
+        "Label Studio", _ALL, "a list of `data` and `annotations`",
+        _is_json(hand_labels.is_label_studio), _by_cameras(hand_labels.read_label_studio),
     ),
     "coco": ObservationLayout(
-        "COCO, as of Roboflow",
-        _OF_CAMERAS,
-        "`images` and `annotations`, or a list of results",
+        "COCO, as of Roboflow", _ALL, "`images` and `annotations`, or a list of results",
         _is_json(lambda data: is_coco(data) and (holds(data, "keypoints") or not holds(data, "segmentation"))),
         _by_cameras(read_coco),
     ),
     "deeplabcut": ObservationLayout(
-        "DeepLabCut, Lightning Pose, EKS",
-        f"a `.csv` {_FOR_EACH_CAMERA}, of one animal or several, or of labels",
-        "the row `scorer`, without `z`",
-        _is_text(".csv", is_deeplabcut),
-        _by_file(read_deeplabcut_csv),
+        "DeepLabCut, Lightning Pose, EKS", f"a `.csv` {_CAMERA}, of one animal or several, or of labels",
+        "the row `scorer`, without `z`", _is_text(".csv", is_deeplabcut), _by_file(read_deeplabcut_csv),
     ),
     "sleap csv": ObservationLayout(
-        "SLEAP's analysis in CSV",
-        f"a `.csv` {_FOR_EACH_CAMERA}",
-        "columns `track` and `frame_idx`",
-        _is_text(".csv", detections.is_sleap_csv),
-        _by_file(detections.read_sleap_csv),
+        "SLEAP's analysis in CSV", f"a `.csv` {_CAMERA}", "columns `track` and `frame_idx`",
+        _is_text(".csv", detections.is_sleap_csv), _by_file(detections.read_sleap_csv),
     ),
     "hdf5": ObservationLayout(
-        "SLEAP, NWB, DeepLabCut in HDF5",
-        f"a `.slp`, `.nwb` or `.h5` {_FOR_EACH_CAMERA}",
-        "the end of the name, and the groups within",
-        _ends(".slp", ".nwb", ".h5"),
-        _read_hdf5,
+        "SLEAP, NWB, DeepLabCut in HDF5", f"a `.slp`, `.nwb` or `.h5` {_CAMERA}", f"{_END}, and the groups within",
+        _ends(".slp", ".nwb", ".h5"), _read_hdf5,
     ),
     "cvat": ObservationLayout(
-        "CVAT",
-        f"a `.xml` {_FOR_EACH_CAMERA}, for images or for videos",
-        "`<annotations>`",
-        _is_text(".xml", hand_labels.is_cvat),
-        _by_cameras(hand_labels.read_cvat),
+        "CVAT", f"a `.xml` {_CAMERA}, for images or for videos", "`<annotations>`",
+        _is_text(".xml", hand_labels.is_cvat), _by_cameras(hand_labels.read_cvat),
     ),
     "yolo": ObservationLayout(
-        "YOLO pose",
-        f"a `.txt` {_FOR_EACH_PICTURE}",
-        "a class, a box and points in each line, in shares of the picture",
-        _is_text(".txt", detections.is_yolo),
-        _read_yolo,
+        "YOLO pose", f"a `.txt` {_PICTURE}", "a class, a box and points in each line, in shares of the picture",
+        _is_text(".txt", detections.is_yolo), _read_yolo,
     ),
-}
+}  # fmt: skip
 """Key points in pictures, by the name that is stored, in the order in which they are tried."""
 SPACE_FORMATS: Mapping[str, ObservationLayout[MarkerTable]] = {
     "trc": _in_space("TRC", lambda path, unit_m, rate: read_trc(path)),
@@ -256,58 +222,36 @@ SPACE_FORMATS: Mapping[str, ObservationLayout[MarkerTable]] = {
 have the given rate, 1/s."""
 MASK_FORMATS: Mapping[str, ObservationLayout[list[MaskFiles]]] = {
     "masks": ObservationLayout(
-        "masks",
-        "a `.png` for each picture, or for each object in it, in a folder for each camera: `cam1/000012.png`",
-        "the end of the name",
-        _ends(".png"),
-        _read_png,
+        "masks", "a `.png` for each picture, or for each object in it, in a folder for each camera: `cam1/000012.png`",
+        _END, _ends(".png"), _read_png,
     ),
     "coco masks": ObservationLayout(
-        "COCO segmentation",
-        _OF_CAMERAS,
-        "`segmentation` in `annotations`: polygons and run lengths",
-        _is_json(lambda data: is_coco(data) and holds(data, "segmentation")),
-        _read_coco_masks,
+        "COCO segmentation", _ALL, "`segmentation` in `annotations`: polygons and run lengths",
+        _is_json(lambda data: is_coco(data) and holds(data, "segmentation")), _read_coco_masks,
     ),
-}
+}  # fmt: skip
 FORMATS: Mapping[str, ObservationLayout[Any]] = {**PICTURE_FORMATS, **SPACE_FORMATS, **MASK_FORMATS}
 """The layouts that are read, by the name that is stored."""
+_OF_UNREAD = (".mat", ".pkl", ".pickle", ".pt", ".pth", ".xlsx", ".xls")
 UNREAD: Sequence[ObservationLayout[Any]] = [
-    ObservationLayout(program, files, recognized_by, recognizes, instead=instead)
-    for program, files, recognized_by, recognizes, instead in (
-        (
-            "AlphaPose's formats of OpenPose",
-            "`.json`",
-            "`bodies`",
-            _has("bodies"),
-            "write its results without --format",
-        ),
-        ("LabelMe", "`.json`", "`shapes` and `imagePath`", _has("shapes", "imagePath"), "export COCO"),
-        ("VGG Image Annotator", "`.json`", "`_via_img_metadata`", _has("_via_img_metadata"), "export COCO"),
-        ("Datumaro", "`.json`", "`items` and `categories`", _has("items", "categories"), "export COCO or CVAT's XML"),
-        ("MATLAB", "`.mat`", "the end of the name", _ends(".mat"), "write CSV"),
-        (
-            "Python's pickles",
-            "`.pkl`, `.pickle`",
-            "the end of the name",
-            _ends(".pkl", ".pickle"),
-            "export CSV or JSON",
-        ),
-        ("PyTorch", "`.pt`, `.pth`", "the end of the name", _ends(".pt", ".pth"), "export CSV"),
-        ("Excel", "`.xlsx`, `.xls`", "the end of the name", _ends(".xlsx", ".xls"), "save it as CSV"),
-        (
-            "videos",
-            "`.mp4`, `.avi`, `.mov`, `.mkv`",
-            "the end of the name",
-            _ends(".mp4", ".avi", ".mov", ".mkv"),
-            "run a detector on it, and import the key points",
-        ),
+    ObservationLayout(program, files or "`.json`", keys or _END, recognizes, instead=instead)
+    for program, files, keys, recognizes, instead in (
+        ("Panoptic Studio's hdPose3d", "", "`univTime` and `bodies`", _has("univTime", "bodies"), "convert it to CSV"),
+        ("EasyMocap in 3-D", "", "a list of `keypoints3d`", _is_json(detections.is_easymocap_3d), "convert it to CSV"),
+        ("AlphaPose's formats of OpenPose", "", "`bodies`", _has("bodies"), "write its results without --format"),
+        ("LabelMe", "", "`shapes` and `imagePath`", _has("shapes", "imagePath"), "export COCO"),
+        ("VGG Image Annotator", "", "`_via_img_metadata`", _has("_via_img_metadata"), "export COCO"),
+        ("Datumaro", "", "`items` and `categories`", _has("items", "categories"), "export COCO or CVAT's XML"),
+        ("MATLAB", "`.mat`", "", _ends(".mat"), "write CSV"),
+        ("Python's pickles", "`.pkl`, `.pickle`", "", _ends(".pkl", ".pickle"), "export CSV or JSON"),
+        ("PyTorch", "`.pt`, `.pth`", "", _ends(".pt", ".pth"), "export CSV or JSON"),
+        ("Excel", "`.xlsx`, `.xls`", "", _ends(".xlsx", ".xls"), "save it as CSV"),
+        ("a video", "`.mp4`, `.avi`, `.mov`", "", _ends(".mp4", ".avi", ".mov"), "import the key points of a detector"),
     )
 ]
 """Layouts that are known and not read."""
 _OFTEN_OTHER = (".txt", ".xml")
 """Ends of names that files of notes and of cameras have too: one that is of no known program is left out."""
-_OF_UNREAD = (".mat", ".pkl", ".pickle", ".pt", ".pth", ".xlsx", ".xls")
 SUFFIXES = (".json", ".csv", ".slp", ".nwb", ".h5", ".trc", ".c3d", ".bvh", ".png", *_OFTEN_OTHER)
 
 
@@ -362,14 +306,7 @@ def _alike(files: Sequence[Found]) -> list[list[Found]]:
     found: dict[tuple[Path, str], list[Found]] = {}
     for path, root in files:
         found.setdefault((path.parent, re.sub(r"[0-9]+", "0", path.name)), []).append((path, root))
-    return [sorted(some, key=lambda one: not _has_content(one[0])) for some in found.values()]
-
-
-def _has_content(path: Path) -> bool:
-    try:
-        return path.stat().st_size > 0
-    except OSError:
-        return False
+    return [sorted(some, key=lambda one: one[0].is_file() and not one[0].stat().st_size) for some in found.values()]
 
 
 def _format_of(files: Sequence[Found], masks: bool) -> str:
@@ -391,19 +328,15 @@ def _unread(sample: Sample) -> FormatError:
     found = f"one that begins with {quoted(sample.head[0])}" if sample.head else "another kind of file"
     if sample.suffix == ".json":
         try:
-            found = f"JSON with {_described(read_json(sample.path, _JSON))}"
+            data = read_json(sample.path, _JSON)
         except FormatError as error:
             return error
+        is_group = isinstance(data, dict)
+        found = f"JSON with the keys {quoted(', '.join(map(str, data)))}" if is_group else f"JSON with {quoted(data)}"
     return FormatError(
         f"file {sample.path}: expected key points, joints or masks of a program that docs/observations.md lists, found "
         f"{found}; export it in one of its formats"
     )
-
-
-def _described(data: Any) -> str:
-    if isinstance(data, list):
-        return f"a list of {len(data)}, the first {quoted(data[0])}" if data else "an empty list"
-    return f"the keys {quoted(', '.join(map(str, data)))}" if isinstance(data, dict) else quoted(data)
 
 
 def markdown_table() -> str:

@@ -13,9 +13,9 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.keypoints.picture_numbers import picture_names
-from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people
+from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
 from tracker.formats.number_rows import MAX_NAMES, check_size
-from tracker.text_files import TABLE_BYTES, TextKind, read_json
+from tracker.text_files import read_json
 from tracker.validation import MAX_FRAMES, MAX_SIDE_PX, Name, Number, check
 
 _FrameNumber = Annotated[int, msgspec.Meta(ge=0, le=MAX_FRAMES, description=f"a whole number of at most {MAX_FRAMES}")]
@@ -118,7 +118,7 @@ def read_pictures(path: Path, program: str = "COCO") -> PictureDataset:
         FormatError: the file is malformed.
     """
     where = f"{program} file {path}"
-    data = read_json(path, TextKind(f"{program} file", TABLE_BYTES, FormatError, "export it again"))
+    data = read_json(path, text_of(program))
     if isinstance(data, list):
         annotations = check(data, list[_Annotation], where, FormatError)
         ids = dict.fromkeys(a.image_id for a in annotations)

@@ -18,13 +18,13 @@ import numpy as np
 from tracker.errors import FormatError, Remedy
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
 from tracker.formats.keypoints.picture_numbers import picture_names
-from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
+from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks, text_of
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
 from tracker.geometry.arrays import Array, IntArray
-from tracker.text_files import TABLE_BYTES, TextKind, read_lines
+from tracker.text_files import read_lines
 from tracker.validation import MAX_NUMBER, quoted
 
-_KIND = TextKind("DeepLabCut file", TABLE_BYTES, FormatError, "export it again")
+_KIND = text_of("DeepLabCut")
 _HEAD = ("scorer", "individuals", "bodyparts", "coords")
 _COORDINATES = ("x", "y", "likelihood")
 _NUMBER = re.compile(r"([0-9]+)(?:\.0*)?")

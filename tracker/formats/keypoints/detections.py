@@ -13,9 +13,9 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.keypoints.openpose import MAX_PEOPLE
-from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, triples
+from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of, triples
 from tracker.formats.number_rows import MAX_NAMES, not_a_number
-from tracker.text_files import TABLE_BYTES, TextKind, read_json, read_lines
+from tracker.text_files import read_json, read_lines
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, Name, Number, check
 
 _Place = tuple[Number, Number]
@@ -104,6 +104,11 @@ def is_mmpose_picture(data: Any) -> bool:
     return isinstance(data, list) and _first_has(data, "keypoints", "keypoint_scores")
 
 
+def is_easymocap_3d(data: Any) -> bool:
+    """Return whether plain data of a JSON file are joints in space of EasyMocap."""
+    return isinstance(data, list) and _first_has(data, "keypoints3d")
+
+
 def read_yolo(path: Path) -> list[PicturePerson]:
     """Read the people in a picture, a line each, in shares of its width and height; a last score or track is left out.
 
@@ -111,7 +116,7 @@ def read_yolo(path: Path) -> list[PicturePerson]:
         FormatError: the file is malformed.
     """
     found = []
-    for number, line in enumerate(read_lines(path, _kind("YOLO")), 1):
+    for number, line in enumerate(read_lines(path, text_of("YOLO")), 1):
         if line.strip():
             values = _numbers(line.split(), f"YOLO file {path}, line {number}")[len(_BOX) :]
             n_points = len(values) // 3
@@ -142,7 +147,7 @@ def read_sleap_csv(path: Path) -> PictureTable:
         FormatError: the file is malformed.
     """
     where = f"SLEAP file {path}"
-    lines = read_lines(path, _kind("SLEAP"))
+    lines = read_lines(path, text_of("SLEAP"))
     head = next(csv.reader([next(lines, "")]), [])
     names = tuple(cell.removesuffix(".x") for cell in head if cell.endswith(".x"))
     columns = [f"{name}{part}" for name in names for part in (".x", ".y", ".score")]
@@ -203,9 +208,5 @@ def _numbers(cells: Sequence[str], where: str) -> list[float]:
     return out
 
 
-def _kind(program: str) -> TextKind:
-    return TextKind(f"{program} file", TABLE_BYTES, FormatError, "export it again")
-
-
 def _json(path: Path, program: str) -> Any:
-    return read_json(path, _kind(program))
+    return read_json(path, text_of(program))

@@ -11,10 +11,10 @@ import numpy as np
 from tracker.errors import FormatError
 from tracker.formats.keypoints.coco_reading import CocoPicture, images_by_camera
 from tracker.formats.keypoints.openpose import MAX_PEOPLE
-from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people
+from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
 from tracker.formats.number_rows import MAX_NAMES, check_size
 from tracker.formats.plain_data import parse_xml
-from tracker.text_files import TABLE_BYTES, TextKind, read_json, read_text
+from tracker.text_files import read_json, read_text
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, MAX_SIDE_PX, Name, check, quoted
 
 Tables = list[tuple[tuple[str, ...], PictureTable]]
@@ -59,7 +59,7 @@ def read_label_studio(path: Path) -> Tables:
         FormatError: the file is malformed, or has no points.
     """
     where = f"Label Studio file {path}"
-    tasks = check(read_json(path, _kind("Label Studio")), list[_Task], where, FormatError)
+    tasks = check(read_json(path, text_of("Label Studio")), list[_Task], where, FormatError)
     images, people = [], _People()
     for i, task in enumerate(tasks):
         name = next((v for v in task.data.values() if isinstance(v, str) and "." in v), "")
@@ -86,7 +86,7 @@ def read_cvat(path: Path) -> Tables:
     Raises:
         FormatError: the file is malformed, or has no points.
     """
-    where, kind = f"CVAT file {path}", _kind("CVAT")
+    where, kind = f"CVAT file {path}", text_of("CVAT")
     root = parse_xml(read_text(path, kind), str(path), kind)
     width, height = (_whole(root.findtext(f".//original_size/{side}") or "0", where) for side in ("width", "height"))
     images, people = list[CocoPicture](), _People()
@@ -176,7 +176,3 @@ def _id(image: CocoPicture) -> int:
 def _person(points: _Points, names: Sequence[str]) -> PicturePerson:
     values = np.array([points.get(name, (np.nan, np.nan)) for name in names])
     return PicturePerson(np.column_stack([values, np.where(np.isnan(values[:, 0]), 0.0, np.nan)]))
-
-
-def _kind(program: str) -> TextKind:
-    return TextKind(f"{program} file", TABLE_BYTES, FormatError, "export it again")

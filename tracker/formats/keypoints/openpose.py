@@ -14,12 +14,12 @@ import numpy as np
 from tracker.errors import FormatError
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, number_like
 from tracker.formats.json_numbers import Span, json_spans, replace_spans
-from tracker.formats.keypoints.picture_table import PicturePerson
+from tracker.formats.keypoints.picture_table import PicturePerson, text_of
 from tracker.geometry.arrays import Array, IntArray
-from tracker.text_files import TABLE_BYTES, TextKind, read_json
+from tracker.text_files import read_json
 from tracker.validation import Number, check
 
-_KIND = TextKind("OpenPose file", TABLE_BYTES, FormatError, "export it again")
+_KIND = text_of("OpenPose")
 MAX_PEOPLE = 100
 """Largest number of people in a picture: OpenPose finds 127 at most; arrays have room for the most of any."""
 

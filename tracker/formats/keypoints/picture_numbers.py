@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from tracker.validation import MAX_FRAMES
 
-_OTHER = re.compile(r"(?:cam(?:era)?|view|obj(?:ect)?|person|id|track)[\W_]*\Z", re.IGNORECASE)
+_OTHER = re.compile(r"(?<![A-Za-z])(?:cam(?:era)?|view|obj(?:ect)?|person|id|track)[\W_]*\Z", re.IGNORECASE)
 """Words before a number of something else than a picture."""
 _RATE = re.compile(r"[\W_]*(?:fps|hz)", re.IGNORECASE)
 """Words after a rate."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tracker.errors import FormatError
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.text_files import TABLE_BYTES, TextKind
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +68,15 @@ def stack_pictures(people: list[list[Array]], n_points: int, where: str) -> Arra
 def stack_tracks(names: Sequence[Sequence[str]]) -> NDArray[np.str_] | None:
     """Stack the names of the people of pictures, as `stack_pictures` stacks their points; None without any name."""
     most = max([1, *map(len, names)])
+    longest = max((len(name) for row in names for name in row), default=0)
+    check_size((len(names), most, longest), "the names of people")
     rows = [[*row, *[""] * (most - len(row))] for row in names]
     return np.array(rows, dtype=np.str_) if any(map(any, rows)) else None
+
+
+def text_of(program: str) -> TextKind:
+    """Return the kind of the text files of a program."""
+    return TextKind(f"{program} file", TABLE_BYTES, FormatError, "export it again")
 
 
 class PicturePerson(NamedTuple):
@@ -120,7 +128,8 @@ def table_of_files(
     people: dict[int, list[PicturePerson]] = {}
     for path, number in files:
         people.setdefault(number, []).extend(people_of(path))
-    return table_of_people(people, where, **more)
+    notes = ("several files of one picture were taken as several people",) if len(people) < len(files) else ()
+    return table_of_people(people, where, notes=notes, **more)
 
 
 def triples(points: Sequence[Sequence[float]], confidence: Sequence[float] | None = None) -> Array:
