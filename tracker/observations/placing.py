@@ -54,6 +54,9 @@ def place_pictures(
     if first_frame is not None:
         frames = {name: table.numbers - lowest + first_frame for name, table in tables.items()}
         notes.append(f"picture {lowest} of the files was placed at frame {first_frame}, as chosen")
+        labels = {name: table for name, table in tables.items() if table.is_by_hand}
+        if labels and lowest != first_frame and not _wrong_lengths(labels, session, 0):
+            notes[-1] += ", though the numbers of the labels are those of the footage"
     else:
         base = _base(tables, session, lowest)
         if base:

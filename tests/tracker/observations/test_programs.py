@@ -1,5 +1,8 @@
 """Key points of detectors and of programs for labels: each is known by content, and read as it was written."""
 
+import json
+import tracemalloc
+
 import numpy as np
 import pytest
 from mask_files import SIZE, image_of, person_masks
@@ -15,6 +18,7 @@ from program_files import (
 )
 
 from tracker.errors import FormatError
+from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints
 from tracker.observations.readers import PICTURE_FORMATS, UNREAD, find_files, markdown_table
@@ -69,6 +73,9 @@ def test_labels_of_a_person_lie_at_their_pictures(session, tmp_path, n_cells):
     write_hand_labels(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]), n_cells)
     found = imported(session, tmp_path / "f")
     assert np.flatnonzero(found.points.is_known.any(axis=(1, 2, 3))).tolist() == [1, 4, 7]
+    assert "labels were placed by the numbers of their pictures" in found.notes[0]
+    moved = planned(session, tmp_path / "f", first_frame=0)
+    assert "placed at frame 0, as chosen, though the numbers of the labels are those of" in moved.observations.notes[0]
     wrong = tmp_path / "f" / "labeled-data" / "cam0" / "CollectedData_ann.csv"
     wrong.write_text(wrong.read_text().replace("img007", "img009"))
     (problem,) = planned(session, tmp_path / "f").problems
@@ -127,7 +134,7 @@ def test_masks_of_two_objects_are_two_values(tmp_path):
     plan = plan_import(session, ImportRequest("sam", (tmp_path / "m",), ("ann", "bob"), values={"ann": 1, "bob": 2}))
     assert not plan.problems
     assert plan.format == "masks"
-    assert any("mask__obj1 = 1, mask__obj2 = 2" in note for note in plan.notes)
+    assert any("mask_obj1 = 1, mask_obj2 = 2" in note for note in plan.notes)
     assert np.array_equal(plan.mask("cam1", 2, SIZE), masks[2, 1])
     assert set(np.unique(plan.mask("cam1", 0, SIZE)).tolist()) == {0, 2}
 
@@ -221,6 +228,31 @@ def test_notes_beside_files_are_left_out(session, tmp_path):
     (tmp_path / "f" / "settings.json").write_text("{}")
     with pytest.raises(FormatError, match=r"settings\.json: expected key points"):
         find_files((tmp_path / "f",))
+
+
+def coco_of(n_names, n_annotations, **more):
+    names = [f"n{i}" for i in range(n_names)]
+    images = [{"id": k, "file_name": f"{k}.jpg"} for k in range(n_annotations)]
+    annotations = [{"image_id": k, "keypoints": [1, 2, 0.5]} for k in range(n_annotations)]
+    annotations[0] |= more
+    return {"images": images, "annotations": annotations, "categories": [{"id": 1, "keypoints": names}]}
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (coco_of(1_000, 1_000), "expected 3000 numbers for 1000 key points, found 3"),
+        (coco_of(1, 300, track_id="x" * 200_000), "names of people: expected at most 40000000 values"),
+    ],
+)
+def test_small_files_take_little_memory(tmp_path, data, expected):
+    (tmp_path / "c.json").write_text(json.dumps(data))
+    tracemalloc.start()
+    with pytest.raises(FormatError, match=expected):
+        read_coco(tmp_path / "c.json")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 15_000_000
 
 
 def test_the_documents_list_all_programs():

@@ -43,8 +43,9 @@ def picture_names(stems: Sequence[str]) -> list[PictureName | None]:
         if column is None:
             continue
         for i in some:
-            label = "".join(rows[i][:column] + rows[i][column + 1 :])
-            out[i] = PictureName(re.sub(r"\A[\W_]+|[\W_]+\Z", "", label), int(rows[i][column]))
+            before, after = ("".join(part) for part in (rows[i][:column], rows[i][column + 1 :]))
+            label = re.sub(r"[\W_]+\Z", "", before) + re.sub(r"[\W_]+\Z", "", after)
+            out[i] = PictureName(re.sub(r"\A[\W_]+", "", label), int(rows[i][column]))
     return out
 
 
