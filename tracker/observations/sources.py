@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from tracker.errors import FormatError, Remedy
-from tracker.formats.keypoints.picture_numbers import PictureName, picture_names
+from tracker.formats.keypoints.picture_names import PictureName, picture_names
 from tracker.observations.observed import SourceFile, checksum
 from tracker.session.matching import check_names
 from tracker.validation import same_form

@@ -14,6 +14,6 @@ __all__ = [
     "hand_labels",
     "hdf5",
     "openpose",
-    "picture_numbers",
+    "picture_names",
     "picture_table",
 ]

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.picture_numbers import picture_names
+from tracker.formats.keypoints.picture_names import picture_names
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
 from tracker.formats.number_rows import MAX_NAMES, check_size
 from tracker.text_files import read_json

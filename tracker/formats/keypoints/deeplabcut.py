@@ -17,7 +17,7 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
-from tracker.formats.keypoints.picture_numbers import picture_names
+from tracker.formats.keypoints.picture_names import picture_names
 from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks, text_of
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
 from tracker.geometry.arrays import Array, IntArray

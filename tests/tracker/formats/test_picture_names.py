@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.formats.keypoints.picture_numbers import picture_names
+from tracker.formats.keypoints.picture_names import picture_names
 
 N = range(12)
 
