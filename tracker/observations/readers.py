@@ -269,10 +269,10 @@ def find_files(paths: Sequence[Path], masks: bool = False) -> tuple[str, list[Fo
     for some in _alike(_listed(paths)):
         found.setdefault(_format_of(some, masks), []).extend(some)
     unread = found.pop("", [])
-    if "masks" in found and (len(found) > 1 or not all(map(_may_be_other, unread))):
-        found, unread = (
-            ({"masks": found["masks"]}, []) if masks else ({n: f for n, f in found.items() if n != "masks"}, unread)
-        )
+    if masks and "masks" in found:
+        found, unread = {"masks": found["masks"]}, []
+    elif len(found) > 1 or not all(map(_may_be_other, unread)):
+        found.pop("masks", None)
     if not found or not all(map(_may_be_other, unread)):
         raise _unread(Sample(min(unread, key=_may_be_other)[0]))
     if {*found} == {"deeplabcut", "hdf5"}:  # DeepLabCut writes each table twice
@@ -302,16 +302,16 @@ def _listed(paths: Sequence[Path]) -> list[Found]:
 
 
 def _alike(files: Sequence[Found]) -> list[list[Found]]:
-    """Return files of a folder whose names differ in digits alone, together, empty ones last."""
+    """Return files of a folder whose names differ in digits alone, together."""
     found: dict[tuple[Path, str], list[Found]] = {}
     for path, root in files:
         found.setdefault((path.parent, re.sub(r"[0-9]+", "0", path.name)), []).append((path, root))
-    return [sorted(some, key=lambda one: one[0].is_file() and not one[0].stat().st_size) for some in found.values()]
+    return list(found.values())
 
 
 def _format_of(files: Sequence[Found], masks: bool) -> str:
-    """Return the name of the format of files that are alike, by the first; empty if it is none that is read."""
-    sample = Sample(files[0][0])
+    """Return the name of the format of files that are alike, by the largest; empty if it is none that is read."""
+    sample = Sample(max((path for path, _ in files), key=lambda path: path.stat().st_size if path.is_file() else 0))
     tried = {**MASK_FORMATS, **FORMATS} if masks else FORMATS
     return next((name for name, layout in tried.items() if layout.recognizes(sample)), "")
 

@@ -150,6 +150,15 @@ def test_one_object_for_each_picture_needs_no_values(tmp_path):
     assert (plan.problems, plan.notes) == ((), ())
 
 
+@pytest.mark.parametrize("program", ["easymocap", "mmpose pictures", "yolo"])
+def test_nobody_in_the_first_picture(session, tmp_path, program):
+    WRITERS[program](tmp_path / "f", session.camera_names, list(POINTS), seen(session, [TRUTH]))
+    for path in (tmp_path / "f").rglob("*000000.*"):
+        path.write_text({"easymocap": '{"annots": []}', "mmpose pictures": "[]", "yolo": ""}[program])
+    found = imported(session, tmp_path / "f")
+    assert np.flatnonzero(found.points.is_known.any(axis=(1, 2, 3))).tolist() == list(range(1, N))
+
+
 def test_names_with_a_rate(session, tmp_path):
     write_openpose(tmp_path / "k", session.camera_names, seen(session, [TRUTH]))
     for path in (tmp_path / "k").rglob("*.json"):
