@@ -11,13 +11,21 @@ from tracker.errors import FormatError
 from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
+from tracker.formats.joint_tables.layouts import (
+    Scenes,
+    find_scenes,
+    find_table,
+    read_scenes,
+    read_tables,
+    refuse_unread,
+)
 from tracker.formats.keypoints.coco_reading import holds, is_coco, read_coco
 from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, check_mask_size, read_segmentations
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut, read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import read_hdf5_apart
 from tracker.formats.keypoints.openpose import numbered_name, read_openpose_pictures
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.formats.points_csv import read_points_csv
+from tracker.formats.observation_layout import Sample
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.observations.mask_files import MaskFiles
 from tracker.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
@@ -38,12 +46,16 @@ class PictureFormat:
 
 @dataclass(frozen=True)
 class SpaceFormat:
-    """A format of points in space, one file for each person."""
+    """A format of points in space."""
 
     title: str
-    read: Callable[[Path, float | None, float], MarkerTable]
-    """Reads a file. Lengths without a unit in the file have the given one, metres, or are refused; rows without times
-    have the given rate, 1/s."""
+    read: Callable[[Sequence[Path], float | None, float], Scenes]
+    """Reads files. Lengths without a unit in the file have the given one, metres, or are refused; rows without times
+    have the given rate, 1/s. Returns the points of each person with the file or folder that they are from."""
+
+
+def _each(read: Callable[[Path, float | None], MarkerTable]) -> Callable[[Sequence[Path], float | None, float], Scenes]:
+    return lambda paths, unit_m, rate: [(path, read(path, unit_m)) for path in paths]
 
 
 @dataclass(frozen=True)
@@ -124,10 +136,12 @@ PICTURE_FORMATS = {
     "hdf5": PictureFormat("SLEAP, NWB or HDF5", _read_hdf5),
 }
 SPACE_FORMATS = {
-    "trc": SpaceFormat("TRC", lambda path, unit_m, rate: read_trc(path)),
-    "c3d": SpaceFormat("C3D", lambda path, unit_m, rate: read_c3d(path, unit_m)),
-    "bvh": SpaceFormat("BVH", lambda path, unit_m, rate: read_bvh(path, unit_m)),
-    "csv": SpaceFormat("CSV", read_points_csv),
+    "trc": SpaceFormat("TRC", _each(lambda path, unit_m: read_trc(path))),
+    "c3d": SpaceFormat("C3D", _each(read_c3d)),
+    "bvh": SpaceFormat("BVH", _each(read_bvh)),
+    "csv": SpaceFormat("CSV", read_tables),
+    "arrays": SpaceFormat("NumPy", read_tables),
+    "scenes": SpaceFormat("JSON of people in space", read_scenes),
 }
 MASK_FORMATS = {
     "masks": MaskFormat("masks in PNG", _read_png),
@@ -135,7 +149,9 @@ MASK_FORMATS = {
 }
 FORMATS: Mapping[str, PictureFormat | SpaceFormat | MaskFormat] = {**PICTURE_FORMATS, **SPACE_FORMATS, **MASK_FORMATS}
 """The formats by name."""
-_BY_SUFFIX = {".slp": "hdf5", ".nwb": "hdf5", ".h5": "hdf5", ".trc": "trc", ".c3d": "c3d", ".bvh": "bvh"}
+_BY_SUFFIX = {".slp": "hdf5", ".nwb": "hdf5", ".h5": "hdf5", ".trc": "trc", ".c3d": "c3d", ".bvh": "bvh"} | {
+    ".tsv": "csv", ".npy": "arrays", ".npz": "arrays",
+}  # fmt: skip
 _MASK_SUFFIX = ".png"
 SUFFIXES = (".json", ".csv", *_BY_SUFFIX, _MASK_SUFFIX)
 
@@ -186,12 +202,15 @@ def _format_of(path: Path, masks: bool) -> str:
     if suffix in _BY_SUFFIX:
         return _BY_SUFFIX[suffix]
     if suffix == ".csv":
-        return "deeplabcut" if is_deeplabcut(path) else "csv"
+        return "csv" if find_table(Sample(path)) or not is_deeplabcut(path) else "deeplabcut"
     if suffix == ".json":
+        if find_scenes(Sample(path)):
+            return "scenes"
         data = _decoded(path)
         if numbered_name(path.name) is not None and not is_coco(data):
             return "openpose"
         return "coco masks" if masks or (holds(data, "segmentation") and not holds(data, "keypoints")) else "coco"
+    refuse_unread(Sample(path))
     raise FormatError(
         f"expected a file that ends in {', '.join(SUFFIXES)}, found {path}; export it in one of these formats"
     )

@@ -13,12 +13,12 @@ from tracker.exports.like.mended_points import MendedPoints
 from tracker.formats.bvh_patching import patch_bvh
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
+from tracker.formats.joint_tables.patching import patch_table
 from tracker.formats.keypoints.coco_patching import patch_coco
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
 from tracker.formats.keypoints.openpose import patch_openpose
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.formats.points_csv import patch_points_csv
 from tracker.formats.trc import patch_trc
 from tracker.geometry.arrays import Array
 from tracker.motion.velocity import velocity
@@ -142,10 +142,15 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
     is_known = np.array([bool(points) for points in observations.counterparts.values()])
     patch: Mapping[str, Callable[[Path, Mapping[int, Array]], bytes]] = {
         "trc": patch_trc,
-        "csv": lambda path, changes: patch_points_csv(path, unit_m, changes),
+        "csv": lambda path, changes: patch_table(path, unit_m, changes),
         "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
     }
     out, farthest_m = Files(), 0.0
+    if len(observations.sources) != len(mended) or observations.format not in {*patch, "bvh"}:
+        raise SessionError(
+            f"expected one file of each person in TRC, C3D, BVH or a table, the formats into which points are written "
+            f"back, found {len(observations.sources)} of another kind in {observations.name}; export the poses instead"
+        )
     if len(observations.row_frames) != len(mended):
         raise SessionError(
             f"expected the rows of each file of {observations.name}, found those of the first; import the files again"

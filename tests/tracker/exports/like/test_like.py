@@ -19,12 +19,12 @@ from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like.sending import export_like
 from tracker.formats.c3d import read_c3d
+from tracker.formats.joint_tables.layouts import read_tables
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.model_toml import format_model
-from tracker.formats.points_csv import read_points_csv
 from tracker.formats.trc import read_trc, write_trc
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.request import ImportRequest
@@ -142,9 +142,11 @@ SUFFIXES = {"dlc h5": ".h5", "sleap": ".slp", "nwb": ".nwb"}
 
 
 def read_space(path):
-    return {".trc": read_trc, ".csv": lambda p: read_points_csv(p, None, 30.0), ".c3d": lambda p: read_c3d(p, None)}[
-        path.suffix
-    ](path)
+    return {
+        ".trc": read_trc,
+        ".csv": lambda p: read_tables([p], None, 30.0)[0][1],
+        ".c3d": lambda p: read_c3d(p, None),
+    }[path.suffix](path)
 
 
 def contents(folder):
