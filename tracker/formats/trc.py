@@ -248,6 +248,12 @@ def _whole(text: str | None) -> int | None:
     return None
 
 
+def stated_rate(text: str) -> float | None:
+    """Return the frame rate that a header states; None if it states none."""
+    number = _number(text)
+    return number if isinstance(number, float) and 0 < number <= MAX_FRAMES else None
+
+
 def _number(text: str | None) -> float | str | None:
     """Return a header's number; its text if it is none."""
     try:

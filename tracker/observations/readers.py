@@ -11,14 +11,7 @@ from tracker.errors import FormatError
 from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
-from tracker.formats.joint_tables.layouts import (
-    Scenes,
-    find_scenes,
-    find_table,
-    read_scenes,
-    read_tables,
-    refuse_unread,
-)
+from tracker.formats.joint_tables.layouts import SCENES, Scenes, find_layout, read_joints, refuse_unread
 from tracker.formats.keypoints.coco_reading import holds, is_coco, read_coco
 from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, check_mask_size, read_segmentations
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut, read_deeplabcut_csv
@@ -139,9 +132,9 @@ SPACE_FORMATS = {
     "trc": SpaceFormat("TRC", _each(lambda path, unit_m: read_trc(path))),
     "c3d": SpaceFormat("C3D", _each(read_c3d)),
     "bvh": SpaceFormat("BVH", _each(read_bvh)),
-    "csv": SpaceFormat("CSV", read_tables),
-    "arrays": SpaceFormat("NumPy", read_tables),
-    "scenes": SpaceFormat("JSON of people in space", read_scenes),
+    "csv": SpaceFormat("CSV", read_joints),
+    "arrays": SpaceFormat("NumPy", read_joints),
+    "scenes": SpaceFormat("JSON of people in space", read_joints),
 }
 MASK_FORMATS = {
     "masks": MaskFormat("masks in PNG", _read_png),
@@ -202,9 +195,9 @@ def _format_of(path: Path, masks: bool) -> str:
     if suffix in _BY_SUFFIX:
         return _BY_SUFFIX[suffix]
     if suffix == ".csv":
-        return "csv" if find_table(Sample(path)) or not is_deeplabcut(path) else "deeplabcut"
+        return "csv" if find_layout(Sample(path)) or not is_deeplabcut(path) else "deeplabcut"
     if suffix == ".json":
-        if find_scenes(Sample(path)):
+        if find_layout(Sample(path)) in SCENES:
             return "scenes"
         data = _decoded(path)
         if numbered_name(path.name) is not None and not is_coco(data):

@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from tracker.errors import FormatError
 from tracker.formats.delimited import read_delimited
 from tracker.formats.exact_text import exact_text, replace_cells
 from tracker.formats.joint_tables.columns import named_columns
-from tracker.formats.joint_tables.layouts import WIDE, find_table
+from tracker.formats.joint_tables.layouts import WIDE, find_layout
 from tracker.formats.joint_tables.table_reading import read_table
 from tracker.formats.observation_layout import Sample
 from tracker.formats.trc import METRES_BY_WORD
@@ -25,7 +27,7 @@ def patch_table(path: Path, unit_m: float | None, changes: Mapping[int, Array]) 
     Raises:
         FormatError: it is of another layout, or has decimal commas.
     """
-    layout, table, exact = find_table(Sample(path)), read_delimited(path), exact_text(path.read_bytes())
+    layout, table, exact = find_layout(Sample(path)), read_delimited(path), exact_text(path.read_bytes())
     columns = named_columns(table) if layout is WIDE else None
     if columns is None or columns.person is not None or (table.separator != "," and "," in exact.text):
         raise FormatError(
@@ -38,7 +40,7 @@ def patch_table(path: Path, unit_m: float | None, changes: Mapping[int, Array]) 
     assert scale is not None
     at = [i for triple in columns.points.values() for i in triple]
     new = {
-        row: {i: float(x / scale) for i, x in zip(at, points.ravel(), strict=True) if x == x}
+        row: {i: float(x / scale) for i, x in zip(at, points.ravel(), strict=True) if not np.isnan(x)}
         for row, points in changes.items()
     }
     return exact.encoded(replace_cells(exact.text, table.separator, len(found.frames), new, 7 if scale > 0.1 else 4))

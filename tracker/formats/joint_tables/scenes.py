@@ -2,9 +2,9 @@
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, TypeAlias
 
 import msgspec
 import numpy as np
@@ -12,29 +12,24 @@ import numpy as np
 from tracker.errors import FormatError, Remedy
 from tracker.formats.number_rows import MAX_NAMES, check_size
 from tracker.formats.observation_layout import Sample
-from tracker.formats.trc import MarkerTable, mask_missing
+from tracker.formats.trc import METRES_BY_WORD, MarkerTable, mask_missing
 from tracker.geometry.arrays import Array, IntArray
 from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
 from tracker.validation import MAX_FRAMES, Number, check
 
+Scenes: TypeAlias = list[tuple[Path, MarkerTable]]
+"""The points of each person, with the file or folder that they are from."""
 _KIND = TextKind("file of people in space", DOCUMENT_BYTES, FormatError, "export it again")
-_Identity: TypeAlias = Annotated[int, msgspec.Meta(ge=-MAX_FRAMES, le=MAX_FRAMES, description="the number of a person")]
-PointsOf: TypeAlias = Callable[[Any, str], dict[int, Array]]
-"""Returns x, y, z and confidence of the people of a file, (n_points, 4), by number, from its data and name."""
 
 
-class _MocapPerson(msgspec.Struct):
-    id: _Identity
-    keypoints3d: Annotated[list[list[Number]], msgspec.Meta(min_length=1, max_length=MAX_NAMES)]
+class _Person(msgspec.Struct):
+    id: Annotated[int, msgspec.Meta(ge=-MAX_FRAMES, le=MAX_FRAMES, description="the number of a person")]
+    keypoints3d: Annotated[list[list[Number]], msgspec.Meta(max_length=MAX_NAMES)] = []
+    joints19: Annotated[list[Number], msgspec.Meta(max_length=MAX_NAMES)] = []
 
 
-class _PanopticPerson(msgspec.Struct):
-    id: _Identity
-    joints19: Annotated[list[Number], msgspec.Meta(min_length=76, max_length=76, description="4 numbers of 19 joints")]
-
-
-class _Panoptic(msgspec.Struct):
-    bodies: list[_PanopticPerson]
+class _Scene(msgspec.Struct):
+    bodies: list[_Person]
 
 
 def is_easymocap(sample: Sample) -> bool:
@@ -45,76 +40,46 @@ def is_easymocap(sample: Sample) -> bool:
     return isinstance(data, list) and isinstance(data[0], dict) and "keypoints3d" in data[0]
 
 
-def easymocap_points(data: Any, where: str) -> dict[int, Array]:
-    """Return the people of a file of EasyMocap's keypoints3d."""
-    found = {}
-    for person in check(data, list[_MocapPerson], where, FormatError):
-        widths = {len(point) for point in person.keypoints3d}
-        if len(widths) > 1 or not widths <= {3, 4}:
-            raise FormatError(
-                f"{where}: expected x, y, z and confidence of each point, found other rows; export it again"
-            )
-        points = np.array(person.keypoints3d, dtype=np.float64)
-        found[person.id] = np.column_stack([points, np.ones(len(points))])[:, :4]
-    return found
-
-
 def is_panoptic(sample: Sample) -> bool:
     """Return whether a file is of CMU Panoptic's hdPose3d."""
     return isinstance(sample.data, dict) and "bodies" in sample.data
 
 
-def panoptic_points(data: Any, where: str) -> dict[int, Array]:
-    """Return the people of a file of CMU Panoptic's hdPose3d, in centimetres."""
-    return {
-        person.id: np.array(person.joints19, dtype=np.float64).reshape(-1, 4)
-        for person in check(data, _Panoptic, where, FormatError).bodies
-    }
-
-
-def read_scenes(
-    points_of: PointsOf, unit_m: float | None, paths: Sequence[Path], given_m: float | None, rate: float
-) -> list[tuple[Path, MarkerTable]]:
+def read_scenes(paths: Sequence[Path], unit_m: float | None, rate: float) -> Scenes:
     """Read the people of a folder of files; a person is absent in the files that do not have him or her.
 
     Args:
-        points_of: reads the data of a file.
-        unit_m: metres per unit of the program; None if it fixes none.
         paths: the files.
-        given_m: metres per unit that the user gave.
+        unit_m: metres per unit of EasyMocap; CMU Panoptic has centimetres.
         rate: frames per second.
 
     Raises:
         FormatError: a file is malformed, or two are of one frame.
     """
-    scale = unit_m or given_m
+    folder = paths[0].parent
+    scale = METRES_BY_WORD["cm"] if is_panoptic(Sample(paths[0])) else unit_m
     if scale is None:
-        raise FormatError(f"{paths[0].parent}: expected the unit of the lengths, found none", Remedy("say_unit"))
+        raise FormatError(f"{folder}: expected the unit of the lengths, found none", Remedy("say_unit"))
     people: dict[int, dict[int, Array]] = defaultdict(dict)
-    files: dict[int, Path] = {}
+    frames: dict[int, Path] = {}
     for path in paths:
-        named = re.search(r"(\d{1,9})$", path.stem)
-        frame = int(named[1]) if named else -1
-        if frame < 0 or frame in files:
-            raise FormatError(
-                f"expected names that end in the number of the frame, each once, found {path.name}; leave it out or "
-                "rename it"
-            )
-        files[frame] = path
-        for number, points in points_of(read_json(path, _KIND), f"{_KIND.name} {path}").items():
-            people[number][frame] = points
-    frames = np.array(sorted(files), dtype=np.int64)
+        named = re.search(r"\d{1,9}$", path.stem)
+        if named is None or frames.setdefault(int(named[0]), path) != path:
+            raise FormatError(f"expected names that end in the number of the frame, each once, found {path}; rename it")
+        for person in _people(path):
+            people[person.id][int(named[0])] = _points(person, path)
+    numbers = np.array(sorted(frames), dtype=np.int64)
+    sizes = {len(points) for found in people.values() for points in found.values()}
+    if len(sizes) != 1:
+        raise FormatError(
+            f"{folder}: expected equally many points of people in all files, found {sorted(sizes) or 'none'}"
+        )
+    check_size((len(people), len(numbers), *sizes, 4), str(folder))
     tables = []
-    for number, found in sorted(people.items()):
-        sizes = {len(points) for points in found.values()}
-        if len(sizes) > 1:
-            raise FormatError(f"{paths[0].parent}: expected equally many points in all files, found {sorted(sizes)}")
-        check_size((len(people), len(frames), *sizes, 4), str(paths[0].parent))
-        table = np.full((len(frames), *sizes, 4), np.nan)
-        table[np.searchsorted(frames, [*found])] = [*found.values()]
-        tables.append((paths[0].parent, unnamed_table(table, frames, scale, rate, str(number))))
-    if not tables:
-        raise FormatError(f"{paths[0].parent}: expected people in some file, found none; check the folder")
+    for name, found in sorted(people.items()):
+        points = np.full((len(numbers), *sizes, 4), np.nan)
+        points[np.searchsorted(numbers, [*found])] = [*found.values()]
+        tables.append((folder, unnamed_table(points, numbers, scale, rate, str(name))))
     return tables
 
 
@@ -124,3 +89,19 @@ def unnamed_table(points: Array, frames: IntArray, scale: float, rate: float, pe
     out[~np.isfinite(out).all(axis=-1) | (points[..., 3:] <= 0).any(axis=-1)] = np.nan
     names = tuple(map(str, range(points.shape[1])))
     return MarkerTable(names, frames, frames / rate, out, rate, None, tuple(mask_missing(out)), person)
+
+
+def _people(path: Path) -> list[_Person]:
+    data, where = read_json(path, _KIND), f"{_KIND.name} {path}"
+    if isinstance(data, dict):
+        return check(data, _Scene, where, FormatError).bodies
+    return check(data, list[_Person], where, FormatError)
+
+
+def _points(person: _Person, path: Path) -> Array:
+    """Return x, y, z and confidence of the points of a person, (n_points, 4)."""
+    rows = person.keypoints3d or [person.joints19[i : i + 4] for i in range(0, len(person.joints19), 4)]
+    if {*map(len, rows)} not in ({3}, {4}):
+        raise FormatError(f"{path}: expected x, y, z and confidence of each point, found other rows; export it again")
+    points = np.array(rows, dtype=np.float64)
+    return np.column_stack([points, np.ones(len(points))])[:, :4]

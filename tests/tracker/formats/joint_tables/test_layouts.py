@@ -7,14 +7,12 @@ from observed_people import BODY_25, walking
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.joint_tables.layouts import (
+    LAYOUTS,
     NOT_READ,
     SCENES,
-    TABLES,
-    find_scenes,
-    find_table,
+    find_layout,
     markdown_table,
-    read_scenes,
-    read_tables,
+    read_joints,
     refuse_unread,
 )
 from tracker.formats.joint_tables.subjects import by_subject
@@ -35,9 +33,7 @@ def people_of(kind):
 
 
 def read(path, unit_m=None):
-    if path.is_dir():
-        return read_scenes(sorted(path.iterdir()), unit_m, 30.0)
-    return read_tables([path], unit_m, 30.0)
+    return read_joints(sorted(path.iterdir()) if path.is_dir() else [path], unit_m, 30.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -61,7 +57,7 @@ def test_joints_come_back(tmp_path, kind):
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("easymocap", "panoptic", "npy", "npz")])
 def test_each_table_is_known_by_its_content(tmp_path, kind):
     points, names = people_of(kind)
-    found = find_table(Sample(write_joints(kind, tmp_path, names, points)))
+    found = find_layout(Sample(write_joints(kind, tmp_path, names, points)))
     word = {"wide": "anipose", "people": "anipose", "semicolon": "anipose", "individuals": "deeplabcut"}.get(kind, kind)
     word = {"tidy": "freemocap", "qtm": "qualisys", "qtm with times": "qualisys"}.get(word, word)
     assert word in found.program.lower()
@@ -71,9 +67,9 @@ def test_scenes_are_known_by_their_content(tmp_path):
     for kind, layout in zip(("easymocap", "panoptic"), SCENES, strict=True):
         points, names = people_of(kind)
         (first, *_) = sorted(write_joints(kind, tmp_path, names, points).iterdir())
-        assert find_scenes(Sample(first)) is layout
+        assert find_layout(Sample(first)) is layout
     first.write_text('[{"image_id": 1, "keypoints": [1, 2, 3]}]')
-    assert find_scenes(Sample(first)) is None
+    assert find_layout(Sample(first)) is None
 
 
 @pytest.mark.parametrize(
@@ -153,7 +149,7 @@ def test_times_are_seconds_milliseconds_or_of_the_day(tmp_path, name, values, ra
             "labelled markers or bones, found Rigid Body; export",
         ),
         ("NO_OF_FRAMES\t3\nNO_OF_BODIES\t1\nBODY_NAMES\twand\n1\t2\t3\n", "MARKER_NAMES.*Qualisys Track Manager"),
-        ("scorer,a,a,a\ncoords,x,y,z\n0,1,2,3\n", "names above x, y and z"),
+        ("scorer,a,a,a\ncoords,x,y,z\n0,1,2,3\n", "names of points above x, y and z"),
         ("frame,keypoint,x_m,y_m,z_m\n" + "".join(f"0,p{i},1,2,3\n" for i in range(2100)), "at most 2000 points"),
     ],
 )
@@ -217,5 +213,5 @@ def test_files_that_are_not_read_are_named(tmp_path):
 
 def test_the_table_for_documents():
     table = markdown_table().splitlines()
-    assert len(table) == 2 + len(TABLES) + len(SCENES) + 1 + len(NOT_READ)
+    assert len(table) == 2 + len(LAYOUTS) + len(NOT_READ)
     assert all(line.count("|") == 4 for line in table)
