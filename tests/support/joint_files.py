@@ -1,6 +1,7 @@
 """Tables, JSON and arrays of joints in space, as the programs write them that the library reads."""
 
 import json
+import struct
 
 import numpy as np
 
@@ -20,15 +21,16 @@ KINDS = {
     "qtm with times": "a.tsv",
     "easymocap": "keypoints3d/000001.json",
     "panoptic": "hd/body3DScene_00000001.json",
+    "c3d": "a.c3d",
     "npy": "a.npy",
     "npz": "a.npz",
 }
 """A file of each kind, by its name."""
 NUMBERED = ("caliscope", "easymocap", "npy", "npz")
 """Kinds whose points have no names."""
-OF_PEOPLE = ("people", "individuals", "easymocap", "panoptic", "npy")
+OF_PEOPLE = ("people", "c3d", "individuals", "easymocap", "panoptic", "npy")
 """Kinds with several people in one file."""
-IN_MM = ("wide", "nexus", "qtm", "qtm with times")
+IN_MM = ("wide", "c3d", "nexus", "qtm", "qtm with times")
 IN_CM = ("panoptic",)
 
 
@@ -44,6 +46,9 @@ def write_joints(kind, folder, names, points, rate=30.0):
     if kind in ("easymocap", "panoptic"):
         _write_scenes(kind, path, points)
         return path.parent
+    if kind == "c3d":
+        path.write_bytes(_c3d([f"{who}:{n}" for who in ("Ann", "Ben")[: len(points)] for n in names], points, rate))
+        return path
     if kind in ("npy", "npz"):
         of_frames = np.swapaxes(points, 0, 1)
         if kind == "npy":
@@ -65,6 +70,25 @@ def _write_scenes(kind, path, points):
             data = {"version": 0.7, "bodies": [{"id": i, "joints19": p.ravel().tolist()} for i, p in enumerate(rows)]}
         name = path.name.replace("00001.json", f"{k:05d}.json")
         path.with_name(name).write_text(json.dumps(data))
+
+
+def _c3d(labels, points, rate):
+    """Real numbers of Intel, in mm; a point that is missing has the residual -1."""
+
+    def parameter(group, name, dims, data):
+        body = struct.pack(f"<bB{len(dims)}B", -1, len(dims), *dims) + data + b"\0"
+        return struct.pack("bb", len(name), group) + name.encode() + struct.pack("<H", 2 + len(body)) + body
+
+    width = max(map(len, labels))
+    text = "".join(label.ljust(width) for label in labels).encode()
+    parameters = b"\1\x50\x08\x54" + struct.pack("bb", 5, -1) + b"POINT" + struct.pack("<HB", 3, 0)
+    parameters += parameter(1, "LABELS", (width, len(labels)), text) + parameter(1, "UNITS", (2,), b"mm") + bytes(2)
+    blocks = -(-len(parameters) // 512)
+    n_frames = points.shape[1]
+    head = struct.pack("<BB5HfHHf", 2, 0x50, len(labels), 0, 1, n_frames, 10, -1.0, 2 + blocks, 0, rate)
+    rows = np.concatenate([points, np.where(np.isnan(points[..., :1]), -1.0, 0.0)], axis=-1)
+    data = np.nan_to_num(np.swapaxes(rows, 0, 1)).astype("<f4").tobytes()
+    return head.ljust(512, b"\0") + parameters.ljust(512 * blocks, b"\0") + data
 
 
 def _text(values):

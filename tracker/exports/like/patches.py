@@ -25,6 +25,7 @@ from tracker.motion.velocity import velocity
 from tracker.observations.joints import side_pairs, triangulate_observations
 from tracker.observations.observed import ObservationSet
 from tracker.observations.placing import rescaled
+from tracker.observations.readers import SPACE_FORMATS
 from tracker.observations.request import picture_size
 from tracker.observations.stored import source_path
 from tracker.observations.stored_files import StoredPictures, stored_pictures
@@ -146,20 +147,24 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
         "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
     }
     out, farthest_m = Files(), 0.0
-    if len(observations.sources) != len(mended) or observations.format not in {*patch, "bvh"}:
-        raise SessionError(
-            f"expected one file of each person in TRC, C3D, BVH or a table, the formats into which points are written "
-            f"back, found {len(observations.sources)} of another kind in {observations.name}; export the poses instead"
-        )
     if len(observations.row_frames) != len(mended):
         raise SessionError(
             f"expected the rows of each file of {observations.name}, found those of the first; import the files again"
         )
+    other = SessionError(
+        f"expected one file for each person in TRC, C3D, BVH or a table with a row for each frame, into which points "
+        f"are written back, found other files of {observations.name}; export the poses as TRC or CSV"
+    )
+    if len(observations.sources) != len(mended) or observations.format not in {*patch, "bvh"}:
+        raise other
     for source, person, row_frames in zip(observations.sources, mended, observations.row_frames, strict=True):
         changes = _rows(row_frames, person)
         if changes:
             in_file = {row: points @ R_file.T for row, points in changes.items()}
             path = source_path(session, observations.name, source)
+            read = SPACE_FORMATS[observations.format].read([path], unit_m, session.fps)
+            if {len(table.names) for _, table in read} != {len(is_known)} or len(read) > 1:
+                raise other
             if observations.format == "bvh":
                 out[source.path], distance_m = patch_bvh(path, unit_m, in_file, is_known)
                 farthest_m = max(farthest_m, distance_m)

@@ -5,6 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from joint_files import write_joints
 from observed_files import (
     write_c3d,
     write_coco_images,
@@ -552,6 +553,18 @@ def test_each_person_has_the_rows_of_their_own_file(tmp_path):
     before, after = read_trc(paths[1]), read_trc(tmp_path / "out" / "bob.trc")
     moved = np.abs(before.points - after.points).max(axis=(1, 2))
     assert np.flatnonzero(moved > 0.1).tolist() == [EDITED - late]
+
+
+@pytest.mark.parametrize("kind", ["people", "semicolon", "deeplabcut", "c3d", "easymocap"])
+def test_points_of_other_layouts_are_not_written_back(tmp_path, kind):
+    session = make_session(tmp_path / "s", N, people=("ann",))
+    bodies = poses(session)
+    truth = observed(session, bodies)
+    path = write_joints(kind, tmp_path, BODY_25.points, np.stack([truth, truth][: 1 + (kind in ("people", "c3d"))]))
+    observations = imported(session, path, unit_m=1.0)
+    store(session, bodies)
+    with pytest.raises(TrackerError, match="points are written back, found .*; export the poses as TRC or CSV"):
+        export_like(session, observations, tmp_path / "out")
 
 
 def test_rows_at_another_rate_are_where_their_time_is(session, tmp_path):
