@@ -103,7 +103,7 @@ def _of_people(
         notes = [f"the points of {', '.join(left_out)} are left out"] * bool(left_out)
         found = [found[names.index(name)] for name in wanted]
     elif len(found) != len(wanted):
-        listed = f" people ({', '.join(table.person for _, table in found)})" if any(names) else ""
+        listed = f" people ({', '.join(table.person for _, table in found)[:60]})" if any(names) else ""
         problem = (
             f"expected one file of points in space for each person ({', '.join(request.people)}), found {len(found)}"
             f"{listed} in {paths[0].name if len(paths) == 1 else f'{len(paths)} files'}"

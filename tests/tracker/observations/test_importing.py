@@ -300,7 +300,7 @@ def test_joints_without_names_are_known_by_their_number(session, tmp_path, kind)
 
 def test_files_of_other_programs_are_named(session, tmp_path):
     (tmp_path / "walk.fbx").write_bytes(b"Kaydara FBX Binary")
-    with pytest.raises(FormatError, match="found FBX in .*; export BVH"):
+    with pytest.raises(FormatError, match=r"found FBX in .*; export BVH"):
         planned(session, tmp_path / "walk.fbx")
 
 

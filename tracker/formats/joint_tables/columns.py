@@ -111,14 +111,15 @@ def motive_columns(table: Delimited) -> Columns:
     at = next((i for i, row in enumerate(rows) if {"Marker", "Bone", "Rigid Body"} & {*row.cells}), 0)
     kinds, names, what, axes = (rows[i].cells for i in (at, min(at + 1, len(rows) - 1), max(len(rows) - 2, 0), -1))
     bones = {name for kind, name in zip(kinds, names, strict=False) if kind == "Bone"}
+    markers = {name for name in names if name not in bones and not name.lower().startswith("unlabeled")}
     chosen = [
-        quantity == "Position" and (kind == "Bone" or (kind == "Marker" and name not in bones and name[:4] != "Unla"))
+        quantity == "Position" and (kind == "Bone" or (kind == "Marker" and name in markers))
         for kind, name, quantity in zip(kinds, names, what, strict=False)
     ]
     found = [kind for kind in dict.fromkeys(kinds) if kind not in ("", "Type", "Marker", "Bone")]
     if not any(chosen):
         raise FormatError(
-            f"{table.where}: expected positions of labelled markers or bones, found {', '.join(found) or 'none'}; "
+            f"{table.where}: expected positions of labelled markers or bones, found {', '.join(found)[:60] or 'none'}; "
             "export markers or the bones of a skeleton from Motive"
         )
     facts = dict(zip(rows[0].cells[::2], rows[0].cells[1::2], strict=False))
@@ -138,7 +139,7 @@ def nexus_columns(table: Delimited) -> Columns:
     if rows[-1].cells[0] != "Trajectories":
         sections = [row.cells[0] for row in rows if row.cells[0][:1].isalpha() and not any(row.cells[1:])]
         raise FormatError(
-            f"{table.where}: expected the section Trajectories, found {', '.join(sections[:9])}; export the "
+            f"{table.where}: expected the section Trajectories, found {', '.join(sections)[:60]}; export the "
             "trajectories from Nexus"
         )
     rate, names, axes, units = [*islice(table.filled, 4), *[TableLine(0, [""])] * 4][:4]

@@ -563,7 +563,7 @@ def test_points_of_other_layouts_are_not_written_back(tmp_path, kind):
     path = write_joints(kind, tmp_path, BODY_25.points, np.stack([truth, truth][: 1 + (kind in ("people", "c3d"))]))
     observations = imported(session, path, unit_m=1.0)
     store(session, bodies)
-    with pytest.raises(TrackerError, match="points are written back, found .*; export the poses as TRC or CSV"):
+    with pytest.raises(TrackerError, match=r"points are written back, found .*; export the poses as TRC or CSV"):
         export_like(session, observations, tmp_path / "out")
 
 

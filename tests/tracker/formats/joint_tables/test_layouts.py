@@ -1,5 +1,7 @@
 """Joints in space of each program come back as they were written; others are named."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from joint_files import IN_CM, IN_MM, KINDS, NUMBERED, OF_PEOPLE, write_joints
@@ -218,5 +220,7 @@ def test_files_that_are_not_read_are_named(tmp_path):
 
 def test_the_table_for_documents():
     table = markdown_table().splitlines()
+    text = (Path(__file__).resolve().parents[4] / "docs" / "observations.md").read_text("utf-8")
+    assert markdown_table() in text
     assert len(table) == 2 + len(LAYOUTS) + len(NOT_READ)
     assert all(line.count("|") == 4 for line in table)
