@@ -11,7 +11,7 @@ from tracker.errors import FormatError
 from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
-from tracker.formats.joint_tables.layouts import SCENES, Scenes, find_layout, read_joints, refuse_unread
+from tracker.formats.joint_tables.layouts import SCENES, Scenes, find_layout, read_joint_files, refuse_unread
 from tracker.formats.keypoints.coco_reading import holds, is_coco, read_coco
 from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, check_mask_size, read_segmentations
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut, read_deeplabcut_csv
@@ -132,9 +132,9 @@ SPACE_FORMATS = {
     "trc": SpaceFormat("TRC", _each(lambda path, unit_m: read_trc(path))),
     "c3d": SpaceFormat("C3D", _each(read_c3d)),
     "bvh": SpaceFormat("BVH", _each(read_bvh)),
-    "csv": SpaceFormat("CSV", read_joints),
-    "arrays": SpaceFormat("NumPy", read_joints),
-    "scenes": SpaceFormat("JSON of people in space", read_joints),
+    "csv": SpaceFormat("CSV", read_joint_files),
+    "arrays": SpaceFormat("NumPy", read_joint_files),
+    "scenes": SpaceFormat("JSON of people in space", read_joint_files),
 }
 MASK_FORMATS = {
     "masks": MaskFormat("masks in PNG", _read_png),

@@ -18,7 +18,7 @@ from observed_people import BODY_25, make_session, seen, walking
 from tracker.errors import FormatError, Remedy
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import patch_c3d, read_c3d
-from tracker.formats.joint_tables.layouts import read_joints
+from tracker.formats.joint_tables.layouts import read_joint_files
 from tracker.formats.keypoints import hdf5
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
@@ -33,7 +33,7 @@ TRUTH = walking(N)
 
 
 def read_one(path, unit_m):
-    ((_, table),) = read_joints([path], unit_m, 30.0)
+    ((_, table),) = read_joint_files([path], unit_m, 30.0)
     return table
 
 

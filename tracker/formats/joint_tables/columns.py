@@ -163,7 +163,7 @@ def qualisys_columns(table: Delimited) -> Columns:
             "data of labelled markers from Qualisys Track Manager"
         )
     is_head = rows[-1].cells[0] == "Frame"
-    start = 2 if is_head or len([c for c in rows[-1].cells if c]) >= 3 * len(names) + 2 else 0
+    start = 2 if is_head or len(rows[-1].cells) >= 3 * len(names) + 2 else 0
     axes = ["", ""][:start] + ["x", "y", "z"] * len(names)
     points = _stacked_points(["", ""][:start] + [name for name in names for _ in "xyz"], axes, where)
     frame, time = (0, 1) if start else (None, None)

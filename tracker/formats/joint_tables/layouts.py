@@ -128,7 +128,7 @@ def refuse_unread(sample: Sample) -> None:
             raise FormatError(f"expected joints, key points or masks, found {found}")
 
 
-def read_joints(paths: Sequence[Path], unit_m: float | None, rate: float) -> Scenes:
+def read_joint_files(paths: Sequence[Path], unit_m: float | None, rate: float) -> Scenes:
     """Read files of joints in space; several are of one person each, or of one frame each.
 
     Raises:

@@ -20,7 +20,7 @@ from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like.sending import export_like
 from tracker.formats.c3d import read_c3d
-from tracker.formats.joint_tables.layouts import read_joints
+from tracker.formats.joint_tables.layouts import read_joint_files
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
@@ -145,7 +145,7 @@ SUFFIXES = {"dlc h5": ".h5", "sleap": ".slp", "nwb": ".nwb"}
 def read_space(path):
     return {
         ".trc": read_trc,
-        ".csv": lambda p: read_joints([p], None, 30.0)[0][1],
+        ".csv": lambda p: read_joint_files([p], None, 30.0)[0][1],
         ".c3d": lambda p: read_c3d(p, None),
     }[path.suffix](path)
 

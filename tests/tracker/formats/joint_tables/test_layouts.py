@@ -15,7 +15,7 @@ from tracker.formats.joint_tables.layouts import (
     SCENES,
     find_layout,
     markdown_table,
-    read_joints,
+    read_joint_files,
     refuse_unread,
 )
 from tracker.formats.joint_tables.subjects import by_subject
@@ -38,7 +38,7 @@ def people_of(kind):
 def read(path, unit_m=None):
     if path.suffix == ".c3d":
         return [(path, read_c3d(path, None))]
-    return read_joints(sorted(path.iterdir()) if path.is_dir() else [path], unit_m, 30.0)
+    return read_joint_files(sorted(path.iterdir()) if path.is_dir() else [path], unit_m, 30.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -110,6 +110,36 @@ def test_sparse_tables_shift_nothing(tmp_path, text, frames, x):
     at = table.names.index("a")
     assert table.frames.tolist() == frames
     assert np.array_equal(table.points[:, at, 0], x, equal_nan=True)
+
+
+def test_qualisys_with_times_and_points_that_are_missing_at_first(tmp_path):
+    (tmp_path / "a.tsv").write_text(
+        "NO_OF_FRAMES\t2\nFREQUENCY\t100\nMARKER_NAMES\ta\tb\n1\t0\t\t\t\t4\t5\t6\n2\t0.01\t1\t2\t3\t4\t5\t6\n"
+    )
+    ((_, table),) = read(tmp_path / "a.tsv")
+    assert table.frames.tolist() == [1, 2]
+    assert np.array_equal(table.points[:, :, 0], [[np.nan, 0.004], [0.001, 0.004]], equal_nan=True)
+
+
+def test_bones_and_markers_of_motive(tmp_path):
+    columns = [("Bone", "Ann:Hip", "Rotation", a) for a in "XYZW"] + [("Bone", "Ann:Hip", "Position", a) for a in "XYZ"]
+    columns += [("Marker", "Ann:Hip", "Position", a) for a in "XYZ"]
+    columns += [("Marker", "Ann:Head", "Position", a) for a in "XYZ"] + [("Marker", "Ann:Head", "Marker Quality", "")]
+    rows = [
+        ",".join([*label, *row])
+        for label, row in zip(
+            (("", "Type"), ("", "Name"), ("", ""), ("Frame", "Time (Seconds)")), zip(*columns, strict=True), strict=True
+        )
+    ]
+    rows.insert(2, ",ID" + ',"1"' * len(columns))
+    rows.insert(3, ",Parent" + ',""' * len(columns))
+    numbers = ",".join(str(i) for i in range(len(columns)))
+    (tmp_path / "a.csv").write_text(
+        "\n".join(["Format Version,1.25,Length Units,Centimeters", "", *rows, f"0,0,{numbers}"])
+    )
+    ((_, table),) = read(tmp_path / "a.csv")
+    assert table.names == ("Ann:Hip", "Ann:Head")
+    assert np.allclose(table.points, [[[0.04, 0.05, 0.06], [0.1, 0.11, 0.12]]])
 
 
 def test_a_name_of_two_groups(tmp_path):
