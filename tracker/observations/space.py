@@ -1,5 +1,6 @@
 """Place points in space at the frames of a session, and check them against its cameras."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -57,13 +58,7 @@ def read_space(
         wrong, gaps = _outside(placed, where, session.n_frames, is_chosen)
         problems += wrong
         notes += [f"{path.name}: {note}" for note in (*placed.notes, *gaps)]
-    names = tuple(dict.fromkeys(name for table in tables for name in table.names))
-    check_size((session.n_frames, len(tables), len(names), 3), str(paths[0]))
-    joints_world = np.full((session.n_frames, len(tables), len(names), 3), np.nan)
-    for k, table in enumerate(tables):
-        inside = (table.frames >= 0) & (table.frames < session.n_frames)
-        columns = [names.index(name) for name in table.names]
-        joints_world[table.frames[inside, None], k, columns] = table.points[inside]
+    names, joints_world = _assembled(tables, session.n_frames, str(paths[0]))
     try:
         names, joint_map = _skeleton(names, given, paths[0].name)
     except FormatError as error:
@@ -119,6 +114,20 @@ def _of_people(
         if path != first_path and table.names != first.names:
             raise FormatError(f"{path}: expected the points of {first_path.name}, found others; import them apart")
     return found, notes
+
+
+def _assembled(tables: Sequence[MarkerTable], n_frames: int, source: str) -> tuple[tuple[str, ...], Array]:
+    """Return the names of the points, those that are numbers in their order, and the points of all people by frame."""
+    names = [*dict.fromkeys(name for table in tables for name in table.names)]
+    if all(re.fullmatch("0|[1-9][0-9]{0,2}", name) for name in names):
+        names = [*map(str, range(1 + max(map(int, names))))]
+    check_size((n_frames, len(tables), len(names), 3), source)
+    joints_world = np.full((n_frames, len(tables), len(names), 3), np.nan)
+    for k, table in enumerate(tables):
+        inside = (table.frames >= 0) & (table.frames < n_frames)
+        columns = [names.index(name) for name in table.names]
+        joints_world[table.frames[inside, None], k, columns] = table.points[inside]
+    return tuple(names), joints_world
 
 
 def _skeleton(names: tuple[str, ...], given: JointMap | None, source: str) -> tuple[tuple[str, ...], JointMap]:

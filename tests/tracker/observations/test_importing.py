@@ -298,6 +298,16 @@ def test_joints_without_names_are_known_by_their_number(session, tmp_path, kind)
     assert "the number of points of a known skeleton" in problems(other)
 
 
+def test_numbered_points_that_appear_late_or_never(session, tmp_path):
+    points = TRUTH.copy()
+    points[:2, 0] = np.nan
+    points[:, 20] = np.nan
+    found = planned(session, write_joints("caliscope", tmp_path, BODY_25.points, points[None]), unit_m=1.0)
+    assert not found.problems
+    assert found.observations.point_names == BODY_25.points
+    assert np.nanmax(np.abs(found.observations.joints.joints_world[:, 0] - points)) < 1e-5
+
+
 def test_files_of_other_programs_are_named(session, tmp_path):
     (tmp_path / "walk.fbx").write_bytes(b"Kaydara FBX Binary")
     with pytest.raises(FormatError, match=r"found FBX in .*; export BVH"):
