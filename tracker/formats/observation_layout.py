@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from tracker.errors import FormatError
+from tracker.formats.delimited import head_cells
 from tracker.text_files import TABLE_BYTES, TextKind, read_json, read_lines
 
 _TEXT = TextKind("file", TABLE_BYTES, FormatError)
@@ -34,6 +35,11 @@ class Sample:
             return tuple(islice(read_lines(self.path, _TEXT), _HEAD_LINES))
         except FormatError:
             return ()
+
+    @cached_property
+    def cells(self) -> list[list[str]]:
+        """Cells of the first lines of a delimited table that are not blank."""
+        return head_cells(self.head)
 
     @cached_property
     def data(self) -> Any:

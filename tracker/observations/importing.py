@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.errors import FormatError, Remedy, SessionError
+from tracker.errors import FormatError
 from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_size, read_joint_map
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.number_rows import check_size
@@ -238,20 +238,15 @@ def _preview(
 
 
 def _plan_of_space(session: Session, request: ImportRequest, format_name: str, files: list[Found]) -> ImportPlan:
-    if len(files) != len(request.people):
-        raise SessionError(
-            f"expected one file of points in space for each person ({', '.join(request.people)}), found {len(files)}",
-            Remedy("name_people_of_files"),
-        )
     placed, problems, notes = read_space(session, request, format_name, [path for path, _ in files])
-    groups = [(FileGroup((path,), (path.stem,), root), "") for path, root in files]
-    sources, by_path = source_files(groups)
+    files.sort(key=lambda found: placed.places.index(found[0]) if found[0] in placed.places else len(files))
+    sources, by_path = source_files([(FileGroup((path,), (path.stem,), root), "") for path, root in files])
     observations = ObservationSet(
         request.name, format_name, request.people, placed.joint_map, None, placed.joints, placed.row_frames, sources,
         tuple(notes), request.options,
     )  # fmt: skip
     views = []
-    for k, ((path, _), person) in enumerate(zip(files, request.people, strict=True)):
+    for k, (path, person) in enumerate(zip(placed.places, request.people, strict=True)):
         with_points = np.flatnonzero(np.isfinite(placed.joints.joints_world[:, k]).all(axis=-1).sum(axis=1))
         frames = (int(with_points[0]), int(with_points[-1])) if len(with_points) else None
         views.append(ViewPreview(person, path, len(placed.row_frames[k]), frames, 1))

@@ -12,6 +12,7 @@ from tracker.errors import FormatError
 from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
+from tracker.formats.joint_tables.layouts import NOT_READ, SCENES, Scenes, find_layout, read_joint_files
 from tracker.formats.keypoints import detections, hand_labels
 from tracker.formats.keypoints.coco_reading import holds, is_alphapose, is_coco, read_coco
 from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, check_mask_size, read_segmentations
@@ -20,7 +21,6 @@ from tracker.formats.keypoints.hdf5 import read_hdf5_apart
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_files
 from tracker.formats.observation_layout import ObservationLayout, Sample
-from tracker.formats.points_csv import read_points_csv
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.observations.mask_files import MaskFiles
 from tracker.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
@@ -48,6 +48,10 @@ def _by_picture(people_of: Callable[[Path], list[PicturePerson]], **more: Any) -
 
 def _read_yolo(files: Sequence[Found], cameras: Sequence[str]) -> Groups:
     return _by_picture(detections.read_yolo, size=(1, 1))(files, cameras)
+
+
+def _each(read: Callable[[Path, float | None], MarkerTable]) -> Callable[[Sequence[Path], float | None, float], Scenes]:
+    return lambda paths, unit_m, rate: [(path, read(path, unit_m)) for path in paths]
 
 
 def _by_file(read_file: Callable[[Path], PictureTable]) -> _Read:
@@ -153,14 +157,19 @@ def _is_json(recognizes: Callable[[Any], bool]) -> Callable[[Sample], bool]:
     return lambda sample: sample.suffix == ".json" and recognizes(sample.data)
 
 
-def _in_space(name: str, read: Callable[[Path, float | None, float], MarkerTable]) -> ObservationLayout[MarkerTable]:
+def _in_space(name: str, read: Callable[..., Scenes]) -> ObservationLayout[Scenes]:
     """Return the row of a format that is known by the end of its files' names alone."""
     suffix = f".{name.lower()}"
     return ObservationLayout(name, f"a `{suffix}` for each person", _END, _ends(suffix), read)
 
 
+def _is_scene(sample: Sample) -> bool:
+    return sample.suffix == ".json" and find_layout(sample) in SCENES
+
+
 _CAMERA, _PICTURE = "for each camera", "for each picture, as `CAMERA/CAMERA_000012`"
 _ALL = "one `.json` for all cameras, or one for each"
+_IN_SPACE = "see [Joints in space](#joints-in-space)"
 
 PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
     "openpose": ObservationLayout(
@@ -212,14 +221,16 @@ PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
     ),
 }  # fmt: skip
 """Key points in pictures, by the name that is stored, in the order in which they are tried."""
-SPACE_FORMATS: Mapping[str, ObservationLayout[MarkerTable]] = {
-    "trc": _in_space("TRC", lambda path, unit_m, rate: read_trc(path)),
-    "c3d": _in_space("C3D", lambda path, unit_m, rate: read_c3d(path, unit_m)),
-    "bvh": _in_space("BVH", lambda path, unit_m, rate: read_bvh(path, unit_m)),
-    "csv": _in_space("CSV", read_points_csv),
+SPACE_FORMATS: Mapping[str, ObservationLayout[Scenes]] = {
+    "trc": _in_space("TRC", _each(lambda path, unit_m: read_trc(path))),
+    "c3d": _in_space("C3D", _each(read_c3d)),
+    "bvh": _in_space("BVH", _each(read_bvh)),
+    "scenes": ObservationLayout("JSON of people in space", _IN_SPACE, "", _is_scene, read_joint_files),
+    "arrays": ObservationLayout("NumPy", _IN_SPACE, "", _ends(".npy", ".npz"), read_joint_files),
+    "csv": ObservationLayout("CSV", _IN_SPACE, "", _ends(".csv", ".tsv"), read_joint_files),
 }
 """Joints in space. Lengths without a unit in the file have the given one, metres, or are refused; rows without times
-have the given rate, 1/s."""
+have the given rate, 1/s. Each returns the points of each person with the file or folder that they are from."""
 MASK_FORMATS: Mapping[str, ObservationLayout[list[MaskFiles]]] = {
     "masks": ObservationLayout(
         "masks", "a `.png` for each picture, or for each object in it, in a folder for each camera: `cam1/000012.png`",
@@ -232,27 +243,24 @@ MASK_FORMATS: Mapping[str, ObservationLayout[list[MaskFiles]]] = {
 }  # fmt: skip
 FORMATS: Mapping[str, ObservationLayout[Any]] = {**PICTURE_FORMATS, **SPACE_FORMATS, **MASK_FORMATS}
 """The layouts that are read, by the name that is stored."""
-_OF_UNREAD = (".mat", ".pkl", ".pickle", ".pt", ".pth", ".xlsx", ".xls")
-UNREAD: Sequence[ObservationLayout[Any]] = [
+_OF_UNREAD = (".mat", ".pkl", ".pickle", ".pt", ".pth", ".xlsx", ".xls", ".fbx", ".glb", ".parquet", ".tak")
+_UNREAD: Sequence[ObservationLayout[Any]] = [
     ObservationLayout(program, files or "`.json`", keys or _END, recognizes, instead=instead)
     for program, files, keys, recognizes, instead in (
-        ("Panoptic Studio's hdPose3d", "", "`univTime` and `bodies`", _has("univTime", "bodies"), "convert it to CSV"),
-        ("EasyMocap in 3-D", "", "a list of `keypoints3d`", _is_json(detections.is_easymocap_3d), "convert it to CSV"),
-        ("AlphaPose's formats of OpenPose", "", "`bodies`", _has("bodies"), "write its results without --format"),
-        ("LabelMe", "", "`shapes` and `imagePath`", _has("shapes", "imagePath"), "export COCO"),
-        ("VGG Image Annotator", "", "`_via_img_metadata`", _has("_via_img_metadata"), "export COCO"),
-        ("Datumaro", "", "`items` and `categories`", _has("items", "categories"), "export COCO or CVAT's XML"),
-        ("MATLAB", "`.mat`", "", _ends(".mat"), "write CSV"),
-        ("Python's pickles", "`.pkl`, `.pickle`", "", _ends(".pkl", ".pickle"), "export CSV or JSON"),
-        ("PyTorch", "`.pt`, `.pth`", "", _ends(".pt", ".pth"), "export CSV or JSON"),
-        ("Excel", "`.xlsx`, `.xls`", "", _ends(".xlsx", ".xls"), "save it as CSV"),
-        ("a video", "`.mp4`, `.avi`, `.mov`", "", _ends(".mp4", ".avi", ".mov"), "import the key points of a detector"),
+        ("AlphaPose's formats of OpenPose", "", "`bodies`", _has("bodies"), "its results without --format"),
+        ("LabelMe", "", "`shapes` and `imagePath`", _has("shapes", "imagePath"), "COCO"),
+        ("VGG Image Annotator", "", "`_via_img_metadata`", _has("_via_img_metadata"), "COCO"),
+        ("Datumaro", "", "`items` and `categories`", _has("items", "categories"), "COCO or CVAT's XML"),
+        ("PyTorch", "`.pt`, `.pth`", "", _ends(".pt", ".pth"), "CSV or JSON"),
+        ("a video", "`.mp4`, `.avi`, `.mov`", "", _ends(".mp4", ".avi", ".mov"), "a detector's key points"),
     )
 ]
+UNREAD = (*NOT_READ, *_UNREAD)
 """Layouts that are known and not read."""
 _OFTEN_OTHER = (".txt", ".xml")
 """Ends of names that files of notes and of cameras have too: one that is of no known program is left out."""
-SUFFIXES = (".json", ".csv", ".slp", ".nwb", ".h5", ".trc", ".c3d", ".bvh", ".png", *_OFTEN_OTHER)
+_OF_SPACE = (".trc", ".c3d", ".bvh", ".tsv", ".npy", ".npz")
+SUFFIXES = (".json", ".csv", ".slp", ".nwb", ".h5", *_OF_SPACE, ".png", *_OFTEN_OTHER)
 
 
 def find_files(paths: Sequence[Path], masks: bool = False) -> tuple[str, list[Found]]:
@@ -324,7 +332,7 @@ def _unread(sample: Sample) -> FormatError:
     """Return that a file is not read, in the words of the program that wrote it."""
     known = next((layout for layout in UNREAD if layout.recognizes(sample)), None)
     if known is not None:
-        return FormatError(f"file {sample.path} is of {known.program}, which is not read; {known.instead}")
+        return FormatError(f"file {sample.path} is of {known.program}, which is not read; export {known.instead}")
     found = f"one that begins with {quoted(sample.head[0])}" if sample.head else "another kind of file"
     if sample.suffix == ".json":
         try:
@@ -343,5 +351,7 @@ def markdown_table() -> str:
     """Return the table for documents."""
     rows = ["| program | files | recognized by |", "|---|---|---|"]
     rows += [f"| {row.program} | {row.files} | {row.recognized_by} |" for row in FORMATS.values()]
-    rows += [f"| {row.program} | {row.files} | {row.recognized_by}; not read: {row.instead} |" for row in UNREAD]
+    rows += [
+        f"| {row.program} | {row.files} | {row.recognized_by}; not read: export {row.instead} |" for row in _UNREAD
+    ]
     return "\n".join(rows) + "\n"

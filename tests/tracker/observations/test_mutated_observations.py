@@ -10,6 +10,7 @@ import tomllib
 import traceback
 import warnings
 
+import joint_files
 import numpy as np
 import pytest
 from mask_files import SIZE, person_masks, write_coco_masks, write_masks
@@ -50,6 +51,7 @@ KINDS = {
     "csv": ("a.csv", None),
     "bvh": ("a.bvh", None),
     "c3d": ("a.c3d", "ezc3d"),
+    **{f"joints {kind}": (name, None) for kind, name in joint_files.KINDS.items() if kind != "wide"},
     "masks": ("m/cam1/cam1_000002.png", None),
     "coco polygon": ("c.json", None),
     "coco runs": ("c.json", None),
@@ -72,7 +74,7 @@ KINDS = {
     "stored numbers": ("points.npz", None),
 }
 """For each kind: the file that is mutated, and the package that it needs."""
-OF_JOINTS = ("trc", "c3d", "bvh", "csv")
+OF_JOINTS = ("trc", "c3d", "bvh", "csv", *(kind for kind in KINDS if kind.startswith("joints ")))
 OF_MASKS = ("masks", "masks by object", "coco polygon", "coco runs", "coco text", "stored masks")
 APART = ("h5py", "sleap_io")
 """Packages that read in a process of their own."""
@@ -92,6 +94,10 @@ def write(kind, session, folder):
     if kind in OF_MASKS:
         return write_coco_masks(folder / "c.json", session.camera_names, person_masks(N, 4), kind.split()[1])
     points = seen(session, [TRUTH])
+    if kind.startswith("joints "):
+        n_points = 19 if kind == "joints panoptic" else 25
+        of_one = TRUTH[None, :, :n_points]
+        return joint_files.write_joints(kind.removeprefix("joints "), folder, BODY_25.points[:n_points], of_one)
     if kind in WRITERS:
         WRITERS[kind](folder / "f", session.camera_names, list(BODY_25.points), points)
     elif kind == "openpose":
@@ -133,9 +139,7 @@ def read(kind, session, path, case):
         found = load_observations(session, "mp")
         observed_joints(found, [c.camera for c in session.cameras])
         return False
-    plan = plan_import(
-        session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=0.01 if kind in OF_JOINTS else None)
-    )
+    plan = plan_import(session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=_unit(kind)))
     if kind in OF_MASKS:
         if not plan.problems and case % 10 == 0:
             used = store_import(session, plan)
@@ -147,6 +151,11 @@ def read(kind, session, path, case):
         store_import(session, plan)
         load_observations(session, f"m{case}")
     return bool(plan.problems)
+
+
+def _unit(kind):
+    """Metres per unit that the user gives: those of the file, so that points lie before the cameras."""
+    return (1.0 if kind.startswith("joints ") else 0.01) if kind in OF_JOINTS else None
 
 
 def run_forked(path, folder):
@@ -165,7 +174,7 @@ def run_forked(path, folder):
     [
         pytest.param(kind, n, marks=[pytest.mark.slow] if n > 50 or package in APART else [])
         for kind, (_, package) in KINDS.items()
-        for n in ((1000,) if package in APART or kind in WRITERS else (50, 1000))
+        for n in ((1000,) if package in APART or kind in WRITERS else (20 if kind.startswith("joints ") else 50, 1000))
     ],
 )
 def test_mutated_observations_are_imported_or_refused(kind, n, tmp_path, monkeypatch):

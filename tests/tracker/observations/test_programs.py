@@ -212,10 +212,13 @@ def test_messages_name_the_program_that_wrote_the_file(tmp_path, name, text, exp
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [
-        ("a.json", '{"version": 0.7, "bodies": []}', "is of AlphaPose's formats of OpenPose, which is not read; write"),
-        ("a.json", '{"univTime": 1, "bodies": []}', "is of Panoptic Studio's hdPose3d, which is not read; convert it"),
+        (
+            "a.json",
+            '{"version": 0.7, "bodies": [{"joints": []}]}',
+            "of AlphaPose's formats of OpenPose, which is not",
+        ),
         ("a.json", '{"shapes": [], "imagePath": "a.png"}', "is of LabelMe, which is not read; export COCO"),
-        ("a.mat", "MATLAB", "is of MATLAB, which is not read; write CSV"),
+        ("a.mat", "MATLAB", "is of a MATLAB file, which is not read; export a CSV"),
         ("a.json", '{"a": 1, "b": 2}', "found JSON with the keys 'a, b'; export it in one of its formats"),
         ("a.json", "{", "a.json is not valid JSON"),
         ("a.json", "[[1, 2]]", r"found JSON with \[\[1, 2\]\]"),

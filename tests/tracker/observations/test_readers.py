@@ -18,18 +18,23 @@ from observed_people import BODY_25, make_session, seen, walking
 from tracker.errors import FormatError, Remedy
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import patch_c3d, read_c3d
+from tracker.formats.joint_tables.layouts import read_joint_files
 from tracker.formats.keypoints import hdf5
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import read_hdf5_apart
 from tracker.formats.keypoints.openpose import read_openpose
-from tracker.formats.points_csv import read_points_csv
 from tracker.observations.importing import plan_import
 from tracker.observations.joints import observed_joints
 from tracker.observations.request import ImportRequest
 
 N = 8
 TRUTH = walking(N)
+
+
+def read_one(path, unit_m):
+    ((_, table),) = read_joint_files([path], unit_m, 30.0)
+    return table
 
 
 @pytest.fixture
@@ -308,21 +313,21 @@ def test_csv_of_points(session, tmp_path, unit):
 def test_malformed_csv_of_points(tmp_path, text, expected):
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(FormatError, match=expected):
-        read_points_csv(tmp_path / "a.csv", 1.0, 30.0)
+        read_one(tmp_path / "a.csv", 1.0)
 
 
 def test_a_csv_with_the_index_of_its_table_and_a_column_of_frames(tmp_path):
     lines = [",frame,left_wrist_x_m,left_wrist_y_m,left_wrist_z_m", "0,100,1,2,3", "1,103,1,2,3"]
     (tmp_path / "p.csv").write_text("\n".join(lines))
-    assert read_points_csv(tmp_path / "p.csv", None, 30.0).frames.tolist() == [100, 103]
+    assert read_one(tmp_path / "p.csv", None).frames.tolist() == [100, 103]
     (tmp_path / "p.csv").write_text("\n".join(lines).replace("frame", "error"))
-    assert read_points_csv(tmp_path / "p.csv", None, 30.0).frames.tolist() == [0, 1]
+    assert read_one(tmp_path / "p.csv", None).frames.tolist() == [0, 1]
 
 
 def test_a_csv_without_a_unit(tmp_path):
     write_points_csv(tmp_path / "a.csv", BODY_25.points, TRUTH, 30.0, "")
     with pytest.raises(FormatError, match="a unit in the names, found none") as caught:
-        read_points_csv(tmp_path / "a.csv", None, 30.0)
+        read_one(tmp_path / "a.csv", None)
     assert caught.value.remedy == Remedy("say_unit")
 
 

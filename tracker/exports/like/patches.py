@@ -13,19 +13,19 @@ from tracker.exports.like.mended_points import MendedPoints
 from tracker.formats.bvh_patching import patch_bvh
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
+from tracker.formats.joint_tables.patching import patch_table
 from tracker.formats.keypoints.coco_patching import patch_coco
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
 from tracker.formats.keypoints.openpose import patch_openpose
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.formats.points_csv import patch_points_csv
 from tracker.formats.trc import patch_trc
 from tracker.geometry.arrays import Array
 from tracker.motion.velocity import velocity
 from tracker.observations.joints import side_pairs, triangulate_observations
 from tracker.observations.observed import ObservationSet
 from tracker.observations.placing import rescaled
-from tracker.observations.readers import PICTURE_FORMATS
+from tracker.observations.readers import PICTURE_FORMATS, SPACE_FORMATS
 from tracker.observations.request import picture_size
 from tracker.observations.stored import source_path
 from tracker.observations.stored_files import StoredPictures, stored_pictures
@@ -154,7 +154,7 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
     is_known = np.array([bool(points) for points in observations.counterparts.values()])
     patch: Mapping[str, Callable[[Path, Mapping[int, Array]], bytes]] = {
         "trc": patch_trc,
-        "csv": lambda path, changes: patch_points_csv(path, unit_m, changes),
+        "csv": lambda path, changes: patch_table(path, unit_m, changes),
         "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
     }
     out, farthest_m = Files(), 0.0
@@ -162,11 +162,20 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
         raise SessionError(
             f"expected the rows of each file of {observations.name}, found those of the first; import the files again"
         )
+    other = SessionError(
+        f"expected one file for each person in TRC, C3D, BVH or a table with a row for each frame, into which points "
+        f"are written back, found other files of {observations.name}; export the poses as TRC or CSV"
+    )
+    if len(observations.sources) != len(mended) or observations.format not in {*patch, "bvh"}:
+        raise other
     for source, person, row_frames in zip(observations.sources, mended, observations.row_frames, strict=True):
         changes = _rows(row_frames, person)
         if changes:
             in_file = {row: points @ R_file.T for row, points in changes.items()}
             path = source_path(session, observations.name, source)
+            read = SPACE_FORMATS[observations.format].read([path], unit_m, session.fps)
+            if {len(table.names) for _, table in read} != {len(is_known)} or len(read) > 1:
+                raise other
             if observations.format == "bvh":
                 out[source.path], distance_m = patch_bvh(path, unit_m, in_file, is_known)
                 farthest_m = max(farthest_m, distance_m)

@@ -104,11 +104,6 @@ def is_mmpose_picture(data: Any) -> bool:
     return isinstance(data, list) and _first_has(data, "keypoints", "keypoint_scores")
 
 
-def is_easymocap_3d(data: Any) -> bool:
-    """Return whether plain data of a JSON file are joints in space of EasyMocap."""
-    return isinstance(data, list) and _first_has(data, "keypoints3d")
-
-
 def read_yolo(path: Path) -> list[PicturePerson]:
     """Read the people in a picture, a line each, in shares of its width and height; a last score or track is left out.
 

@@ -5,6 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from joint_files import write_joints
 from observed_files import (
     write_c3d,
     write_coco_images,
@@ -20,12 +21,12 @@ from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like.sending import export_like
 from tracker.formats.c3d import read_c3d
+from tracker.formats.joint_tables.layouts import read_joint_files
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.model_toml import format_model
-from tracker.formats.points_csv import read_points_csv
 from tracker.formats.trc import read_trc, write_trc
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.request import ImportRequest
@@ -143,9 +144,11 @@ SUFFIXES = {"dlc h5": ".h5", "sleap": ".slp", "nwb": ".nwb"}
 
 
 def read_space(path):
-    return {".trc": read_trc, ".csv": lambda p: read_points_csv(p, None, 30.0), ".c3d": lambda p: read_c3d(p, None)}[
-        path.suffix
-    ](path)
+    return {
+        ".trc": read_trc,
+        ".csv": lambda p: read_joint_files([p], None, 30.0)[0][1],
+        ".c3d": lambda p: read_c3d(p, None),
+    }[path.suffix](path)
 
 
 def contents(folder):
@@ -574,6 +577,18 @@ def test_each_person_has_the_rows_of_their_own_file(tmp_path):
     before, after = read_trc(paths[1]), read_trc(tmp_path / "out" / "bob.trc")
     moved = np.abs(before.points - after.points).max(axis=(1, 2))
     assert np.flatnonzero(moved > 0.1).tolist() == [EDITED - late]
+
+
+@pytest.mark.parametrize("kind", ["people", "semicolon", "deeplabcut", "c3d", "easymocap"])
+def test_points_of_other_layouts_are_not_written_back(tmp_path, kind):
+    session = make_session(tmp_path / "s", N, people=("ann",))
+    bodies = poses(session)
+    truth = observed(session, bodies)
+    path = write_joints(kind, tmp_path, BODY_25.points, np.stack([truth, truth][: 1 + (kind in ("people", "c3d"))]))
+    observations = imported(session, path, unit_m=1.0)
+    store(session, bodies)
+    with pytest.raises(TrackerError, match=r"points are written back, found .*; export the poses as TRC or CSV"):
+        export_like(session, observations, tmp_path / "out")
 
 
 def test_rows_at_another_rate_are_where_their_time_is(session, tmp_path):
