@@ -152,8 +152,8 @@ def _skeleton(
         (one, n), (two, m) = ((filled[x].names, filled[x].points.shape[2]) for x in (first, other))
         if one != two or n != m:
             raise FormatError(
-                f"expected the same points in all views, found {n} ({', '.join(one[:3])}...) for camera '{first}' and "
-                f"{m} ({', '.join(two[:3])}...) for camera '{other}'; import files of one skeleton"
+                f"expected the same points in all views, found {n} ({', '.join(one[:3])[:60]}...) for camera '{first}' and "
+                f"{m} ({', '.join(two[:3])[:60]}...) for camera '{other}'; import files of one skeleton"
             )
     names, n_points = filled[first].names, filled[first].points.shape[2]
     where = f"the files of camera '{first}'"
