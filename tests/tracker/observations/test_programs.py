@@ -167,6 +167,14 @@ def test_names_with_a_rate(session, tmp_path):
     assert np.abs(in_space(session, found) - TRUTH).max() < 1e-3
 
 
+@pytest.mark.parametrize(("program", "name"), [("eks", "x" * 300), ("sleap csv", "a\x0bb"), ("cvat images", "a&#10;b")])
+def test_names_that_cannot_be_stored(session, tmp_path, program, name):
+    names = [name, *POINTS[1:]]
+    WRITERS[program](tmp_path / "f", session.camera_names, names, seen(session, [TRUTH]))
+    with pytest.raises(FormatError, match="the files of camera 'cam0': expected a name of 1 to 200 characters"):
+        planned(session, tmp_path / "f")
+
+
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [
@@ -200,6 +208,7 @@ def test_names_with_a_rate(session, tmp_path):
         ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\nt,0,1,1,2\n", "SLEAP file .*line 2: expected 6 col"),
         ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\nt,0.5,1,1,2,1\n", "SLEAP file .*frame_idx"),
         ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\n", "SLEAP file .*no rows"),
+        ("a.csv", "track,frame_idx,n.x,n.y,n.score\n" + "a" * 200_000, "SLEAP file .*line 2: field larger than"),
     ],
 )
 def test_messages_name_the_program_that_wrote_the_file(tmp_path, name, text, expected):
