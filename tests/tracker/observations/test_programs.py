@@ -21,6 +21,7 @@ from tracker.errors import FormatError
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints
+from tracker.observations.readers import FORMATS as FORMATS_BY_NAME
 from tracker.observations.readers import PICTURE_FORMATS, UNREAD, find_files, markdown_table
 from tracker.observations.request import ImportRequest
 
@@ -271,6 +272,12 @@ def test_small_files_take_little_memory(tmp_path, data, expected):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 15_000_000
+
+
+def test_stored_observations_keep_their_formats():
+    """Sessions hold these names."""
+    old = {"openpose", "coco", "deeplabcut", "hdf5", "trc", "c3d", "bvh", "csv", "masks", "coco masks"}
+    assert old <= FORMATS_BY_NAME.keys()
 
 
 def test_the_documents_list_all_programs():
