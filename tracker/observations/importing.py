@@ -22,6 +22,7 @@ from tracker.observations.space import read_space
 from tracker.observations.stored import new_folder, save_observations
 from tracker.observations.stored_masks import store_masks
 from tracker.session.session import Session
+from tracker.validation import Name, check
 
 
 def plan_import(session: Session, request: ImportRequest, calibrated: bool = True) -> ImportPlan | MaskPlan:
@@ -143,20 +144,22 @@ def _skeleton(
     """Return the names of the points, their convention, and what is wrong with it.
 
     Raises:
-        FormatError: cameras have different points, or the file of the map is malformed.
+        FormatError: cameras have different points, a name cannot be stored, or the file of the map is malformed.
     """
     given = read_joint_map(request.joint_map) if request.joint_map is not None else None
     filled = {name: t for name, t in tables.items() if t.points.shape[2]} or dict(tables)
     first, *others = filled
     for other in others:
         (one, n), (two, m) = ((filled[x].names, filled[x].points.shape[2]) for x in (first, other))
+        begins = [", ".join(found[:3])[:60] for found in (one, two)]
         if one != two or n != m:
             raise FormatError(
-                f"expected the same points in all views, found {n} ({', '.join(one[:3])}...) for camera '{first}' and "
-                f"{m} ({', '.join(two[:3])}...) for camera '{other}'; import files of one skeleton"
+                f"expected the same points in all views, found {n} ({begins[0]}...) for camera '{first}' and "
+                f"{m} ({begins[1]}...) for camera '{other}'; import files of one skeleton"
             )
     names, n_points = filled[first].names, filled[first].points.shape[2]
     where = f"the files of camera '{first}'"
+    check(list(names), list[Name], where, FormatError)
     numbered = names or tuple(f"point {i}" for i in range(n_points))
     try:
         if names:

@@ -21,6 +21,7 @@ from tracker.errors import FormatError
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints
+from tracker.observations.readers import FORMATS as FORMATS_BY_NAME
 from tracker.observations.readers import PICTURE_FORMATS, UNREAD, find_files, markdown_table
 from tracker.observations.request import ImportRequest
 
@@ -167,6 +168,14 @@ def test_names_with_a_rate(session, tmp_path):
     assert np.abs(in_space(session, found) - TRUTH).max() < 1e-3
 
 
+@pytest.mark.parametrize(("program", "name"), [("eks", "x" * 300), ("sleap csv", "a\x0bb"), ("cvat images", "a&#10;b")])
+def test_names_that_cannot_be_stored(session, tmp_path, program, name):
+    names = [name, *POINTS[1:]]
+    WRITERS[program](tmp_path / "f", session.camera_names, names, seen(session, [TRUTH]))
+    with pytest.raises(FormatError, match="the files of camera 'cam0': expected a name of 1 to 200 characters"):
+        planned(session, tmp_path / "f")
+
+
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [
@@ -200,6 +209,7 @@ def test_names_with_a_rate(session, tmp_path):
         ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\nt,0,1,1,2\n", "SLEAP file .*line 2: expected 6 col"),
         ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\nt,0.5,1,1,2,1\n", "SLEAP file .*frame_idx"),
         ("a.csv", "track,frame_idx,instance.score,n.x,n.y,n.score\n", "SLEAP file .*no rows"),
+        ("a.csv", "track,frame_idx,n.x,n.y,n.score\n" + "a" * 200_000, "SLEAP file .*line 2: field larger than"),
     ],
 )
 def test_messages_name_the_program_that_wrote_the_file(tmp_path, name, text, expected):
@@ -265,6 +275,12 @@ def test_small_files_take_little_memory(tmp_path, data, expected):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 15_000_000
+
+
+def test_stored_observations_keep_their_formats():
+    """Sessions hold these names."""
+    old = {"openpose", "coco", "deeplabcut", "hdf5", "trc", "c3d", "bvh", "csv", "masks", "coco masks"}
+    assert old <= FORMATS_BY_NAME.keys()
 
 
 def test_the_documents_list_all_programs():

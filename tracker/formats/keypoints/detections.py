@@ -143,7 +143,7 @@ def read_sleap_csv(path: Path) -> PictureTable:
     """
     where = f"SLEAP file {path}"
     lines = read_lines(path, text_of("SLEAP"))
-    head = next(csv.reader([next(lines, "")]), [])
+    head = _cells(next(lines, ""), where)
     names = tuple(cell.removesuffix(".x") for cell in head if cell.endswith(".x"))
     columns = [f"{name}{part}" for name in names for part in (".x", ".y", ".score")]
     if not 0 < len(names) <= MAX_NAMES or len(set(head)) < len(head) or {*columns, "track", "frame_idx"} - set(head):
@@ -154,10 +154,10 @@ def read_sleap_csv(path: Path) -> PictureTable:
     at = [head.index(c) for c in ("frame_idx", *columns)]
     people: dict[int, list[PicturePerson]] = {}
     for number, line in enumerate(lines, 2):
-        cells = next(csv.reader([line]), [])
+        here = f"{where}, line {number}"
+        cells = _cells(line, here)
         if not cells:
             continue
-        here = f"{where}, line {number}"
         if len(cells) != len(head):
             raise FormatError(f"{here}: expected {len(head)} columns, found {len(cells)}; export it again")
         picture, *values = _numbers([cells[i] or "nan" for i in at], here)
@@ -187,6 +187,13 @@ def _mmpose_person(person: _Instance, where: str) -> PicturePerson:
 
 def _first_has(rows: list[Any], *keys: str) -> bool:
     return bool(rows) and isinstance(rows[0], dict) and rows[0].keys() >= {*keys}
+
+
+def _cells(line: str, where: str) -> list[str]:
+    try:
+        return next(csv.reader([line]), [])
+    except csv.Error as error:
+        raise FormatError(f"{where}: {error}; export it again") from error
 
 
 def _numbers(cells: Sequence[str], where: str) -> list[float]:

@@ -14,7 +14,7 @@ from observed_files import (
     write_sleap,
 )
 from observed_people import BODY_25, make_session, seen, write_openpose
-from program_files import write_alphapose, write_sleap_csv
+from program_files import write_alphapose, write_eks, write_sleap_csv
 
 from tracker.body.model import PosedBody
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
@@ -420,6 +420,29 @@ def test_mended_points_of_alphapose_alone_differ(session, tmp_path):
         before, after = (json.loads((tmp_path / folder / name).read_text()) for folder in ("f", "back"))
         assert [a == b for a, b in zip(before, after, strict=True)] == [k != EDITED for k in range(N)]
         assert before[EDITED] | {"keypoints": []} == after[EDITED] | {"keypoints": []}
+
+
+def test_other_columns_of_a_table_stay(session, tmp_path):
+    bodies = poses(session)
+    write_eks(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
+    store(session, bodies)
+    export_like(session, imported(session, tmp_path / "f"), tmp_path / "back")
+    name = f"multicam_{session.camera_names[1]}_results.csv"
+    before, after = ((tmp_path / folder / name).read_text().splitlines() for folder in ("f", "back"))
+    assert [a == b for a, b in zip(before, after, strict=True)] == [k != EDITED + 3 for k in range(N + 3)]
+    rows = [line.split(",") for line in (before[2], before[EDITED + 3], after[EDITED + 3])]
+    changed = {head for head, a, b in zip(*rows, strict=True) if a != b}
+    assert changed == {"x", "y", "likelihood"}
+
+
+def test_several_files_of_one_picture_are_not_sent_back(session, tmp_path):
+    bodies = poses(session)
+    write_openpose(tmp_path / "k", session.camera_names, seen(session, [observed(session, bodies)]))
+    for path in [*(tmp_path / "k").rglob("*.json")]:
+        path.with_name(path.name.replace("keypoints", "person2")).write_text('{"people": []}')
+    store(session, bodies)
+    with pytest.raises(FormatError, match="expected files with one picture each, found several of one"):
+        export_like(session, imported(session, tmp_path / "k"), tmp_path / "back")
 
 
 def test_programs_to_which_nothing_is_sent_back(session, tmp_path):
