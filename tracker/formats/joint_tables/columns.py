@@ -82,7 +82,7 @@ def named_columns(table: Delimited) -> Columns:
     if not points or len(units) != 1:
         raise FormatError(
             f"{where}: expected columns NAME_x, NAME_y, NAME_z of 1 to {MAX_NAMES} points in one unit, found "
-            f"{quoted(cells[:4])}; export positions of joints"
+            f"{quoted(cells[:4])}; export positions of joints as one of the tables that docs/observations.md lists"
         )
     others = {c: i for i, c in reversed([*enumerate(lower)]) if i not in dict(found)}
     time, unit = next(((i, m["unit"]) for c, i in others.items() if (m := _TIME.fullmatch(c))), (None, None))
