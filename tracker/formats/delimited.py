@@ -65,7 +65,7 @@ def _separator(lines: Iterable[str]) -> str:
 
 def _rows(where: str, separator: str, lines: Iterable[str]) -> Iterator[TableLine]:
     for number, line in enumerate(lines, 1):
-        if line.startswith("#"):
+        if line.startswith(("#", "sep=")):  # a comment, or Excel's name for the separator
             continue
         try:
             cells = next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)

@@ -93,7 +93,8 @@ def _of_people(
     names = [same_form(table.person).casefold() for _, table in found]
     wanted = [same_form(person).casefold() for person in request.people]
     notes = []
-    if {*wanted} <= {*names} and len({*names}) == len(names):
+    is_named = len({*names}) == len(names)
+    if is_named and {*wanted} <= {*names}:
         left_out = [table.person for (_, table), name in zip(found, names, strict=True) if name not in wanted]
         notes = [f"the points of {', '.join(left_out)} are left out"] * bool(left_out)
         found = [found[names.index(name)] for name in wanted]
@@ -106,9 +107,12 @@ def _of_people(
         if len(found) > len(session.people):
             raise SessionError(f"{problem}; make a session of as many people, or export one person alone")
         raise SessionError(problem, Remedy("name_people_of_files"))
-    elif any(names):
-        pairs = zip(found, request.people, strict=True)
-        notes = [f"{path.name}: {table.person} is taken for {person}" for (path, table), person in pairs]
+    else:
+        free = [i for i, name in enumerate(names) if not (is_named and name in wanted)]
+        order = [names.index(name) if is_named and name in names else free.pop(0) for name in wanted]
+        others = [(found[i], person) for i, person in zip(order, request.people, strict=True) if names[i] not in wanted]
+        notes = [f"{path.name}: {table.person} is taken for {p}" for (path, table), p in others if table.person]
+        found = [found[i] for i in order]
     first_path, first = found[0]
     for path, table in found:
         if path != first_path and table.names != first.names:

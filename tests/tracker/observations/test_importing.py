@@ -272,6 +272,15 @@ def test_people_of_one_file_in_order(tmp_path):
         planned(make_session(tmp_path / "t", N, people=("person",)), path)
 
 
+def test_a_person_whom_the_file_names_is_nobody_else(tmp_path):
+    path = write_joints("people", tmp_path, BODY_25.points, np.stack([TRUTH, TRUTH + 0.2]))
+    found = planned(make_session(tmp_path / "s", N, people=("ben", "carl")), path)
+    ben, carl = np.moveaxis(found.observations.joints.joints_world, 1, 0)
+    assert np.abs(ben - TRUTH - 0.2).max() < 1e-5
+    assert np.abs(carl - TRUTH).max() < 1e-5
+    assert found.observations.notes == ("a.csv: ann is taken for carl",)
+
+
 def test_our_own_tables_of_motion_are_read_back(tmp_path):
     session = make_session(tmp_path / "s", N, people=("ann", "ben"))
     columns = [f"{name}.{what}_mm" for name in BODY_25.points for what in ("x", "y", "z", "error")]

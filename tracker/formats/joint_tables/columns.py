@@ -12,6 +12,7 @@ from typing import TypeAlias
 from tracker.errors import FormatError
 from tracker.formats.delimited import Delimited, TableLine
 from tracker.formats.number_rows import MAX_NAMES
+from tracker.formats.trc import METRES_BY_WORD
 from tracker.validation import quoted
 
 Triple: TypeAlias = tuple[int, int, int]
@@ -81,14 +82,23 @@ def named_columns(table: Delimited) -> Columns:
     if not points or len(units) != 1:
         raise FormatError(
             f"{where}: expected columns NAME_x, NAME_y, NAME_z of 1 to {MAX_NAMES} points in one unit, found "
-            f"{quoted(cells[:4])}; export positions of joints"
+            f"{quoted(cells[:4])}; export positions of joints as one of the tables that docs/observations.md lists"
         )
     others = {c: i for i, c in reversed([*enumerate(lower)]) if i not in dict(found)}
     time, unit = next(((i, m["unit"]) for c, i in others.items() if (m := _TIME.fullmatch(c))), (None, None))
     frame, person = (next((others[c] for c in names if c in others), None) for names in (_FRAMES, _PEOPLE))
     groups = tuple(others[c] for c in _GROUPS if c in others and name is not None)
     second = 1000.0 ** -_SECONDS.index(unit) if unit else None
-    return Columns(points, frame, time, units.pop(), "", second, person, name, groups, len(cells))
+    begun = next(table.rows, None)  # perhaps a row of units
+    below = {cell.lower().strip("()[]") for i, cell in enumerate(begun.cells if begun else ()) if i in dict(found)}
+    if below < {*METRES_BY_WORD} and len(below) == 1:
+        units, begun = below, None
+    notes: tuple[str, ...] = ()
+    if time is not None and begun is not None and ":" in "".join(begun.cells[time : time + 1]):
+        time, notes = None, (f"its column {cells[time]} has clock times, which are left out",)
+    return Columns(
+        points, frame, time, units.pop(), "", second, person, name, groups, len(cells), begun=begun, notes=notes
+    )
 
 
 def stacked_columns(table: Delimited) -> Columns:
