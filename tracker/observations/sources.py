@@ -93,7 +93,7 @@ def numbered_groups(files: Sequence[Found], cameras: Sequence[str]) -> list[File
                     f"expected the number of the picture in the file's name, as in CAMERA_000000000012_keypoints.json, "
                     f"found {path.name}; rename it or leave it out"
                 )
-            camera = _camera_of((name.label, *folder_labels(path, root)[1:]), cameras)
+            camera = _camera_of(_picture_labels([name], path, root, cameras), cameras)
             group = groups.setdefault((path.parent, camera or name.label), {})
             if name in group:
                 raise FormatError(
@@ -104,9 +104,19 @@ def numbered_groups(files: Sequence[Found], cameras: Sequence[str]) -> list[File
     for group in groups.values():
         pictures = tuple(sorted(group, key=lambda picture: (picture.number, picture.label)))
         first, root = group[pictures[0]]
-        labels = (*dict.fromkeys(p.label for p in pictures), *folder_labels(first, root)[1:])
+        labels = _picture_labels(pictures, first, root, cameras)
         out.append(FileGroup(tuple(group[p][0] for p in pictures), labels, root, pictures))
     return out
+
+
+def _picture_labels(pictures: Sequence[PictureName], path: Path, root: Path, cameras: Sequence[str]) -> tuple[str, ...]:
+    """Return the names after which the camera of pictures in a folder may be called, best first.
+
+    A label without letters may be the number of an object: the folder of a camera comes first.
+    """
+    own, folders = dict.fromkeys(p.label for p in pictures), folder_labels(path, root)[1:]
+    has_letters = any(character.isalpha() for label in own for character in label)
+    return (*own, *folders) if has_letters or not {*folders[:1]} & {*cameras} else (*folders, *own)
 
 
 def videos_of_footage(groups: Sequence[FileGroup], footage: Mapping[str, Path]) -> list[bool]:

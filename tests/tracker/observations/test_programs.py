@@ -24,6 +24,7 @@ from tracker.observations.joints import observed_joints
 from tracker.observations.readers import FORMATS as FORMATS_BY_NAME
 from tracker.observations.readers import PICTURE_FORMATS, UNREAD, find_files, markdown_table
 from tracker.observations.request import ImportRequest
+from tracker.observations.sources import match_cameras, numbered_groups
 
 N = 8
 TRUTH = walking(N)
@@ -149,6 +150,17 @@ def test_one_object_for_each_picture_needs_no_values(tmp_path):
             image_of(masks[k, v] * 255).save(tmp_path / "m" / camera / f"{k:06d}_0.png")
     plan = plan_import(session, ImportRequest("sam", (tmp_path / "m",), ("ann",)))
     assert (plan.problems, plan.notes) == ((), ())
+
+
+def test_an_object_with_the_number_of_a_camera(tmp_path):
+    """Cameras are called 0 and 1, and so are objects; the names of all cameras may also be in one folder."""
+    names = ("0", "1")
+    files = [(tmp_path / camera / f"{k:06d}_0.png", tmp_path) for camera in names for k in range(3)]
+    groups = numbered_groups(files, names)
+    assert match_cameras([(g.labels, g.place) for g in groups], names, {}) == ["0", "1"]
+    files = [(tmp_path / f"{camera}_{k:06d}.png", tmp_path) for camera in names for k in range(3)]
+    groups = numbered_groups(files, names)
+    assert match_cameras([(g.labels, g.files[0]) for g in groups], names, {}) == ["0", "1"]
 
 
 @pytest.mark.parametrize("program", ["easymocap", "mmpose pictures", "yolo"])

@@ -60,7 +60,7 @@ def read_easymocap(path: Path) -> list[PicturePerson]:
     Raises:
         FormatError: the file is malformed.
     """
-    found = check(_json(path, "EasyMocap"), _EasyMocapPicture, f"EasyMocap file {path}", FormatError)
+    found = check(read_json(path, text_of("EasyMocap")), _EasyMocapPicture, f"EasyMocap file {path}", FormatError)
     return [PicturePerson(triples(person.keypoints)) for person in found.annots]
 
 
@@ -71,7 +71,7 @@ def read_mmpose_picture(path: Path) -> list[PicturePerson]:
         FormatError: the file is malformed.
     """
     where = f"mmpose file {path}"
-    found = check(_json(path, "mmpose"), Annotated[list[_Instance], _OF_PEOPLE], where, FormatError)
+    found = check(read_json(path, text_of("mmpose")), Annotated[list[_Instance], _OF_PEOPLE], where, FormatError)
     return [_mmpose_person(person, where) for person in found]
 
 
@@ -81,7 +81,7 @@ def read_mmpose_video(path: Path) -> PictureTable:
     Raises:
         FormatError: the file is malformed, or has a picture twice.
     """
-    where, data = f"mmpose file {path}", _json(path, "mmpose")
+    where, data = f"mmpose file {path}", read_json(path, text_of("mmpose"))
     found = check({"instance_info": data} if isinstance(data, list) else data, _MmposeVideo, where, FormatError)
     people = {f.frame_id: [_mmpose_person(person, where) for person in f.instances] for f in found.instance_info}
     if len(people) < len(found.instance_info):
@@ -113,7 +113,7 @@ def read_yolo(path: Path) -> list[PicturePerson]:
     found = []
     for number, line in enumerate(read_lines(path, text_of("YOLO")), 1):
         if line.strip():
-            values = _numbers(line.split(), f"YOLO file {path}, line {number}")[len(_BOX) :]
+            values = parse_numbers(line.split(), f"YOLO file {path}, line {number}")[len(_BOX) :]
             n_points = len(values) // 3
             if not 0 < n_points <= MAX_NAMES or len(found) >= MAX_PEOPLE:
                 raise FormatError(
@@ -160,7 +160,7 @@ def read_sleap_csv(path: Path) -> PictureTable:
             continue
         if len(cells) != len(head):
             raise FormatError(f"{here}: expected {len(head)} columns, found {len(cells)}; export it again")
-        picture, *values = _numbers([cells[i] or "nan" for i in at], here)
+        picture, *values = parse_numbers([cells[i] or "nan" for i in at], here)
         if not (picture % 1 == 0 and 0 <= picture <= MAX_FRAMES):
             raise FormatError(f"{here}: expected a whole number as frame_idx, found {picture:g}; export it again")
         points = np.reshape(values, (-1, 3))
@@ -196,19 +196,18 @@ def _cells(line: str, where: str) -> list[str]:
         raise FormatError(f"{where}: {error}; export it again") from error
 
 
-def _numbers(cells: Sequence[str], where: str) -> list[float]:
-    """Return numbers of a table; `nan` stands for a missing one."""
+def parse_numbers(cells: Sequence[str], where: str) -> list[float]:
+    """Return numbers of a table; `nan` stands for a missing one.
+
+    Raises:
+        FormatError: one is none, or too large; `where` names its place.
+    """
     out = []
     for cell in cells:
         try:
-            value = float(cell)
+            out.append(float(cell))
         except ValueError as error:
             raise FormatError(f"{where}: {not_a_number(cell)}") from error
-        if abs(value) > MAX_NUMBER:
-            raise FormatError(f"{where}: expected numbers within {MAX_NUMBER:g}, found {value:g}; correct it")
-        out.append(value)
+    if wrong := next((value for value in out if abs(value) > MAX_NUMBER), None):
+        raise FormatError(f"{where}: expected numbers within {MAX_NUMBER:g}, found {wrong:g}; correct it")
     return out
-
-
-def _json(path: Path, program: str) -> Any:
-    return read_json(path, text_of(program))

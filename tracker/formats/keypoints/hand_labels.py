@@ -10,12 +10,13 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.keypoints.coco_reading import CocoPicture, images_by_camera
+from tracker.formats.keypoints.detections import parse_numbers
 from tracker.formats.keypoints.openpose import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
 from tracker.formats.number_rows import MAX_NAMES, check_size
 from tracker.formats.plain_data import parse_xml
 from tracker.text_files import read_json, read_text
-from tracker.validation import MAX_FRAMES, MAX_NUMBER, MAX_SIDE_PX, Name, check, quoted
+from tracker.validation import MAX_FRAMES, MAX_SIDE_PX, Name, check, quoted
 
 Tables = list[tuple[tuple[str, ...], PictureTable]]
 """For each camera the names that it may have, best first, and its key points."""
@@ -131,14 +132,9 @@ def _add(points: _Points, name: str, place: tuple[float, float], where: str) -> 
 
 def _place(point: ElementTree.Element, where: str) -> tuple[float, float]:
     text = point.get("points", "")
-    try:
-        x, y = (float(number) for number in text.split(","))
-    except ValueError as error:
-        raise FormatError(
-            f"{where}: expected x and y of a point, found {quoted(text)}; label points one by one"
-        ) from error
-    if not max(abs(x), abs(y)) <= MAX_NUMBER:
-        raise FormatError(f"{where}: expected a finite number within {MAX_NUMBER:g}, found {quoted(text)}; correct it")
+    if text.count(",") != 1 or "nan" in text.lower():
+        raise FormatError(f"{where}: expected x and y of a point, found {quoted(text)}; label points one by one")
+    x, y = parse_numbers(text.split(","), where)
     return x, y
 
 
@@ -159,18 +155,13 @@ def _tables(images: Sequence[CocoPicture], people: Mapping[int, Mapping[str, _Po
         )
     check_size((len(people), most, len(names), 3), where)
     out = []
-    for labels, own in images_by_camera([i for i in images if people.get(_id(i))], where).items():
+    for labels, own in images_by_camera([i for i in images if people.get(int(i.id))], where).items():
         sizes = {(i.width, i.height) for i in own.values() if i.width and i.height}
         if len(sizes) > 1:
             raise FormatError(f"{where}: expected images of one size, found {sorted(sizes)[:3]}; export them apart")
-        seen = {n: [_person(points, names) for points in people[_id(image)].values()] for n, image in own.items()}
+        seen = {n: [_person(points, names) for points in people[int(image.id)].values()] for n, image in own.items()}
         out.append((labels, table_of_people(seen, where, names, size=next(iter(sizes), None), is_by_hand=True)))
     return out
-
-
-def _id(image: CocoPicture) -> int:
-    assert isinstance(image.id, int)
-    return image.id
 
 
 def _person(points: _Points, names: Sequence[str]) -> PicturePerson:
