@@ -173,7 +173,8 @@ _IN_SPACE = "see [Joints in space](#joints-in-space)"
 
 PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
     "openpose": ObservationLayout(
-        "OpenPose, Pose2Sim", f"a `.json` {_PICTURE}", "`people`", _has("people"), _by_picture(read_openpose)
+        "OpenPose JSON", f"a `.json` {_PICTURE}; of Pose2Sim too", "`people`",
+        _has("people"), _by_picture(read_openpose),
     ),
     "easymocap": ObservationLayout(
         "EasyMocap", f"a `.json` {_PICTURE}", "`annots`", _has("annots"), _by_picture(detections.read_easymocap)
@@ -195,7 +196,7 @@ PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
         _is_json(hand_labels.is_label_studio), _by_cameras(hand_labels.read_label_studio),
     ),
     "coco": ObservationLayout(
-        "COCO, as of Roboflow", _ALL, "`images` and `annotations`, or a list of results",
+        "COCO", f"{_ALL}; of Roboflow too", "`images` and `annotations`, or a list of results",
         _is_json(lambda data: is_coco(data) and (holds(data, "keypoints") or not holds(data, "segmentation"))),
         _by_cameras(read_coco),
     ),
@@ -233,7 +234,7 @@ SPACE_FORMATS: Mapping[str, ObservationLayout[Scenes]] = {
 have the given rate, 1/s. Each returns the points of each person with the file or folder that they are from."""
 MASK_FORMATS: Mapping[str, ObservationLayout[list[MaskFiles]]] = {
     "masks": ObservationLayout(
-        "masks", "a `.png` for each picture, or for each object in it, in a folder for each camera: `cam1/000012.png`",
+        "masks in PNG", "a `.png` for each picture, or for each object in it: `CAMERA/000012.png`",
         _END, _ends(".png"), _read_png,
     ),
     "coco masks": ObservationLayout(
