@@ -67,8 +67,9 @@ def read_text(path: Path, kind: TextKind) -> str:
         TrackerError: of the kind's type; the file is missing, too large, or not text.
     """
     with _reading(path, kind), _open(path) as file:
-        _check_size(os.fstat(file.fileno()).st_size, path, kind)
-        data = file.read(kind.max_bytes + 1)  # a pipe does not know its size
+        size = os.fstat(file.fileno()).st_size
+        _check_size(size, path, kind)
+        data = file.read((size or kind.max_bytes) + 1)  # a pipe does not know its size
         _check_size(len(data), path, kind)
         encoding = _encoding_of(data)
         try:

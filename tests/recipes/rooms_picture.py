@@ -55,7 +55,7 @@ HOUSE = {
         ["contours", "images", "store"],
         ["session"],
         ["footage", "calibrations", "motion"],
-        ["formats/interchange", "formats/keypoints"],
+        ["formats/interchange", "formats/keypoints", "formats/joint_tables"],
         ["formats"],
         ["body"],
         ["geometry"],

@@ -15,6 +15,7 @@ ROOMS = [
     "tracker.body",
     "tracker.motion",
     "tracker.formats",
+    "tracker.formats.joint_tables",
     "tracker.formats.keypoints",
     "tracker.formats.interchange",
     "tracker.calibrations",

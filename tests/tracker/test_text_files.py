@@ -13,7 +13,16 @@ from pathlib import Path
 import pytest
 
 from tracker.errors import SessionError
-from tracker.text_files import MAX_NESTING, TextKind, parse_toml, read_json, read_lines, read_text, read_toml
+from tracker.text_files import (
+    MAX_NESTING,
+    TABLE_BYTES,
+    TextKind,
+    parse_toml,
+    read_json,
+    read_lines,
+    read_text,
+    read_toml,
+)
 
 KIND = TextKind("odd file", 1_000_000, SessionError, "mend it")
 
@@ -202,3 +211,12 @@ def test_the_largest_files_take_little_longer_than_ordinary_ones(text):
     """At most twice as long here; a search that starts again at each character takes hundreds of times as long."""
     assert len(text) <= KIND.max_bytes
     assert seconds(text) < 10 * plain_seconds(KIND.max_bytes)
+
+
+def test_a_small_file_takes_little_memory_whatever_its_kind_allows(tmp_path):
+    (tmp_path / "a.json").write_text("{}")
+    tracemalloc.start()
+    assert read_text(tmp_path / "a.json", TextKind("table", TABLE_BYTES, SessionError)) == "{}"
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1_000_000

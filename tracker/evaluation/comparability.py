@@ -55,9 +55,9 @@ def distance_note(
     in_file = (truth @ axes_matrix(axes))[:, None]  # the inverse of a rotation is its transpose
     rate, step = estimated.rate, gcd(*np.diff(frames).tolist()) or 1
     at = np.asarray(frames[0] if len(frames) else 0) + step * np.arange(len(frames))
-    read = ReadPoints(
-        names, in_file, at, (bones(known).stature,), floor_plane(up, None).normal, rate, PosedPerson(known)
-    )
+    vertical, stature = floor_plane(up, None).normal, bones(known).stature
+    stature = stature if np.isfinite(stature) else DEFAULT_HEIGHT_M
+    read = ReadPoints(names, in_file, at, (stature,), vertical, rate, PosedPerson(known))
     if apart <= APART_M:
         return _lag_note(read, own)
     why, remedy = _explanation(read, own, estimate[both], truth[both])

@@ -11,6 +11,7 @@ __all__ = [
     "bvh_reading",
     "c3d",
     "camera_section",
+    "delimited",
     "exact_text",
     "file_axes",
     "file_names",
@@ -23,7 +24,6 @@ __all__ = [
     "opensim_model",
     "opensim_mot",
     "plain_data",
-    "points_csv",
     "pose_csv",
     "trc",
 ]

@@ -15,6 +15,8 @@ from tracker.validation import MAX_FRAMES, quoted
 
 MAX_VALUES = 40_000_000
 """Largest number of values of a table, 320 MB: an hour of 30 points at 120 Hz."""
+MAX_TIME = float(np.iinfo(np.int64).max)
+"""Largest time of a file in any unit: Unix time in nanoseconds, which programs hold in 64 bits."""
 MAX_NAMES = 2000
 """Largest number of points or columns that the head of a table names: some twenty bodies of 100 values."""
 _MISSING = {
@@ -100,6 +102,26 @@ class NumberRows:
         return row + [np.nan] * (self._n_columns - len(row))
 
     def table(self, limit: float, limits: Mapping[int, float] | None = None) -> tuple[NDArray[np.int64], Array]:
+        """Return numbers as `numbers` does, of rows whose frames rise.
+
+        Raises:
+            FormatError: as `numbers` does, or the frames do not rise.
+        """
+        frames, values = self.numbers(limit, limits)
+        falls = np.flatnonzero(np.diff(frames) <= 0)
+        if len(falls):
+            row = int(falls[0]) + 1
+            raise FormatError(
+                f"{self.place(row)}: expected frame numbers that rise from row to row, found {frames[row]} after "
+                f"{frames[row - 1]}; give each person or take a file of its own"
+            )
+        return frames, values
+
+    def place(self, row: int) -> str:
+        """Return the file and line of a row, for messages."""
+        return f"{self._where}, line {self._lines[row]}"
+
+    def numbers(self, limit: float, limits: Mapping[int, float] | None = None) -> tuple[NDArray[np.int64], Array]:
         """Return the frame numbers, (n,), and the other columns, (n, n_columns - 1), which the caller may change.
 
         Args:
@@ -107,19 +129,12 @@ class NumberRows:
             limits: other ones of some columns, by their number from 1.
 
         Raises:
-            FormatError: there is no row, the frames do not rise, or a value is infinite, beyond its limit, or missing
-                where it is required.
+            FormatError: there is no row, or a value is infinite, beyond its limit, or missing where it is required.
         """
         if not self._lines:
             raise FormatError(f"{self._where} has no rows of numbers; export it again")
         table = np.frombuffer(self._values).reshape(len(self._lines), self._n_columns)
         frames, values = table[:, 0].astype(np.int64), table[:, 1:]
-        falls = np.flatnonzero(np.diff(frames) <= 0)
-        if len(falls):
-            raise FormatError(
-                f"{self._where}, line {self._lines[int(falls[0]) + 1]}: expected frame numbers that rise from row to "
-                "row; sort the rows and remove doubles"
-            )
         for i, column in enumerate(values.T, 2):  # by column: a mask of all would take much memory
             most = (limits or {}).get(i, limit)
             wrong = ~(np.abs(column) <= most)
@@ -128,7 +143,7 @@ class NumberRows:
             if wrong.any():
                 row = int(np.argmax(wrong))
                 raise FormatError(
-                    f"{self._where}, line {self._lines[row]}, column {i}: expected a finite number within {most:g}, "
+                    f"{self.place(row)}, column {i}: expected a finite number within {most:g}, "
                     f"found {column[row]:g}; correct it"
                 )
         return frames, values

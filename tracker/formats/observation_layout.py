@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from tracker.errors import FormatError
+from tracker.formats.delimited import head_cells
 from tracker.text_files import TABLE_BYTES, TextKind, read_json, read_lines
 
 _TEXT = TextKind("file", TABLE_BYTES, FormatError)
@@ -22,6 +23,11 @@ class Sample:
 
     path: Path
 
+    @property
+    def suffix(self) -> str:
+        """End of its name, in lower case: `.json`."""
+        return self.path.suffix.lower()
+
     @cached_property
     def head(self) -> tuple[str, ...]:
         """First lines, without their ends; none if the file is no text."""
@@ -29,6 +35,11 @@ class Sample:
             return tuple(islice(read_lines(self.path, _TEXT), _HEAD_LINES))
         except FormatError:
             return ()
+
+    @cached_property
+    def cells(self) -> list[list[str]]:
+        """Cells of the first lines of a delimited table that are not blank."""
+        return head_cells(self.head)
 
     @cached_property
     def data(self) -> Any:
@@ -50,7 +61,12 @@ class ObservationLayout(Generic[T]):
     recognized_by: str
     """Content by which it is recognized, for documents."""
     recognizes: Callable[[Sample], bool]
-    read: Callable[..., T] | None = None
+    reader: Callable[..., T] | None = None
     """Reads it; None for a layout that is known by name alone."""
     instead: str = ""
     """For a layout that is not read: the file to export instead, as the end of a sentence."""
+
+    def read(self, *arguments: Any) -> T:
+        """Read files; the arguments are those of its table."""
+        assert self.reader is not None, "a layout that is not read is refused before"
+        return self.reader(*arguments)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
 from tracker.formats.exact_text import exact_text, replace_cells
-from tracker.formats.number_rows import MAX_NAMES, NumberRows, not_a_number
+from tracker.formats.number_rows import MAX_NAMES, MAX_TIME, NumberRows, not_a_number
 from tracker.geometry.arrays import Array
 from tracker.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, FrameRate, check, quoted
@@ -38,8 +38,6 @@ METRES_BY_WORD = {
 _KIND = TextKind("TRC file", TABLE_BYTES, FormatError, "export it again")
 _Line: TypeAlias = tuple[int, str]
 """Number of a line in its file, from 1, and its text with its end."""
-_MAX_TIME = 1e13
-"""Largest time of a file, s: Unix time in milliseconds, which is named as a contradiction to DataRate, is some 2e12."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +58,8 @@ class MarkerTable:
     """OrigDataStartFrame of a file; None if it has none."""
     notes: tuple[str, ...] = ()
     """Sentences on what is odd about a file, and on how its rows were placed at frames of a session."""
+    person: str = ""
+    """Name of the person in the file; empty if it has none."""
 
     def __post_init__(self) -> None:
         n, m = len(self.frames), len(self.names)
@@ -88,17 +88,22 @@ def read_trc(path: str | Path) -> MarkerTable:
     frames, values = _read_rows(lines, where, 2 + 3 * len(names), promised)
     values[:, 1:] *= scale  # the three-dimensional view would be scaled in a copy
     points = values[:, 1:].reshape(len(frames), len(names), 3)
-    # A point with a missing coordinate is missing.
-    points[np.isnan(points).any(axis=-1)] = np.nan
     notes = list[str]()
     if promised is not None and len(frames) < promised:
         notes.append(f"its header promises {promised} rows, and it has {len(frames)}: check that it is complete")
-    is_zero = (points == 0).all(axis=-1)
-    if is_zero.any() and not is_zero.all():
-        points[is_zero] = np.nan
-        notes.append(f"{is_zero.sum()} of its points lie at 0, 0, 0 exactly, as missing ones: they are left out")
+    notes += mask_missing(points)
     origin = _whole(header.get("origdatastartframe"))
     return MarkerTable(names, frames, values[:, 0], points, rate, origin, tuple(notes))
+
+
+def mask_missing(points: Array) -> list[str]:
+    """Make points, (n, m, 3), NaN that miss a coordinate or lie at 0, 0, 0; return the note on the latter."""
+    points[np.isnan(points).any(axis=-1)] = np.nan
+    is_zero = (points == 0).all(axis=-1)
+    if not is_zero.any() or is_zero.all():
+        return []
+    points[is_zero] = np.nan
+    return [f"{is_zero.sum()} of its points lie at 0, 0, 0 exactly, as missing ones: they are left out"]
 
 
 def write_trc(
@@ -205,7 +210,7 @@ def _read_rows(
                 "end the line if it is complete"
             )
         rows.add(text, number)  # some writers end rows with tabs, some drop them
-    return rows.table(MAX_NUMBER, {2: _MAX_TIME})
+    return rows.table(MAX_NUMBER, {2: MAX_TIME})
 
 
 def _rate(text: str | None, where: str) -> float:
@@ -241,6 +246,12 @@ def _whole(text: str | None) -> int | None:
     if isinstance(number, float) and number.is_integer() and abs(number) <= MAX_FRAMES:
         return int(number)
     return None
+
+
+def stated_rate(text: str) -> float | None:
+    """Return the frame rate that a header states; None if it states none."""
+    number = _number(text)
+    return number if isinstance(number, float) and 0 < number <= MAX_FRAMES else None
 
 
 def _number(text: str | None) -> float | str | None:

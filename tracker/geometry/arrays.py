@@ -1,5 +1,6 @@
 """Type aliases of arrays, errors of files of arrays, and how much masks overlap."""
 
+import tokenize
 import zipfile
 import zlib
 
@@ -16,7 +17,10 @@ Image = NDArray[np.uint8]
 """Pixels, (H, W) or (H, W, 3) in BGR, as each function states."""
 Mask = NDArray[np.bool_]
 """Whether each pixel belongs to something, (H, W)."""
-DAMAGED_ARRAYS = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError)
+DAMAGED_ARRAYS = (
+    OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, SyntaxError, MemoryError,
+    tokenize.TokenError,
+)  # fmt: skip
 """Errors of `numpy.load` on a file that is missing, damaged, encrypted or compressed in a way that is not known."""
 
 

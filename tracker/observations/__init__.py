@@ -13,6 +13,7 @@ __all__ = [
     "observed",
     "placing",
     "plans",
+    "readers",
     "request",
     "shifts",
     "sides",

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.errors import FormatError, Remedy, SessionError
+from tracker.errors import FormatError
 from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_size, read_joint_map
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.number_rows import check_size
@@ -17,11 +17,12 @@ from tracker.observations.placing import place_pictures, rescaled
 from tracker.observations.plans import ImportPlan, MaskPlan, ViewPreview
 from tracker.observations.readers import MASK_FORMATS, PICTURE_FORMATS, find_files
 from tracker.observations.request import ImportRequest, refuse_choices
-from tracker.observations.sources import FileGroup, Found, match_cameras, no_camera, source_files
+from tracker.observations.sources import FileGroup, Found, match_cameras, no_camera, source_files, videos_of_footage
 from tracker.observations.space import read_space
 from tracker.observations.stored import new_folder, save_observations
 from tracker.observations.stored_masks import store_masks
 from tracker.session.session import Session
+from tracker.validation import Name, check
 
 
 def plan_import(session: Session, request: ImportRequest, calibrated: bool = True) -> ImportPlan | MaskPlan:
@@ -68,7 +69,10 @@ def store_import(session: Session, plan: ImportPlan | MaskPlan) -> Session:
 def _plan_of_pictures(
     session: Session, request: ImportRequest, format_name: str, files: list[Found], calibrated: bool
 ) -> ImportPlan:
-    groups = PICTURE_FORMATS[format_name].read(files)
+    groups = PICTURE_FORMATS[format_name].read(files, session.camera_names)
+    is_own = videos_of_footage([g for g, _ in groups], {c.camera.name: c.footage for c in session.cameras})
+    others = [str(g.video) for (g, _), own in zip(groups, is_own, strict=True) if not own]
+    groups = [pair for pair, own in zip(groups, is_own, strict=True) if own]
     names = match_cameras([(g.labels, g.place) for g, _ in groups], session.camera_names, request.cameras)
     unmatched = [g for (g, _), name in zip(groups, names, strict=True) if not name]
     problems = [no_camera(session.camera_names, g) for g in unmatched]
@@ -93,6 +97,8 @@ def _plan_of_pictures(
         problems.append(disagreement)
     notes += [f"{name}: {note}" for name, table in tables.items() for note in table.notes]
     notes += _notes(tables)
+    if others:
+        notes.append(f"points of videos of other footage were left out: {', '.join(others[:3])}")
     sources, by_path = source_files([(g, name) for (g, _), name in zip(groups, names, strict=True)])
     rows = np.unique(np.concatenate([f for f in frames.values()])).astype(np.float64)
     observations = ObservationSet(
@@ -104,7 +110,8 @@ def _plan_of_pictures(
 
 
 def _scaled(table: PictureTable, size: tuple[int, int], given: tuple[int, int] | None) -> PictureTable:
-    """Return points in the pixels of the camera, if they are said to be of pictures of another size."""
+    """Return points in the pixels of the camera, if they are said to be of pictures of another size, or are shares."""
+    given = (1, 1) if table.size == (1, 1) else given
     if given is None:
         return table
     points = table.points.copy()
@@ -121,9 +128,9 @@ def _with_confidence(table: PictureTable, confidence: float) -> PictureTable:
 
 
 def _with_certain_points(table: PictureTable) -> PictureTable:
-    """Return points that are certain where they alone state no confidence, as those that a person set."""
+    """Return points that are certain where a person set them, or where they alone state no confidence."""
     is_certain = table.is_found & np.isnan(table.points[..., 2])
-    if not table.has_confidence or not is_certain.any():
+    if not (table.has_confidence or table.is_by_hand) or not is_certain.any():
         return table
     points = table.points.copy()
     points[is_certain, 2] = 1.0
@@ -137,20 +144,22 @@ def _skeleton(
     """Return the names of the points, their convention, and what is wrong with it.
 
     Raises:
-        FormatError: cameras have different points, or the file of the map is malformed.
+        FormatError: cameras have different points, a name cannot be stored, or the file of the map is malformed.
     """
     given = read_joint_map(request.joint_map) if request.joint_map is not None else None
     filled = {name: t for name, t in tables.items() if t.points.shape[2]} or dict(tables)
     first, *others = filled
     for other in others:
         (one, n), (two, m) = ((filled[x].names, filled[x].points.shape[2]) for x in (first, other))
+        begins = [", ".join(found[:3])[:60] for found in (one, two)]
         if one != two or n != m:
             raise FormatError(
-                f"expected the same points in all views, found {n} ({', '.join(one[:3])}...) for camera '{first}' and "
-                f"{m} ({', '.join(two[:3])}...) for camera '{other}'; import files of one skeleton"
+                f"expected the same points in all views, found {n} ({begins[0]}...) for camera '{first}' and "
+                f"{m} ({begins[1]}...) for camera '{other}'; import files of one skeleton"
             )
     names, n_points = filled[first].names, filled[first].points.shape[2]
     where = f"the files of camera '{first}'"
+    check(list(names), list[Name], where, FormatError)
     numbered = names or tuple(f"point {i}" for i in range(n_points))
     try:
         if names:
@@ -232,20 +241,15 @@ def _preview(
 
 
 def _plan_of_space(session: Session, request: ImportRequest, format_name: str, files: list[Found]) -> ImportPlan:
-    if len(files) != len(request.people):
-        raise SessionError(
-            f"expected one file of points in space for each person ({', '.join(request.people)}), found {len(files)}",
-            Remedy("name_people_of_files"),
-        )
     placed, problems, notes = read_space(session, request, format_name, [path for path, _ in files])
-    groups = [(FileGroup((path,), (path.stem,), root), "") for path, root in files]
-    sources, by_path = source_files(groups)
+    files.sort(key=lambda found: placed.places.index(found[0]) if found[0] in placed.places else len(files))
+    sources, by_path = source_files([(FileGroup((path,), (path.stem,), root), "") for path, root in files])
     observations = ObservationSet(
         request.name, format_name, request.people, placed.joint_map, None, placed.joints, placed.row_frames, sources,
         tuple(notes), request.options,
     )  # fmt: skip
     views = []
-    for k, ((path, _), person) in enumerate(zip(files, request.people, strict=True)):
+    for k, (path, person) in enumerate(zip(placed.places, request.people, strict=True)):
         with_points = np.flatnonzero(np.isfinite(placed.joints.joints_world[:, k]).all(axis=-1).sum(axis=1))
         frames = (int(with_points[0]), int(with_points[-1])) if len(with_points) else None
         views.append(ViewPreview(person, path, len(placed.row_frames[k]), frames, 1))

@@ -26,7 +26,7 @@ def plan_masks(session: Session, request: ImportRequest, format_name: str, files
     Raises:
         FormatError: a file is malformed, or none is of a camera of the session.
     """
-    found = MASK_FORMATS[format_name].read(files)
+    found = MASK_FORMATS[format_name].read(files, session.camera_names)
     names = match_cameras([(m.group.labels, m.group.place) for m in found], session.camera_names, request.cameras)
     problems: list[TrackerError] = [
         no_camera(session.camera_names, m.group) for m, name in zip(found, names, strict=True) if not name

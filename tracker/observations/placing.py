@@ -21,7 +21,8 @@ def place_pictures(
 ) -> tuple[dict[str, IntArray], list[FormatError], list[str]]:
     """Return the frame of the session of each picture by camera, what contradicts the session, and notes.
 
-    A number counts the pictures of the footage, from 0 or from 1; the offset of a camera is taken off. With
+    A number counts the pictures of the footage, from 0 or from 1; the offset of a camera is taken off. Points that a
+    person set may be in some pictures alone. With
     `first_frame`, the lowest number of all cameras is that frame of the session, and equal numbers are one instant.
 
     Args:
@@ -53,10 +54,15 @@ def place_pictures(
     if first_frame is not None:
         frames = {name: table.numbers - lowest + first_frame for name, table in tables.items()}
         notes.append(f"picture {lowest} of the files was placed at frame {first_frame}, as chosen")
+        labels = {name: table for name, table in tables.items() if table.is_by_hand}
+        if labels and lowest != first_frame and not _wrong_lengths(labels, session, 0):
+            notes[-1] += ", though the numbers of the labels are those of the footage"
     else:
         base = _base(tables, session, lowest)
         if base:
             notes.append("the files count pictures from 1: number 1 is the first picture of the footage")
+        elif any(table.is_by_hand for table in tables.values()):
+            notes.append("labels were placed by the numbers of their pictures, of which 0 is the first of the footage")
         frames = {name: table.numbers - base - offsets[name] for name, table in tables.items()}
         problems += _wrong_lengths(tables, session, base)
     frames = {name: placed - late.get(name, 0) for name, placed in frames.items()}
@@ -109,7 +115,8 @@ def _wrong_lengths(tables: Mapping[str, PictureTable], session: Session, base: i
     lengths, problems = footage_lengths(session), []
     for name, table in tables.items():
         first, last = (int(table.numbers[0]), int(table.numbers[-1])) if len(table.numbers) else (0, -1)
-        if (first, last) == (base, base + lengths[name] - 1):
+        end = base + lengths[name] - 1
+        if (first, last) == (base, end) or (table.is_by_hand and base <= first <= last <= end):
             continue
         problems.append(
             FormatError(

@@ -3,11 +3,12 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import TypeAlias
 
 from tracker.errors import FormatError, Remedy
-from tracker.formats.keypoints.openpose import numbered_name
+from tracker.formats.keypoints.picture_names import PictureName, picture_names
 from tracker.observations.observed import SourceFile, checksum
 from tracker.session.matching import check_names
 from tracker.validation import same_form
@@ -26,6 +27,15 @@ class FileGroup:
     """Names after which the camera may be called, best first."""
     root: Path
     """Folder to which the paths of the stored files are relative."""
+    pictures: tuple[PictureName, ...] = ()
+    """For files with one picture each: the label and number of each, ascending by number. Several may have a number."""
+    video: Path | None = None
+    """Video that the points are of, as a file names it that may be of several; None for other files."""
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the pictures, each once, ascending."""
+        return sorted({picture.number for picture in self.pictures})
 
     @property
     def place(self) -> Path:
@@ -65,34 +75,74 @@ def folder_labels(path: Path, root: Path) -> tuple[str, ...]:
     return (path.stem, *folders)
 
 
-def numbered_groups(files: Sequence[Found]) -> list[FileGroup]:
-    """Group files with one picture each, by their folder and by the name before the number.
+def numbered_groups(files: Sequence[Found], cameras: Sequence[str]) -> list[FileGroup]:
+    """Group files with one picture each by their folder, and by the camera in their names or else the rest of them.
 
     Raises:
-        FormatError: a name has no number, or two of a group have the same.
+        FormatError: a name has no number, or two that differ in nothing else have the same.
     """
-    groups: dict[tuple[Path, str], dict[int, Found]] = {}
+    folders: dict[Path, list[Found]] = {}
     for path, root in files:
-        named = numbered_name(path.name)
-        if named is None:
-            raise FormatError(
-                f"expected the number of the picture in the file's name, as in CAMERA_000000000000_keypoints.json, "
-                f"found {path.name}; rename it or leave it out"
-            )
-        stem, number = named
-        group = groups.setdefault((path.parent, stem), {})
-        if number in group:
-            raise FormatError(
-                f"expected one file for each picture, found {group[number][0].name} and {path.name}; leave one out"
-            )
-        group[number] = (path, root)
+        folders.setdefault(path.parent, []).append((path, root))
+    groups: dict[tuple[Path, str], dict[PictureName, Found]] = {}
+    for some in folders.values():
+        names = picture_names([path.stem.removesuffix("_keypoints") for path, _ in some])
+        for (path, root), name in zip(some, names, strict=True):
+            if name is None:
+                raise FormatError(
+                    f"expected the number of the picture in the file's name, as in CAMERA_000000000012_keypoints.json, "
+                    f"found {path.name}; rename it or leave it out"
+                )
+            camera = _camera_of(_picture_labels([name], path, root, cameras), cameras)
+            group = groups.setdefault((path.parent, camera or name.label), {})
+            if name in group:
+                raise FormatError(
+                    f"expected one file for each picture, found {group[name][0].name} and {path.name}; leave one out"
+                )
+            group[name] = (path, root)
     out = []
-    for (_, stem), group in groups.items():
-        ordered = [group[n] for n in sorted(group)]
-        root = ordered[0][1]
-        labels = (stem, *folder_labels(ordered[0][0], root)[1:])
-        out.append(FileGroup(tuple(p for p, _ in ordered), labels, root))
+    for group in groups.values():
+        pictures = tuple(sorted(group, key=lambda picture: (picture.number, picture.label)))
+        first, root = group[pictures[0]]
+        labels = _picture_labels(pictures, first, root, cameras)
+        out.append(FileGroup(tuple(group[p][0] for p in pictures), labels, root, pictures))
     return out
+
+
+def _picture_labels(pictures: Sequence[PictureName], path: Path, root: Path, cameras: Sequence[str]) -> tuple[str, ...]:
+    """Return the names after which the camera of pictures in a folder may be called, best first.
+
+    A label without letters may be the number of an object: the folder of a camera comes first.
+    """
+    own, folders = dict.fromkeys(p.label for p in pictures), folder_labels(path, root)[1:]
+    has_letters = any(character.isalpha() for label in own for character in label)
+    return (*own, *folders) if has_letters or not {*folders[:1]} & {*cameras} else (*folders, *own)
+
+
+def videos_of_footage(groups: Sequence[FileGroup], footage: Mapping[str, Path]) -> list[bool]:
+    """Return whether each group is of the session, where a file holds the videos of several.
+
+    Of several videos of one camera it is the one whose path is most like that of the footage from its end on.
+
+    Args:
+        groups: files, perhaps with their videos.
+        footage: of each camera.
+    """
+    names = [_camera_of(group.labels, [*footage]) if group.video else "" for group in groups]
+    out = [True] * len(groups)
+    for camera, path in footage.items():
+        likeness = {i: _common_end(groups[i].video or path, path) for i, name in enumerate(names) if name == camera}
+        most = max(likeness.values(), default=0)
+        if list(likeness.values()).count(most) == 1:
+            for i, n in likeness.items():
+                out[i] = n == most
+    return out
+
+
+def _common_end(one: Path, other: Path) -> int:
+    """Return how many parts two paths have in common from their ends on; the suffix may differ."""
+    ends = [[path.stem, *(p.name for p in path.parents)] for path in (one, other)]
+    return len([*takewhile(lambda pair: pair[0].casefold() == pair[1].casefold(), zip(*ends, strict=False))])
 
 
 def match_cameras(
@@ -119,6 +169,11 @@ def match_cameras(
     for name in dict.fromkeys(n for n in found if n):
         if found.count(name) > 1:
             both = [str(places[i]) for i, n in enumerate(found) if n == name]
+            if len(set(both)) < len(both):
+                raise FormatError(
+                    f"{both[0]}: expected the pictures of camera '{name}' once, found those of several videos of its "
+                    "name; export those of this session alone"
+                )
             raise FormatError(
                 f"expected one file or folder for camera '{name}', found {' and '.join(both[:2])}",
                 Remedy("name_observed_camera", camera=name),

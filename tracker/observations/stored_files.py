@@ -9,7 +9,7 @@ from tracker.geometry.arrays import IntArray
 from tracker.observations.observed import ObservationSet
 from tracker.observations.placing import place_pictures
 from tracker.observations.readers import PICTURE_FORMATS
-from tracker.observations.sources import match_cameras
+from tracker.observations.sources import match_cameras, videos_of_footage
 from tracker.observations.stored import files_folder, source_path
 from tracker.session.session import Session
 
@@ -36,8 +36,10 @@ def stored_pictures(session: Session, observations: ObservationSet) -> list[Stor
     """
     of_path = {source_path(session, observations.name, s): s for s in observations.sources}
     root = files_folder(session, observations.name)
-    groups = PICTURE_FORMATS[observations.format].read([(path, root) for path in of_path])
-    labels = [() if of_path[g.files[0]].camera else g.labels for g, _ in groups]
+    groups = PICTURE_FORMATS[observations.format].read([(path, root) for path in of_path], session.camera_names)
+    is_own = videos_of_footage([g for g, _ in groups], {c.camera.name: c.footage for c in session.cameras})
+    pairs = zip(groups, is_own, strict=True)
+    labels = [g.labels if own and not of_path[g.files[0]].camera else () for (g, _), own in pairs]
     matched = match_cameras([(n, g.place) for n, (g, _) in zip(labels, groups, strict=True)], session.camera_names, {})
     cameras = [of_path[g.files[0]].camera or name for (g, _), name in zip(groups, matched, strict=True)]
     tables = {name: table for name, (_, table) in zip(cameras, groups, strict=True) if name}

@@ -139,7 +139,8 @@ async def test_the_worst_is_mended_and_the_files_differ_there_alone(page, sessio
     for source in session.cameras:
         name = f"{source.camera.name}/{source.camera.name}_{WRONG:012d}_keypoints.json"
         (tmp_path / "mended.json").write_bytes(back[name])
-        (before,), (after,) = read_openpose(files / name), read_openpose(tmp_path / "mended.json")
+        read = [read_openpose(path) for path in (files / name, tmp_path / "mended.json")]
+        before, after = (people[0].points for people in read)
         differ = {p for p, a, b in zip(BODY_25.points, before, after, strict=True) if not np.array_equal(a, b, True)}
         assert "LWrist" in differ
         assert differ <= {"LWrist", "LElbow", "LShoulder"}  # the arm of the drag

@@ -51,7 +51,7 @@ def test_points_are_where_the_footage_shows_them(tmp_path):
                 tmp_path / "o" / f"{camera.name}_json" / f"{camera.name}_{frame + 5:012d}_keypoints.json"
             )
             for one, (_, points) in zip(own, people.values(), strict=True):
-                np.testing.assert_array_equal(np.nan_to_num(one), points)
+                np.testing.assert_array_equal(np.nan_to_num(one.points), points)
             assert set(people) == {i for i in (0, 1) if frame in truth[i]}
             for i, (person, points) in people.items():
                 places = dict(zip(truth[i][frame].model.point_names, truth[i][frame].joint_centers_world, strict=True))

@@ -111,7 +111,7 @@ def test_mended_points_are_those_of_the_right_person(session, tmp_path):
     done = export_like(session, load_observations(session, "op"), tmp_path / "back")
     assert done.frames == (EDITED,)
     files = [sorted((tmp_path / folder / "cam0").glob("*.json")) for folder in ("k", "back")]
-    before, after = (np.array([read_openpose(file) for file in some]) for some in files)
+    before, after = (np.array([[p.points for p in read_openpose(file)] for file in some]) for some in files)
     moved = np.nan_to_num(np.abs(after - before)[..., :2]).max(axis=(2, 3))
     assert (moved[:, 0] == 0).all()  # ben stands first
     assert moved[EDITED, 1] > 3

@@ -5,9 +5,11 @@ import shutil
 import numpy as np
 import pytest
 from damaged_arrays import encrypted
+from joint_files import write_joints
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.errors import FormatError, SessionError
+from tracker.formats.motion_csv import MotionRow, write_motion_csv
 from tracker.formats.trc import write_trc
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints, triangulate_observations
@@ -245,6 +247,82 @@ def test_one_file_for_each_person(tmp_path):
     found = plan_import(session, request).observations
     assert np.abs(found.joints.joints_world[:, 0] - TRUTH).max() < 1e-6
     assert found.joints.people == ("ben", "ann")
+
+
+@pytest.mark.parametrize(("kind", "names"), [("people", ("ann", "ben")), ("c3d", ("Ann", "Ben"))])
+def test_people_of_one_file_are_known_by_name(tmp_path, kind, names):
+    session = make_session(tmp_path / "s", N, people=("BEN", "ann"))
+    path = write_joints(kind, tmp_path, BODY_25.points, np.stack([TRUTH, TRUTH + 0.2]))
+    found = planned(session, path)
+    assert not found.problems
+    ben, ann = np.moveaxis(found.observations.joints.joints_world, 1, 0)
+    assert np.abs(ann - TRUTH).max() < 1e-5
+    assert np.abs(ben - TRUTH - 0.2).max() < 1e-5
+    alone = plan_import(session, ImportRequest("one", (path,), ("BEN",)))
+    assert np.abs(alone.observations.joints.joints_world[:, 0] - TRUTH - 0.2).max() < 1e-5
+    assert alone.observations.notes == (f"the points of {names[0]} are left out",)
+
+
+def test_people_of_one_file_in_order(tmp_path):
+    path = write_joints("people", tmp_path, BODY_25.points, np.stack([TRUTH, TRUTH + 0.2]))
+    found = planned(make_session(tmp_path / "s", N, people=("one", "two")), path)
+    assert np.abs(found.observations.joints.joints_world[:, 1] - TRUTH - 0.2).max() < 1e-5
+    assert found.observations.notes == ("a.csv: ann is taken for one", "a.csv: ben is taken for two")
+    with pytest.raises(
+        SessionError, match=r"\(person\), found 2 people \(ann, ben\) in a.csv; make a session of as many"
+    ):
+        planned(make_session(tmp_path / "t", N, people=("person",)), path)
+
+
+def test_a_person_whom_the_file_names_is_nobody_else(tmp_path):
+    path = write_joints("people", tmp_path, BODY_25.points, np.stack([TRUTH, TRUTH + 0.2]))
+    found = planned(make_session(tmp_path / "s", N, people=("ben", "carl")), path)
+    ben, carl = np.moveaxis(found.observations.joints.joints_world, 1, 0)
+    assert np.abs(ben - TRUTH - 0.2).max() < 1e-5
+    assert np.abs(carl - TRUTH).max() < 1e-5
+    assert found.observations.notes == ("a.csv: ann is taken for carl",)
+
+
+def test_our_own_tables_of_motion_are_read_back(tmp_path):
+    session = make_session(tmp_path / "s", N, people=("ann", "ben"))
+    columns = [f"{name}.{what}_mm" for name in BODY_25.points for what in ("x", "y", "z", "error")]
+    rows = []
+    for person, points in zip(("ann", "ben"), (TRUTH, TRUTH + 0.2), strict=True):
+        for k, row in enumerate(points):
+            values = [x for x, y, z in row * 1000 for x in (x, y, z, 4.0)]
+            rows.append(MotionRow(person, k, k / 30, values=values if (person, k) != ("ben", 3) else ()))
+    write_motion_csv(tmp_path / "motion.csv", session.camera_names, columns, rows)
+    store_import(session, planned(session, tmp_path / "motion.csv"))
+    ann, ben = np.moveaxis(load_observations(session, "mp").joints.joints_world, 1, 0)
+    assert np.abs(ann - TRUTH).max() < 1e-6
+    assert np.isnan(ben[3]).all()
+    assert np.nanmax(np.abs(ben - TRUTH - 0.2)) < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["npy", "easymocap"])
+def test_joints_without_names_are_known_by_their_number(session, tmp_path, kind):
+    found = planned(session, write_joints(kind, tmp_path, BODY_25.points, TRUTH[None]), unit_m=1.0)
+    assert not found.problems
+    assert found.observations.joint_map.name == "BODY_25"
+    assert found.observations.point_names == BODY_25.points
+    other = planned(session, write_joints(kind, tmp_path / "b", range(23), TRUTH[None, :, :23]), unit_m=1.0)
+    assert "the number of points of a known skeleton" in problems(other)
+
+
+def test_numbered_points_that_appear_late_or_never(session, tmp_path):
+    points = TRUTH.copy()
+    points[:2, 0] = np.nan
+    points[:, 20] = np.nan
+    found = planned(session, write_joints("caliscope", tmp_path, BODY_25.points, points[None]), unit_m=1.0)
+    assert not found.problems
+    assert found.observations.point_names == BODY_25.points
+    assert np.nanmax(np.abs(found.observations.joints.joints_world[:, 0] - points)) < 1e-5
+
+
+def test_files_of_other_programs_are_named(session, tmp_path):
+    (tmp_path / "walk.fbx").write_bytes(b"Kaydara FBX Binary")
+    with pytest.raises(FormatError, match=r"is of FBX, which is not read; export BVH"):
+        planned(session, tmp_path / "walk.fbx")
 
 
 def test_views_with_different_points(session, tmp_path):

@@ -279,7 +279,7 @@ def test_a_file_with_both_holds_key_points_unless_masks_are_asked_for(session, t
 def test_pictures_beside_other_files_are_no_masks_unless_they_are_asked_for(session, tmp_path):
     folder = write_masks(tmp_path / "m", session.camera_names, MASKS)
     (folder / "labels.json").write_text("{}")
-    with pytest.raises(FormatError, match="COCO file"):
+    with pytest.raises(FormatError, match=r"labels\.json: expected key points, joints or masks of a program"):
         planned(session, folder)
     assert planned(session, folder, masks=True).format == "masks"
 

@@ -3,12 +3,14 @@
 import json
 import multiprocessing
 import random
+import shutil
 import subprocess
 import sys
 import tomllib
 import traceback
 import warnings
 
+import joint_files
 import numpy as np
 import pytest
 from mask_files import SIZE, person_masks, write_coco_masks, write_masks
@@ -21,6 +23,7 @@ from observed_files import (
     write_sleap,
 )
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
+from program_files import WRITERS
 
 from tracker.errors import TrackerError
 from tracker.footage.recording import read_mask
@@ -48,17 +51,31 @@ KINDS = {
     "csv": ("a.csv", None),
     "bvh": ("a.bvh", None),
     "c3d": ("a.c3d", "ezc3d"),
+    **{f"joints {kind}": (name, None) for kind, name in joint_files.KINDS.items() if kind != "wide"},
     "masks": ("m/cam1/cam1_000002.png", None),
     "coco polygon": ("c.json", None),
     "coco runs": ("c.json", None),
     "coco text": ("c.json", "pycocotools"),
+    "easymocap": ("f/annots/cam1/000002.json", None),
+    "mmpose": ("f/cam1.json", None),
+    "mmpose pictures": ("f/cam1/000002.json", None),
+    "alphapose": ("f/cam1/alphapose-results.json", None),
+    "roboflow": ("f/_annotations.coco.json", None),
+    "label studio": ("f/project-1.json", None),
+    "cvat images": ("f/cam1.xml", None),
+    "cvat video": ("f/cam1.xml", None),
+    "yolo": ("f/cam1/cam1_000002.txt", None),
+    "sleap csv": ("f/labels.v001.000_cam1.analysis.csv", None),
+    "eks": ("f/multicam_cam1_results.csv", None),
+    "hand labels": ("f/labeled-data/cam1/CollectedData_ann.csv", None),
+    "masks by object": ("m/cam1/mask_00002_obj1.png", None),
     "stored masks": ("masks.toml", None),
     "stored text": ("observations.toml", None),
     "stored numbers": ("points.npz", None),
 }
 """For each kind: the file that is mutated, and the package that it needs."""
-OF_JOINTS = ("trc", "c3d", "bvh", "csv")
-OF_MASKS = ("masks", "coco polygon", "coco runs", "coco text", "stored masks")
+OF_JOINTS = ("trc", "c3d", "bvh", "csv", *(kind for kind in KINDS if kind.startswith("joints ")))
+OF_MASKS = ("masks", "masks by object", "coco polygon", "coco runs", "coco text", "stored masks")
 APART = ("h5py", "sleap_io")
 """Packages that read in a process of their own."""
 SECONDS = 10.0
@@ -69,10 +86,21 @@ def write(kind, session, folder):
     """Write the files of a kind; return the path to import."""
     if kind in ("masks", "stored masks"):
         return write_masks(folder / "m", session.camera_names, person_masks(N, 4))
+    if kind == "masks by object":
+        for k in (1, 2):
+            write_masks(folder / f"m{k}", session.camera_names, person_masks(N, 4), f"mask_{{k:05d}}_obj{k}.png")
+        shutil.copytree(folder / "m2", folder / "m1", dirs_exist_ok=True)
+        return (folder / "m1").rename(folder / "m")
     if kind in OF_MASKS:
         return write_coco_masks(folder / "c.json", session.camera_names, person_masks(N, 4), kind.split()[1])
     points = seen(session, [TRUTH])
-    if kind == "openpose":
+    if kind.startswith("joints "):
+        n_points = 19 if kind == "joints panoptic" else 25
+        of_one = TRUTH[None, :, :n_points]
+        return joint_files.write_joints(kind.removeprefix("joints "), folder, BODY_25.points[:n_points], of_one)
+    if kind in WRITERS:
+        WRITERS[kind](folder / "f", session.camera_names, list(BODY_25.points), points)
+    elif kind == "openpose":
         write_openpose(folder / "k", session.camera_names, points)
     elif kind == "coco":
         write_coco_images(folder / "c.json", session.camera_names, BODY_25.points, points, "scores")
@@ -111,9 +139,7 @@ def read(kind, session, path, case):
         found = load_observations(session, "mp")
         observed_joints(found, [c.camera for c in session.cameras])
         return False
-    plan = plan_import(
-        session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=0.01 if kind in OF_JOINTS else None)
-    )
+    plan = plan_import(session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=_unit(kind)))
     if kind in OF_MASKS:
         if not plan.problems and case % 10 == 0:
             used = store_import(session, plan)
@@ -125,6 +151,11 @@ def read(kind, session, path, case):
         store_import(session, plan)
         load_observations(session, f"m{case}")
     return bool(plan.problems)
+
+
+def _unit(kind):
+    """Metres per unit that the user gives: those of the file, so that points lie before the cameras."""
+    return (1.0 if kind.startswith("joints ") else 0.01) if kind in OF_JOINTS else None
 
 
 def run_forked(path, folder):
@@ -143,7 +174,7 @@ def run_forked(path, folder):
     [
         pytest.param(kind, n, marks=[pytest.mark.slow] if n > 50 or package in APART else [])
         for kind, (_, package) in KINDS.items()
-        for n in ((1000,) if package in APART else (50, 1000))
+        for n in ((1000,) if package in APART or kind in WRITERS else (20 if kind.startswith("joints ") else 50, 1000))
     ],
 )
 def test_mutated_observations_are_imported_or_refused(kind, n, tmp_path, monkeypatch):

@@ -18,18 +18,23 @@ from observed_people import BODY_25, make_session, seen, walking
 from tracker.errors import FormatError, Remedy
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import patch_c3d, read_c3d
+from tracker.formats.joint_tables.layouts import read_joint_files
 from tracker.formats.keypoints import hdf5
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import read_hdf5_apart
-from tracker.formats.keypoints.openpose import numbered_name, read_openpose
-from tracker.formats.points_csv import read_points_csv
+from tracker.formats.keypoints.openpose import read_openpose
 from tracker.observations.importing import plan_import
 from tracker.observations.joints import observed_joints
 from tracker.observations.request import ImportRequest
 
 N = 8
 TRUTH = walking(N)
+
+
+def read_one(path, unit_m):
+    ((_, table),) = read_joint_files([path], unit_m, 30.0)
+    return table
 
 
 @pytest.fixture
@@ -137,7 +142,7 @@ def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
     for package in ("sleap_io", "h5py"):
         (tmp_path / f"{package}.py").write_text(f"raise ModuleNotFoundError('no', name='{package}')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    for name, needed in (("a.slp", "sleap-io"), ("a.h5", "h5py")):
+    for name, needed in (("a.slp", "h5py"), ("a.h5", "h5py")):
         (tmp_path / name).write_bytes(b"x")
         with pytest.raises(FormatError, match=f"needs the package {needed}, which is not installed") as caught:
             read_hdf5_apart(tmp_path / name)
@@ -147,11 +152,11 @@ def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
 def test_a_library_that_hangs_or_dies(tmp_path, monkeypatch):
     (tmp_path / "a.slp").write_bytes(b"x")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    (tmp_path / "sleap_io.py").write_text("import os; os._exit(11)")
+    (tmp_path / "h5py.py").write_text("import os; os._exit(11)")
     with pytest.raises(FormatError, match="its library failed; export it again"):
         read_hdf5_apart(tmp_path / "a.slp")
-    (tmp_path / "sleap_io.py").write_text("import time; time.sleep(60)")
-    monkeypatch.setattr(hdf5, "SECONDS", 1.0)
+    (tmp_path / "h5py.py").write_text("import time; time.sleep(60)")
+    monkeypatch.setattr(hdf5, "LIMITS", hdf5.LIMITS._replace(seconds=1.0))
     with pytest.raises(FormatError, match="it took over 1 s, as damaged files do"):
         read_hdf5_apart(tmp_path / "a.slp")
 
@@ -204,14 +209,6 @@ def test_malformed_coco(tmp_path, data, expected):
     (tmp_path / "c.json").write_text(json.dumps(data))
     with pytest.raises(FormatError, match=expected):
         read_coco(tmp_path / "c.json")
-
-
-def test_names_of_numbered_files():
-    assert numbered_name("CAM_000000000012_keypoints.json") == ("CAM", 12)
-    assert numbered_name("000000000012_keypoints.json") == ("", 12)
-    assert numbered_name("cam01_12.json") == ("cam01", 12)
-    assert numbered_name("calibration.json") is None
-    assert numbered_name("x_99999999999999999999.json") is None
 
 
 @pytest.mark.parametrize(
@@ -316,21 +313,21 @@ def test_csv_of_points(session, tmp_path, unit):
 def test_malformed_csv_of_points(tmp_path, text, expected):
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(FormatError, match=expected):
-        read_points_csv(tmp_path / "a.csv", 1.0, 30.0)
+        read_one(tmp_path / "a.csv", 1.0)
 
 
 def test_a_csv_with_the_index_of_its_table_and_a_column_of_frames(tmp_path):
     lines = [",frame,left_wrist_x_m,left_wrist_y_m,left_wrist_z_m", "0,100,1,2,3", "1,103,1,2,3"]
     (tmp_path / "p.csv").write_text("\n".join(lines))
-    assert read_points_csv(tmp_path / "p.csv", None, 30.0).frames.tolist() == [100, 103]
+    assert read_one(tmp_path / "p.csv", None).frames.tolist() == [100, 103]
     (tmp_path / "p.csv").write_text("\n".join(lines).replace("frame", "error"))
-    assert read_points_csv(tmp_path / "p.csv", None, 30.0).frames.tolist() == [0, 1]
+    assert read_one(tmp_path / "p.csv", None).frames.tolist() == [0, 1]
 
 
 def test_a_csv_without_a_unit(tmp_path):
     write_points_csv(tmp_path / "a.csv", BODY_25.points, TRUTH, 30.0, "")
     with pytest.raises(FormatError, match="a unit in the names, found none") as caught:
-        read_points_csv(tmp_path / "a.csv", None, 30.0)
+        read_one(tmp_path / "a.csv", None)
     assert caught.value.remedy == Remedy("say_unit")
 
 

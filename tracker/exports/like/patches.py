@@ -7,24 +7,25 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.errors import SessionError
+from tracker.errors import FormatError, Remedy, SessionError
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like.mended_points import MendedPoints
 from tracker.formats.bvh_patching import patch_bvh
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
+from tracker.formats.joint_tables.patching import patch_table
 from tracker.formats.keypoints.coco_patching import patch_coco
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
 from tracker.formats.keypoints.openpose import patch_openpose
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.formats.points_csv import patch_points_csv
 from tracker.formats.trc import patch_trc
 from tracker.geometry.arrays import Array
 from tracker.motion.velocity import velocity
 from tracker.observations.joints import side_pairs, triangulate_observations
 from tracker.observations.observed import ObservationSet
 from tracker.observations.placing import rescaled
+from tracker.observations.readers import PICTURE_FORMATS, SPACE_FORMATS
 from tracker.observations.request import picture_size
 from tracker.observations.stored import source_path
 from tracker.observations.stored_files import StoredPictures, stored_pictures
@@ -104,16 +105,27 @@ def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Chan
     out: dict[Path, bytes] = {}
     if format_name == "openpose":
         for pictures, changes in found:
+            if len(pictures.files) > len(pictures.table.numbers):
+                raise _not_sent_back("files with one picture each, found several of one")
             of_row = {pictures.files[row]: c for row, c in changes.items()}
             out |= {path: patch_openpose(path.read_bytes(), c) for path, c in of_row.items()}
         return out
+    patch = {"coco": patch_coco, "alphapose": patch_coco, "hdf5": patch_hdf5_apart}
+    if format_name != "deeplabcut" and format_name not in patch:
+        raise _not_sent_back(
+            f"files of a program to which points are sent back, found {PICTURE_FORMATS[format_name].program}"
+        )
     for path in {pictures.files[0] for pictures, _ in found}:  # a file may hold several cameras
         of_file = {p.part: changes for p, changes in found if p.files[0] == path}
         if format_name == "deeplabcut":
             out[path] = patch_deeplabcut_csv(path, of_file[0])
         else:
-            out[path] = (patch_coco if format_name == "coco" else patch_hdf5_apart)(path, of_file)
+            out[path] = patch[format_name](path, of_file)
     return out
+
+
+def _not_sent_back(difference: str) -> FormatError:
+    return FormatError(f"expected {difference}", Remedy("export_other_format"))
 
 
 def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Array:
@@ -142,7 +154,7 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
     is_known = np.array([bool(points) for points in observations.counterparts.values()])
     patch: Mapping[str, Callable[[Path, Mapping[int, Array]], bytes]] = {
         "trc": patch_trc,
-        "csv": lambda path, changes: patch_points_csv(path, unit_m, changes),
+        "csv": lambda path, changes: patch_table(path, unit_m, changes),
         "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
     }
     out, farthest_m = Files(), 0.0
@@ -150,11 +162,20 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
         raise SessionError(
             f"expected the rows of each file of {observations.name}, found those of the first; import the files again"
         )
+    other = SessionError(
+        f"expected one file for each person in TRC, C3D, BVH or a table with a row for each frame, into which points "
+        f"are written back, found other files of {observations.name}; export the poses as TRC or CSV"
+    )
+    if len(observations.sources) != len(mended) or observations.format not in {*patch, "bvh"}:
+        raise other
     for source, person, row_frames in zip(observations.sources, mended, observations.row_frames, strict=True):
         changes = _rows(row_frames, person)
         if changes:
             in_file = {row: points @ R_file.T for row, points in changes.items()}
             path = source_path(session, observations.name, source)
+            read = SPACE_FORMATS[observations.format].read([path], unit_m, session.fps)
+            if {len(table.names) for _, table in read} != {len(is_known)} or len(read) > 1:
+                raise other
             if observations.format == "bvh":
                 out[source.path], distance_m = patch_bvh(path, unit_m, in_file, is_known)
                 farthest_m = max(farthest_m, distance_m)

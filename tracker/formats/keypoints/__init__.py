@@ -1,7 +1,7 @@
 """Files of key points in pictures, and of masks beside them: one module each.
 
-Imports `geometry` and `body`; knows no session. Callers use `picture_table.PictureTable` and the modules: `openpose`,
-`coco`, `deeplabcut`, `sleap_files`.
+Imports `geometry` and `body`; knows no session. Callers use `picture_table.PictureTable` and the modules; the table of
+all programs is `tracker.observations.readers`.
 """
 
 __all__ = [
@@ -10,8 +10,11 @@ __all__ = [
     "coco_reading",
     "coco_segmentation",
     "deeplabcut",
+    "detections",
+    "hand_labels",
     "hdf5",
     "openpose",
+    "picture_names",
     "picture_numbers",
     "picture_table",
 ]

@@ -1,5 +1,6 @@
 """Replace key points in a COCO file and leave all other bytes as they are."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ def patch_coco(path: Path, changes: Mapping[int, Mapping[int, PersonChanges]]) -
     found, exact = read_dataset(path), exact_text(path.read_bytes())
     spans = json_spans(exact.text)
     annotations: SpanList = spans if isinstance(spans, SpanList) else spans["annotations"]
-    of_image: dict[int, list[dict[str, Any]]] = {}
+    of_image: dict[int | str, list[dict[str, Any]]] = {}
     for annotation, own in zip(found.dataset.annotations, annotations.items, strict=True):
         if annotation.category_id == found.category and annotation.keypoints:
             of_image.setdefault(annotation.image_id, []).append(own)
@@ -78,7 +79,7 @@ def _next_id(annotations: SpanList, text: str) -> int:
     return 1 + max((int(float(text[slice(*span)])) for span in ids if isinstance(span, tuple)), default=0)
 
 
-def _annotation(values: Array, has_flags: bool, image_id: int, category: int, number: int | None) -> str:
+def _annotation(values: Array, has_flags: bool, image_id: int | str, category: int, number: int | None) -> str:
     """Return the annotation of a person who was not found; with a number in a dataset, else in a list of results."""
     is_known = values[:, 2] > 0
     rows = np.where(is_known[:, None], values, 0.0)
@@ -86,7 +87,7 @@ def _annotation(values: Array, has_flags: bool, image_id: int, category: int, nu
     for x, y, confidence in rows.tolist():
         sure = str(2 * (confidence > 0)) if has_flags else number_like(confidence, "", PIXEL_DECIMALS)
         cells += [number_like(x, "", PIXEL_DECIMALS), number_like(y, "", PIXEL_DECIMALS), sure]
-    fields = {"image_id": str(image_id), "category_id": str(category), "keypoints": f"[{', '.join(cells)}]"}
+    fields = {"image_id": json.dumps(image_id), "category_id": str(category), "keypoints": f"[{', '.join(cells)}]"}
     if number is None:
         fields["score"] = "1.0"
     else:

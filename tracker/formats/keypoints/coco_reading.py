@@ -1,10 +1,10 @@
-"""Read key points of people from COCO: a dataset with images and categories, or a list of results.
+"""Read key points of people from COCO: a dataset with images and categories, or a list of results, as AlphaPose has.
 
 v of a key point is 0, 1 or 2 in datasets, which is no confidence; detectors write theirs there, or as the score of a
 person. Images are matched to cameras by `camera`, as this program writes it, or by the folder of their file name.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -12,14 +12,12 @@ import msgspec
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.openpose import numbered_name
-from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures, stack_tracks
-from tracker.formats.number_rows import MAX_NAMES
-from tracker.geometry.arrays import Array
-from tracker.text_files import TABLE_BYTES, TextKind, read_json
+from tracker.formats.keypoints.picture_names import picture_names
+from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
+from tracker.formats.number_rows import MAX_NAMES, check_size
+from tracker.text_files import read_json
 from tracker.validation import MAX_FRAMES, MAX_SIDE_PX, Name, Number, check
 
-_KIND = TextKind("COCO file", TABLE_BYTES, FormatError, "export it again")
 _FrameNumber = Annotated[int, msgspec.Meta(ge=0, le=MAX_FRAMES, description=f"a whole number of at most {MAX_FRAMES}")]
 _Side = Annotated[int, msgspec.Meta(ge=0, le=MAX_SIDE_PX, description="a size in pixels")]
 
@@ -27,7 +25,7 @@ _Side = Annotated[int, msgspec.Meta(ge=0, le=MAX_SIDE_PX, description="a size in
 class CocoPicture(msgspec.Struct):
     """An image of a dataset."""
 
-    id: _FrameNumber
+    id: _FrameNumber | Name
     file_name: str = ""
     width: _Side = 0
     height: _Side = 0
@@ -45,7 +43,7 @@ class _Category(msgspec.Struct):
 
 
 class _Annotation(msgspec.Struct):
-    image_id: _FrameNumber
+    image_id: _FrameNumber | Name
     category_id: int = 1
     keypoints: list[Number] = []
     score: Number | None = None
@@ -66,7 +64,14 @@ class _Dataset(msgspec.Struct):
 
 def is_coco(data: Any) -> bool:
     """Return whether plain data of a JSON file looks like COCO."""
-    return isinstance(data, list) or (isinstance(data, dict) and "annotations" in data)
+    if isinstance(data, list):
+        return all(isinstance(a, dict) and "image_id" in a for a in data)
+    return isinstance(data, dict) and "annotations" in data and "images" in data
+
+
+def is_alphapose(data: Any) -> bool:
+    """Return whether plain data of a JSON file is a list of results for names of images."""
+    return isinstance(data, list) and bool(data) and is_coco(data) and isinstance(data[0]["image_id"], str)
 
 
 def holds(data: Any, key: Literal["keypoints", "segmentation"]) -> bool:
@@ -106,22 +111,31 @@ class KeypointDataset(NamedTuple):
         return all(v in (0, 1, 2) for a in self.annotations for v in a.keypoints[2::3])
 
 
-def read_pictures(path: Path) -> PictureDataset:
-    """Read a dataset or a list of results, of key points or segmentations.
+def read_pictures(path: Path, program: str = "COCO") -> PictureDataset:
+    """Read a dataset or a list of results, of key points or segmentations; `program` names it in messages.
 
     Raises:
         FormatError: the file is malformed.
     """
-    where = f"COCO file {path}"
-    data = read_json(path, _KIND)
+    where = f"{program} file {path}"
+    data = read_json(path, text_of(program))
     if isinstance(data, list):
         annotations = check(data, list[_Annotation], where, FormatError)
-        dataset = _Dataset([CocoPicture(i) for i in sorted({a.image_id for a in annotations})], annotations)
+        ids = dict.fromkeys(a.image_id for a in annotations)
+        dataset = _Dataset([CocoPicture(i, i if isinstance(i, str) else "") for i in ids], annotations)
     else:
         dataset = check(data, _Dataset, where, FormatError)
+    return PictureDataset(dataset, images_by_camera(dataset.images, where))
+
+
+def images_by_camera(images: Sequence[CocoPicture], where: str) -> dict[tuple[str, ...], dict[int, CocoPicture]]:
+    """Return images by the names that their camera may have, best first, and by number; `where` names the file.
+
+    Raises:
+        FormatError: two images are of one picture, or an image has no number.
+    """
     by_camera: dict[tuple[str, ...], dict[int, CocoPicture]] = {}
-    for image in dataset.images:
-        labels, number = _place(image)
+    for image, (labels, number) in zip(images, _places(images, where), strict=True):
         taken = by_camera.setdefault(labels, {})
         if number in taken:
             raise FormatError(
@@ -129,24 +143,24 @@ def read_pictures(path: Path) -> PictureDataset:
                 "; give the images numbers or folders of their cameras"
             )
         taken[number] = image
-    return PictureDataset(dataset, by_camera)
+    return by_camera
 
 
-def read_dataset(path: Path) -> KeypointDataset:
-    """Read key points of a dataset or a list of results, without arrays.
+def read_dataset(path: Path, program: str = "COCO") -> KeypointDataset:
+    """Read key points of a dataset or a list of results, without arrays; `program` names it in messages.
 
     Raises:
         FormatError: the file is malformed, or has no key points.
     """
-    dataset, images = read_pictures(path)
-    category, names, notes = _category(dataset, f"COCO file {path}")
+    dataset, images = read_pictures(path, program)
+    category, names, notes = _category(dataset, f"{program} file {path}")
     if any(a.segmentation for a in dataset.annotations):
         notes = (*notes, "key points were taken, and segmentations of the file left out")
     return KeypointDataset(dataset, category, names, images, notes)
 
 
-def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
-    """Read a dataset or a list of results.
+def read_coco(path: Path, program: str = "COCO") -> list[tuple[tuple[str, ...], PictureTable]]:
+    """Read a dataset or a list of results; `program` names it in messages.
 
     Returns:
         For each camera the names that it may have, best first, and its key points.
@@ -154,25 +168,19 @@ def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
     Raises:
         FormatError: the file is malformed, or has no key points.
     """
-    where, found = f"COCO file {path}", read_dataset(path)
+    where, found = f"{program} file {path}", read_dataset(path, program)
     people = _people(found, where)
-    tracks: dict[int, list[str]] = {}
-    for annotation in found.annotations:
-        tracks.setdefault(annotation.image_id, []).append(annotation.track)
-    n_points = len(found.names) or max((len(p) for some in people.values() for p in some), default=0)
+    n_points = len(found.names) or max((len(p.points) for some in people.values() for p in some), default=0)
     if not n_points:
         raise FormatError(f"{where}: expected key points of people, found none; export them")
     out = []
     for labels, images in found.images.items():
-        numbers = sorted(images)
-        points = stack_pictures([people.get(images[n].id, []) for n in numbers], n_points, where)
         sizes = {(i.width, i.height) for i in images.values() if i.width and i.height}
         if len(sizes) > 1:
             raise FormatError(f"{where}: expected images of one size for {labels[0]}, found {sorted(sizes)[:3]}")
-        size = next(iter(sizes), None)
-        names = stack_tracks([tracks.get(images[n].id, []) for n in numbers])
-        table = PictureTable(found.names, np.array(numbers, dtype=np.int64), points, size, None, found.notes, names)
-        out.append((labels, table))
+        of_number = {number: people.get(image.id, []) for number, image in images.items()}
+        more = {"size": next(iter(sizes), None), "notes": found.notes}
+        out.append((labels, table_of_people(of_number, where, found.names, **more)))
     return out
 
 
@@ -181,13 +189,27 @@ def quoted_images(one: CocoPicture, other: CocoPicture) -> str:
     return f"'{one.file_name[-60:]}' and '{other.file_name[-60:]}'"
 
 
-def _place(image: CocoPicture) -> tuple[tuple[str, ...], int]:
-    """Return the names that the camera of an image may have, best first, and the number of the picture."""
-    path = PurePosixPath(image.file_name.replace("\\", "/"))
-    named = numbered_name(f"{path.stem}.json") if path.stem else None
-    number = image.video_frame if image.video_frame is not None else named[1] if named else image.id
-    labels = (image.camera, named[0] if named else "", *(p for p in reversed(path.parts[:-1]) if p != "/"))
-    return tuple(label for label in labels if label), number
+def _places(images: Sequence[CocoPicture], where: str) -> list[tuple[tuple[str, ...], int]]:
+    """Return the names that the camera of each image may have, best first, and the number of the picture.
+
+    Raises:
+        FormatError: an image has no number.
+    """
+    paths = [PurePosixPath(image.file_name.replace("\\", "/")) for image in images]
+    by_folder: dict[PurePosixPath, list[int]] = {}
+    for i, path in enumerate(paths):
+        by_folder.setdefault(path.parent, []).append(i)
+    out: list[tuple[tuple[str, ...], int]] = [((), 0)] * len(images)
+    for folder, some in by_folder.items():
+        folders = [part for part in reversed(folder.parts) if part != "/"]
+        for i, named in zip(some, picture_names([paths[i].stem for i in some]), strict=True):
+            image = images[i]
+            number = image.video_frame if image.video_frame is not None else named.number if named else image.id
+            if isinstance(number, str):
+                raise FormatError(f"{where}: expected the number of the picture in '{number[:60]}'; name it by number")
+            labels = (image.camera, named.label if named else "", *folders)
+            out[i] = tuple(label for label in labels if label), number
+    return out
 
 
 def _category(dataset: _Dataset, where: str) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
@@ -206,28 +228,28 @@ def _category(dataset: _Dataset, where: str) -> tuple[int, tuple[str, ...], tupl
     return chosen, names, notes
 
 
-def _people(found: KeypointDataset, where: str) -> dict[int, list[Array]]:
-    """Return the people of each image by its id, each (n_points, 3).
+def _people(found: KeypointDataset, where: str) -> dict[int | str, list[PicturePerson]]:
+    """Return the people of each image by its id.
 
     Raises:
         FormatError: people have different numbers of points.
     """
     chosen = found.annotations
     n_points = len(found.names) or len(chosen[0].keypoints) // 3
-    values = np.zeros((len(chosen), n_points, 3))
-    for row, annotation in zip(values, chosen, strict=True):
-        if len(annotation.keypoints) != 3 * n_points:
-            raise FormatError(
-                f"{where}: expected {3 * n_points} numbers for {n_points} key points, found "
-                f"{len(annotation.keypoints)} of the person in image {annotation.image_id}; export it again"
-            )
-        row[:] = np.array(annotation.keypoints).reshape(-1, 3)
+    wrong = next((a for a in chosen if len(a.keypoints) != 3 * n_points), None)
+    if wrong is not None:
+        raise FormatError(
+            f"{where}: expected {3 * n_points} numbers for {n_points} key points, found "
+            f"{len(wrong.keypoints)} of the person in image {wrong.image_id}; export it again"
+        )
+    check_size((len(chosen), n_points, 3), where)
+    values = np.array([a.keypoints for a in chosen]).reshape(len(chosen), n_points, 3)
     absent = (values[..., 2] == 0) | (values[..., :2] == 0).all(axis=-1)
     if found.has_flags:
         scores = np.array([np.nan if a.score is None else a.score for a in chosen])
         values[..., 2] = scores[:, None]
     values[absent] = (np.nan, np.nan, 0.0)
-    people: dict[int, list[Array]] = {}
+    people: dict[int | str, list[PicturePerson]] = {}
     for annotation, points in zip(chosen, values, strict=True):
-        people.setdefault(annotation.image_id, []).append(points)
+        people.setdefault(annotation.image_id, []).append(PicturePerson(points, annotation.track))
     return people

@@ -37,7 +37,7 @@ class SegmentedPictures(NamedTuple):
     """Names that the camera may have, best first."""
     images: Mapping[int, CocoPicture]
     """By number."""
-    people: Mapping[int, list[Any]]
+    people: Mapping[int | str, list[Any]]
     """Segmentations of people by the id of the image."""
     notes: tuple[str, ...]
     where: str
@@ -90,7 +90,7 @@ def read_segmentations(path: Path) -> list[SegmentedPictures]:
     notes = ()
     if others := [quoted(named[i].name) if i in named else str(i) for i in sorted(used - taken)]:
         notes = (f"segmentations of {others[0]} and other categories were left out",)
-    people: dict[int, list[Any]] = {}
+    people: dict[int | str, list[Any]] = {}
     for annotation in chosen:
         if annotation.category_id in taken:
             people.setdefault(annotation.image_id, []).append(annotation.segmentation)

@@ -1,7 +1,8 @@
 """DeepLabCut's tables of key points, CSV and HDF5, which Lightning Pose writes too: one file for each camera.
 
 The head of a CSV has the rows scorer, individuals (of several animals), bodyparts and coords (x, y, likelihood). The
-first column of a row is the number of the picture, or the path of the picture, whose name has its number.
+first column of a row is the number of the picture, or the path of the picture, whose name has its number: such rows are
+labels of a person. The Ensemble Kalman Smoother (EKS) adds coords of its own.
 """
 
 import csv
@@ -9,22 +10,24 @@ import io
 import pickle
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
-from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
+from tracker.formats.keypoints.picture_names import picture_names
+from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks, text_of
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
 from tracker.geometry.arrays import Array, IntArray
-from tracker.text_files import TABLE_BYTES, TextKind, read_lines
-from tracker.validation import MAX_FRAMES, MAX_NUMBER, quoted
+from tracker.text_files import read_lines
+from tracker.validation import MAX_NUMBER, quoted
 
-_KIND = TextKind("DeepLabCut file", TABLE_BYTES, FormatError, "export it again")
+_KIND = text_of("DeepLabCut")
 _HEAD = ("scorer", "individuals", "bodyparts", "coords")
 _COORDINATES = ("x", "y", "likelihood")
+_NUMBER = re.compile(r"([0-9]+)(?:\.0*)?")
 
 
 class _Column(NamedTuple):
@@ -35,11 +38,10 @@ class _Column(NamedTuple):
     coordinate: str
 
 
-def is_deeplabcut(path: Path) -> bool:
-    """Return whether a CSV begins as DeepLabCut's do; raises as `read_lines` does."""
-    for line in read_lines(path, _KIND):
-        return line.split(",")[0].strip().strip('"').lower() == "scorer"
-    return False
+def is_deeplabcut(head: Sequence[str]) -> bool:
+    """Return whether the first lines of a CSV are those of DeepLabCut's key points in pictures."""
+    words = [[cell.strip().strip('"').lower() for cell in line.split(",")] for line in head]
+    return bool(words) and words[0][0] == "scorer" and not any(row[0] == "coords" and "z" in row for row in words)
 
 
 def read_deeplabcut_csv(path: Path) -> PictureTable:
@@ -51,7 +53,7 @@ def read_deeplabcut_csv(path: Path) -> PictureTable:
     where = f"DeepLabCut file {path}"
     lines = enumerate(read_lines(path, _KIND), 1)
     columns, n_index, row = _read_head(lines, where)
-    rows = NumberRows(where, ",", 1 + len(columns), n_required=1)
+    rows, is_of_names = NumberRows(where, ",", 1 + len(columns), n_required=1), False
     while row is not None:
         line, cells = row
         if len(cells) != n_index + len(columns):
@@ -59,12 +61,13 @@ def read_deeplabcut_csv(path: Path) -> PictureTable:
                 f"{where}, line {line}: expected {n_index + len(columns)} columns, found {len(cells)}; export it again"
             )
         number = _picture_number(cells[:n_index], f"{where}, line {line}")
+        is_of_names = is_of_names or not _NUMBER.fullmatch(cells[n_index - 1].strip())
         text = io.StringIO()
         csv.writer(text).writerow([number, *cells[n_index:]])
         rows.add(text.getvalue().strip(), line)
         row = _next_row(lines, where)
     numbers, values = rows.table(MAX_NUMBER)
-    return _table(columns, numbers, values, where)
+    return _table(columns, numbers, values, where, is_of_names)
 
 
 def is_deeplabcut_hdf5(path: Path) -> bool:
@@ -91,17 +94,18 @@ def read_deeplabcut_hdf5(path: Path) -> PictureTable:
         ((_, heads),) = _Plain(io.BytesIO(bytes(groups[0].attrs["non_index_axes"]))).load()
         columns = [_column(head, where) for head in heads]
         table = groups[0]["table"]
-        check_size((len(table), len(columns)), where)
+        check_size((len(table), max(len(columns), table.dtype.itemsize // np.dtype(float).itemsize)), where)
         rows = table[:]
         blocks = [name for name in rows.dtype.names if name.startswith("values_block_")]
         values = np.concatenate([rows[name].reshape(len(rows), -1) for name in blocks], axis=1).astype(np.float64)
         indices = rows["index"].tolist()
     if values.shape[1] != len(columns):
         raise FormatError(f"{where}: expected {len(columns)} columns, found {values.shape[1]}; export it as CSV")
-    numbers = np.array([_picture_number([_text(i)], where) for i in indices], dtype=np.int64)
+    names = [_text(i) for i in indices]
+    numbers = np.array([_picture_number([name], where) for name in names], dtype=np.int64)
     if (np.diff(numbers) <= 0).any() or not (np.abs(values[np.isfinite(values)]) <= MAX_NUMBER).all():
         raise FormatError(f"{where}: expected rows in order and numbers within {MAX_NUMBER:g}; export it again")
-    return _table(columns, numbers, values, where)
+    return _table(columns, numbers, values, where, not all(map(_NUMBER.fullmatch, names)))
 
 
 class _Plain(pickle.Unpickler):
@@ -164,39 +168,58 @@ def _next_row(lines: Iterator[tuple[int, str]], where: str) -> tuple[int, list[s
 
 
 def _picture_number(cells: Sequence[str], where: str) -> int:
-    """Return the number of a picture: the only cell, or the last number in the name of a file."""
+    """Return the number of a picture: the only cell, or the number in the name of a file."""
     last = cells[-1].strip()
-    found = re.fullmatch(r"(\d+)(?:\.0*)?", last) or re.search(r"(\d+)\.\w+\Z", last)
-    digits = found[1].lstrip("0") or "0" if found else ""
-    if not digits or len(digits) > len(str(MAX_FRAMES)):
+    whole = _NUMBER.fullmatch(last)
+    (found,) = picture_names([whole[1] if whole else PurePath(last.replace("\\", "/")).stem])
+    if found is None:
         raise FormatError(f"{where}: expected the number of a picture, or a name with one, found {quoted(last)}")
-    return int(digits)
+    return found.number
 
 
-def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: str) -> PictureTable:
-    """Sort the columns by person, point and coordinate.
+def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: str, is_of_names: bool) -> PictureTable:
+    """Sort the columns by person, point and coordinate; other coordinates are left out with a note.
+
+    Args:
+        columns: their heads.
+        numbers: of the pictures, (n,).
+        values: of the columns, (n, n_columns).
+        where: names the file.
+        is_of_names: whether rows have names of pictures, not their numbers.
 
     Raises:
-        FormatError: a column is there twice, x or y is missing, or a coordinate is unknown.
+        FormatError: a column is there twice, or x or y is missing.
     """
-    wrong = [c.coordinate for c in columns if c.coordinate not in _COORDINATES]
-    if wrong or len(set(columns)) < len(columns):
-        found = quoted(wrong[0]) if wrong else "a column twice"
-        raise FormatError(f"{where}: expected each x, y and likelihood once, found {found}; import key points in 2-D")
+    own = [i for i, c in enumerate(columns) if c.coordinate in _COORDINATES]
+    others = list(dict.fromkeys(c.coordinate for c in columns if c.coordinate not in _COORDINATES))
+    if "z" in others or not own or len(set(columns)) < len(columns):
+        found = "z" if "z" in others else others[0] if others else "a column twice"
+        raise FormatError(
+            f"{where}: expected each x, y and likelihood once, found {quoted(found)}; import key points in 2-D"
+        )
     individuals, names = (
         list(dict.fromkeys(c.individual for c in columns)),
         list(dict.fromkeys(c.point for c in columns)),
     )
     check_size((len(numbers), len(individuals), len(names), 3), where)
     points = np.full((len(numbers), len(individuals), len(names), 3), np.nan)
-    for column, of_column in zip(columns, values.T, strict=True):
+    for i in own:
+        column = columns[i]
         at = individuals.index(column.individual), names.index(column.point), _COORDINATES.index(column.coordinate)
-        points[:, at[0], at[1], at[2]] = of_column
+        points[:, at[0], at[1], at[2]] = values[:, i]
     absent = ~np.isfinite(points[..., :2]).all(axis=-1)
     points[absent] = (np.nan, np.nan, 0.0)
-    if not any(c.coordinate == "likelihood" for c in columns):
+    has_likelihood, notes = any(columns[i].coordinate == "likelihood" for i in own), []
+    if not has_likelihood:
         points[~absent, 2] = np.nan
-    return PictureTable(tuple(names), numbers, points, tracks=stack_tracks([individuals] * len(numbers)))
+    if others:
+        notes.append(f"columns {', '.join(others[:3])}{' and others' if len(others) > 3 else ''} were left out")
+        if has_likelihood and not (points[..., 2] > 0).any():
+            points[~absent, 2] = 1.0
+            notes.append("likelihoods are 0 throughout, which stands for none: the points were taken as certain")
+    tracks = stack_tracks([individuals] * len(numbers))
+    is_by_hand = is_of_names and not has_likelihood
+    return PictureTable(tuple(names), numbers, points, notes=tuple(notes), tracks=tracks, is_by_hand=is_by_hand)
 
 
 Changes = Mapping[int, Sequence[tuple[int, Array]]]
@@ -242,6 +265,8 @@ def _new_cells(columns: Sequence[_Column], changes: Changes) -> dict[int, dict[i
     for row, people in changes.items():
         for person, values in _with_free_individuals(people, len(individuals)):
             for i, column in enumerate(columns):
+                if column.coordinate not in _COORDINATES:
+                    continue
                 value = values[names.index(column.point)]
                 if column.individual == individuals[person] and not np.isnan(value[2]):
                     absent = value[2] == 0 and column.coordinate != "likelihood"

@@ -1,7 +1,7 @@
 """Read HDF5 files (SLEAP, NWB, DeepLabCut) in a process of their own, and replace points in them.
 
 The HDF5 library hangs on some damaged files, or ends the process that reads them. So another process reads a file,
-within a time limit, and hands back plain arrays.
+within limits of time and memory, and hands back plain arrays.
 """
 
 import os
@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -20,11 +21,23 @@ from tracker.errors import FormatError, Remedy
 from tracker.files import check_regular
 from tracker.formats.keypoints.deeplabcut import Changes
 from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.number_rows import MAX_VALUES
 
 CHANGES, PATCHED = "changes.npz", "patched"
 """Names of the file of changes to a file of key points, and of the copy that gets them, without its suffix."""
-SECONDS = 300.0
-"""Time that a file may take, s. To load sleap-io takes 2 s; damaged files may take for ever."""
+
+
+class ReadingLimits(NamedTuple):
+    """Limits of the process that reads a file."""
+
+    seconds: float
+    """To load sleap-io takes 2 s; damaged files may take for ever."""
+    memory_bytes: int
+    """Addresses that it may take up, where the system can limit them: room for the largest table a few times."""
+
+
+LIMITS = ReadingLimits(300.0, 16 * np.dtype(float).itemsize * MAX_VALUES)
+"""Tables of the largest size take 0.3 GB, and are held up to five times; libraries take up 0.5 GB."""
 
 _REMEDIES = {"install": Remedy("install_import"), "other format": Remedy("export_other_format")}
 
@@ -35,6 +48,7 @@ class VideoHead(msgspec.Struct):
     video: str
     names: tuple[str, ...]
     notes: tuple[str, ...] = ()
+    is_by_hand: bool = False
 
 
 class ReadAnswer(msgspec.Struct):
@@ -58,9 +72,8 @@ def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
         for i, video in enumerate(_answer(path, folder).videos):
             with np.load(folder / f"{i}.npz", allow_pickle=False) as arrays:
                 numbers, points, tracks = arrays["numbers"], arrays["points"], arrays["tracks"]
-            table = PictureTable(
-                video.names, numbers, points, notes=video.notes, tracks=tracks if tracks.size else None
-            )
+            more = {"notes": video.notes, "is_by_hand": video.is_by_hand}
+            table = PictureTable(video.names, numbers, points, tracks=tracks if tracks.size else None, **more)
             out.append((Path(video.video), table))
         return out
 
@@ -106,9 +119,13 @@ def _folder_for(path: Path) -> Generator[Path, None, None]:
 def _run(path: Path, folder: Path) -> None:
     """Run the other process on a file; its answer goes to the folder."""
     root = str(Path(__file__).resolve().parents[3])
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
+    # Each thread of a library for matrices would take up addresses, which are limited.
+    environment = os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    environment |= {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
     words = [sys.executable, "-m", "tracker.formats.keypoints.hdf5_process", str(path.resolve()), str(folder)]
-    subprocess.run(words, env=environment, timeout=SECONDS, capture_output=True, check=False, stdin=subprocess.DEVNULL)
+    subprocess.run(
+        words, env=environment, timeout=LIMITS.seconds, capture_output=True, check=False, stdin=subprocess.DEVNULL
+    )
 
 
 def _answer(path: Path, folder: Path) -> ReadAnswer:

@@ -3,21 +3,29 @@
 With a file of changes in the folder, they are made in the copy of the file there instead.
 """
 
+import re
 import sys
 import warnings
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from tracker.errors import FormatError, Remedy, TrackerError
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut_hdf5, patch_deeplabcut_hdf5, read_deeplabcut_hdf5
-from tracker.formats.keypoints.hdf5 import CHANGES, PATCHED, ReadAnswer, VideoHead
-from tracker.formats.keypoints.nwb_files import patch_nwb, read_nwb
+from tracker.formats.keypoints.hdf5 import CHANGES, LIMITS, PATCHED, ReadAnswer, VideoHead
+from tracker.formats.keypoints.nwb_files import is_of_points, patch_nwb, read_nwb
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.keypoints.sleap_files import read_sleap
 from tracker.formats.keypoints.sleap_patching import is_analysis, patch_analysis, patch_project
+from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array
+from tracker.validation import quoted
+
+_PICTURES = re.compile(r"video\d*(/.*)?")
+"""Paths of pictures in packages of SLEAP, which are not read."""
 
 Tables = list[tuple[Path, PictureTable]]
 """Key points of each video, with its path."""
@@ -34,6 +42,7 @@ def read_hdf5(path: Path) -> Tables:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
+            check_datasets(path)
             if path.suffix.lower() == ".h5" and is_deeplabcut_hdf5(path):
                 return [(path, read_deeplabcut_hdf5(path))]
             if path.suffix.lower() == ".nwb":
@@ -44,6 +53,47 @@ def read_hdf5(path: Path) -> Tables:
     except Exception as error:  # the libraries raise anything for a damaged file
         words = " ".join(str(error).split())[:200] or type(error).__name__
         raise FormatError(f"{where} cannot be read: {words}; export it again") from error
+
+
+def check_datasets(path: Path) -> None:
+    """Check the sizes of all data that are read later, and that they lie in the file as they are.
+
+    Raises:
+        FormatError: a dataset is too large, or lies in another file. h5py raises other errors for a damaged file.
+        ImportError: h5py is not installed.
+    """
+    import h5py
+
+    where = f"file {path}"
+    links, items = list[tuple[str, Any]](), list[tuple[str, Any]]()
+    with h5py.File(path, "r") as file:
+        file.visititems_links(lambda name, link: links.append((name, link)))
+        file.visititems(lambda name, item: items.append((name, item)))
+        elsewhere = [name for name, link in links if isinstance(link, h5py.ExternalLink)]
+        for name, item in items:
+            if not isinstance(item, h5py.Dataset) or _PICTURES.fullmatch(name):
+                continue
+            if path.suffix.lower() == ".nwb" and not is_of_points(item.parent):
+                continue  # NWB has the recordings of other instruments too
+            n_numbers = -(-item.dtype.itemsize // np.dtype(float).itemsize)  # of eight bytes, in one entry
+            check_size((*(item.shape or ()), max(n_numbers, 1)), f"{where}, {quoted(name)}")
+            properties = item.id.get_create_plist()
+            filters = {properties.get_filter(i)[0] for i in range(properties.get_nfilters())}
+            if max(filters - {h5py.h5z.FILTER_LZF}, default=0) >= h5py.h5z.FILTER_RESERVED:
+                raise FormatError(f"{where}: expected data packed by gzip or LZF, found {quoted(name)} in another way")
+            elsewhere += [name] * bool(item.is_virtual or item.external)
+    if elsewhere := [name for name in elsewhere if not _PICTURES.fullmatch(name)]:
+        raise FormatError(
+            f"{where}: expected all data in one file, found {quoted(elsewhere[0])} in another; export it again"
+        )
+
+
+def limit_memory() -> None:
+    """Limit the memory of this process, where the system can."""
+    with suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (LIMITS.memory_bytes, LIMITS.memory_bytes))
 
 
 Changes = dict[int, dict[int, list[tuple[int, Array]]]]
@@ -117,7 +167,7 @@ def main(path: Path, folder: Path) -> None:
         for i, (_, table) in enumerate(found):
             tracks = np.array([], dtype=np.str_) if table.tracks is None else table.tracks
             np.savez(folder / f"{i}.npz", numbers=table.numbers, points=table.points, tracks=tracks)
-        answer = ReadAnswer(tuple(VideoHead(str(video), table.names, table.notes) for video, table in found))
+        answer = ReadAnswer(tuple(VideoHead(str(video), t.names, t.notes, t.is_by_hand) for video, t in found))
     except ImportError as error:
         package = {"sleap_io": "sleap-io"}.get(error.name or "", error.name or "sleap-io")
         answer = ReadAnswer(error=f"file {path} needs the package {package}, which is not installed", remedy="install")
@@ -127,4 +177,5 @@ def main(path: Path, folder: Path) -> None:
 
 
 if __name__ == "__main__":
+    limit_memory()
     main(Path(sys.argv[1]), Path(sys.argv[2]))

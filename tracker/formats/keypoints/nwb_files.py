@@ -81,6 +81,11 @@ def patch_nwb(path: Path, changes: Mapping[int, Changes]) -> None:
                             _set(video, k, node, int(pictures[row]), (x, y, confidence))
 
 
+def is_of_points(group: Any) -> bool:
+    """Return whether a group has key points, or a series or the skeleton of some."""
+    return _text(group.attrs.get(_TYPE, "")) in (_ESTIMATION, _SERIES, _SKELETON)
+
+
 def _videos(file: Any, path: Path) -> list[_Video]:
     """Return the videos of a file, in the order of the file."""
     by_video: dict[str, list[Any]] = {}

@@ -4,7 +4,6 @@
 pixels of the picture. 0, 0, 0 is an absent point. Files are named `CAMERA_000000000012_keypoints.json`.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -15,15 +14,12 @@ import numpy as np
 from tracker.errors import FormatError
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, number_like
 from tracker.formats.json_numbers import Span, json_spans, replace_spans
-from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures, stack_tracks
+from tracker.formats.keypoints.picture_table import PicturePerson, text_of
 from tracker.geometry.arrays import Array, IntArray
-from tracker.text_files import TABLE_BYTES, TextKind, read_json
-from tracker.validation import MAX_FRAMES, Number, check
+from tracker.text_files import read_json
+from tracker.validation import Number, check
 
-_KIND = TextKind("OpenPose file", TABLE_BYTES, FormatError, "export it again")
-_NUMBERED = re.compile(
-    r"(?P<stem>.*?)[_.-]?(?P<number>\d{1,20})(?:(?:_keypoints)?\.json|\D*\.png)", re.IGNORECASE | re.DOTALL
-)
+_KIND = text_of("OpenPose")
 MAX_PEOPLE = 100
 """Largest number of people in a picture: OpenPose finds 127 at most; arrays have room for the most of any."""
 
@@ -43,36 +39,18 @@ class _Picture(msgspec.Struct):
     people: Annotated[list[_Person], msgspec.Meta(max_length=MAX_PEOPLE, description=f"up to {MAX_PEOPLE} people")]
 
 
-def numbered_name(name: str) -> tuple[str, int] | None:
-    """Return the stem and the number of the name of a file, of a mask the last one; None for another kind of name."""
-    match = _NUMBERED.fullmatch(name)
-    if match is None or len(match["number"].lstrip("0")) > len(str(MAX_FRAMES)):
-        return None
-    return match["stem"], int(match["number"])
-
-
-def read_openpose(path: Path) -> list[Array]:
-    """Read the key points of the people in a picture.
-
-    Returns:
-        x, y (pixels) and confidence of each point of each person, (n_points, 3); NaN, NaN, 0 for an absent point. A
-        person without points is an empty array.
+def read_openpose(path: Path) -> list[PicturePerson]:
+    """Read the key points of the people in a picture; a person without points has an empty array.
 
     Raises:
         FormatError: the file is malformed, or its numbers are not triples.
     """
-    return [points for points, _ in _read_people(path)]
-
-
-def _read_people(path: Path) -> list[tuple[Array, str]]:
-    """Return the points of the people in a picture, and the track of each; raises as `read_openpose`."""
     where = f"OpenPose file {path}"
     data: Any = read_json(path, _KIND)
     if isinstance(data, Mapping) and "people" not in data:
         raise FormatError(f"{where}: expected the key 'people', found {', '.join(list(map(str, data))[:5]) or 'none'}")
-    people = check(data, _Picture, where, FormatError).people
     found = []
-    for person in people:
+    for person in check(data, _Picture, where, FormatError).people:
         if len(person.pose_keypoints_2d) % 3:
             raise FormatError(
                 f"{where}: expected x, y and confidence of each point in 'pose_keypoints_2d', found "
@@ -80,28 +58,8 @@ def _read_people(path: Path) -> list[tuple[Array, str]]:
             )
         values = np.array(person.pose_keypoints_2d, dtype=np.float64).reshape(-1, 3)
         values[(values[:, :2] == 0).all(axis=1)] = (np.nan, np.nan, 0.0)
-        found.append((values, person.track))
+        found.append(PicturePerson(values, person.track))
     return found
-
-
-def read_openpose_pictures(paths: Sequence[Path], where: str) -> PictureTable:
-    """Read the files of one camera, which `numbered_name` numbers, in ascending order.
-
-    Raises:
-        FormatError: a file is malformed, or people have different numbers of points; `where` names the folder.
-    """
-    people = [_read_people(path) for path in paths]
-    sizes = {len(p): path for path, found in zip(paths, people, strict=True) for p, _ in found if len(p)}
-    if len(sizes) > 1:
-        (n, one), (m, other) = list(sizes.items())[:2]
-        raise FormatError(
-            f"{where}: expected one skeleton, found {n} points in {one.name} and {m} in {other.name}; import them apart"
-        )
-    kept = [[(points, track) for points, track in found if len(points)] for found in people]
-    points = stack_pictures([[p for p, _ in found] for found in kept], next(iter(sizes), 0), where)
-    tracks = stack_tracks([[track for _, track in found] for found in kept])
-    numbers = [numbered_name(path.name) for path in paths]
-    return PictureTable((), np.array([n for _, n in filter(None, numbers)], dtype=np.int64), points, tracks=tracks)
 
 
 def patch_openpose(data: bytes, changes: Sequence[tuple[int, Array]]) -> bytes:

@@ -1,13 +1,17 @@
 """Key points of people in the pictures of one camera, as a file has them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.errors import FormatError
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.text_files import TABLE_BYTES, TextKind
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +26,7 @@ class PictureTable:
     """x, y (pixels) and confidence, (n, n_people, n_points, 3); x and y are NaN where absent, confidence is NaN where
     the file has none."""
     size: tuple[int, int] | None = None
-    """Width and height of the pictures, px; None if unknown."""
+    """Width and height of the pictures, px; None if unknown, 1, 1 where x and y are shares of them."""
     rate: float | None = None
     """Pictures per second; None if unknown."""
     notes: tuple[str, ...] = ()
@@ -30,6 +34,8 @@ class PictureTable:
     tracks: NDArray[np.str_] | None = None
     """Name that the file gives each person, (n, n_people), the same in all its pictures; empty for one without a name.
     None if it names nobody."""
+    is_by_hand: bool = False
+    """Whether a person set the points: they are certain, and only some pictures have any."""
 
     @property
     def is_found(self) -> Mask:
@@ -62,5 +68,81 @@ def stack_pictures(people: list[list[Array]], n_points: int, where: str) -> Arra
 def stack_tracks(names: Sequence[Sequence[str]]) -> NDArray[np.str_] | None:
     """Stack the names of the people of pictures, as `stack_pictures` stacks their points; None without any name."""
     most = max([1, *map(len, names)])
+    longest = max((len(name) for row in names for name in row), default=0)
+    check_size((len(names), most, longest), "the names of people")
     rows = [[*row, *[""] * (most - len(row))] for row in names]
     return np.array(rows, dtype=np.str_) if any(map(any, rows)) else None
+
+
+def text_of(program: str) -> TextKind:
+    """Return the kind of the text files of a program."""
+    return TextKind(f"{program} file", TABLE_BYTES, FormatError, "export it again")
+
+
+class PicturePerson(NamedTuple):
+    """A person in a picture."""
+
+    points: Array
+    """x, y (pixels) and confidence, (n_points, 3), as in `PictureTable`; nobody without any."""
+    track: str = ""
+    """Name that the file gives the person in all its pictures; empty without one."""
+
+
+def table_of_people(
+    people: Mapping[int, Sequence[PicturePerson]], where: str, names: tuple[str, ...] = (), **more: Any
+) -> PictureTable:
+    """Return a table of the people of each picture, by its number.
+
+    Args:
+        people: of each picture.
+        where: names the file or folder in messages.
+        names: of the points, if the file names them.
+        more: further fields of the table.
+
+    Raises:
+        FormatError: people have different numbers of points, or the table would be too large.
+    """
+    kept = {number: [p for p in people[number] if len(p.points)] for number in sorted(people)}
+    sizes = {len(p.points): number for number, found in kept.items() for p in found}
+    if len(sizes) > 1:
+        (n, one), (m, other) = list(sizes.items())[:2]
+        raise FormatError(
+            f"{where}: expected one skeleton, found {n} points in picture {one} and {m} in picture {other}; import "
+            "them apart"
+        )
+    n_points = next(iter(sizes), len(names))
+    if names and len(names) != n_points:
+        raise FormatError(f"{where}: expected {len(names)} points, as many as names, found {n_points}; export it again")
+    points = stack_pictures([[p.points for p in found] for found in kept.values()], n_points, where)
+    tracks = stack_tracks([[p.track for p in found] for found in kept.values()])
+    return PictureTable(names, np.array(list(kept), dtype=np.int64), points, tracks=tracks, **more)
+
+
+def table_of_files(
+    files: Sequence[tuple[Path, int]], people_of: Callable[[Path], Sequence[PicturePerson]], where: str, **more: Any
+) -> PictureTable:
+    """Return a table of files with the people of one picture each, whose number is given.
+
+    Several files of one picture are of different people. Raises as `people_of` and `table_of_people` do.
+    """
+    people: dict[int, list[PicturePerson]] = {}
+    for path, number in files:
+        people.setdefault(number, []).extend(people_of(path))
+    notes = ("several files of one picture were taken as several people",) if len(people) < len(files) else ()
+    return table_of_people(people, where, notes=notes, **more)
+
+
+def triples(points: Sequence[Sequence[float]], confidence: Sequence[float] | None = None) -> Array:
+    """Return x, y, confidence of points, (n_points, 3), where 0, 0 or a confidence of 0 is an absent point.
+
+    Args:
+        points: x and y, and the confidence if it is not given.
+        confidence: of each point.
+    """
+    if not points:
+        return np.empty((0, 3))
+    values = np.array(points, dtype=np.float64)
+    if confidence is not None:
+        values = np.column_stack([values[:, :2], confidence])
+    values[(values[:, :2] == 0).all(axis=1) | (values[:, 2] == 0)] = (np.nan, np.nan, 0.0)
+    return values

@@ -25,7 +25,8 @@ def read_sleap(path: Path) -> list[tuple[Path, PictureTable]]:
     import sleap_io
 
     labels = sleap_io.load_file(str(path), **({"open_videos": False} if path.suffix.lower() == ".slp" else {}))
-    out = [(_video_path(video, path), _table(labels, video, where)) for video in labels.videos]
+    labelled = {id(frame.video) for frame in labels.labeled_frames}
+    out = [(_video_path(v, path), _table(labels, v, where)) for v in labels.videos if id(v) in labelled]
     if not out:
         raise FormatError(f"{where}: expected key points of a video, found none; export it again")
     return out
@@ -34,7 +35,7 @@ def read_sleap(path: Path) -> list[tuple[Path, PictureTable]]:
 def _video_path(video: Any, path: Path) -> Path:
     name = video.filename
     name = name[0] if isinstance(name, list) and name else name
-    return Path(str(name)) if name else path
+    return Path(str(name).replace("\\", "/")) if name else path
 
 
 def _table(labels: Any, video: Any, where: str) -> PictureTable:
@@ -59,7 +60,8 @@ def _table(labels: Any, video: Any, where: str) -> PictureTable:
         raise FormatError(f"{where}: expected coordinates within {MAX_NUMBER:g}; export it again")
     points[absent] = (np.nan, np.nan, 0.0)
     tracks = stack_tracks([[i.track.name if i.track is not None else "" for i in instances] for instances in found])
-    return PictureTable(names, numbers, points, tracks=tracks)
+    is_by_hand = not any(hasattr(i, "score") for instances in found for i in instances)
+    return PictureTable(names, numbers, points, tracks=tracks, is_by_hand=is_by_hand)
 
 
 def _instances(picture: Any) -> list[Any]:

@@ -5,6 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from joint_files import write_joints
 from observed_files import (
     write_c3d,
     write_coco_images,
@@ -13,18 +14,19 @@ from observed_files import (
     write_sleap,
 )
 from observed_people import BODY_25, make_session, seen, write_openpose
+from program_files import write_alphapose, write_eks, write_sleap_csv
 
 from tracker.body.model import PosedBody
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like.sending import export_like
 from tracker.formats.c3d import read_c3d
+from tracker.formats.joint_tables.layouts import read_joint_files
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.model_toml import format_model
-from tracker.formats.points_csv import read_points_csv
 from tracker.formats.trc import read_trc, write_trc
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.request import ImportRequest
@@ -142,9 +144,11 @@ SUFFIXES = {"dlc h5": ".h5", "sleap": ".slp", "nwb": ".nwb"}
 
 
 def read_space(path):
-    return {".trc": read_trc, ".csv": lambda p: read_points_csv(p, None, 30.0), ".c3d": lambda p: read_c3d(p, None)}[
-        path.suffix
-    ](path)
+    return {
+        ".trc": read_trc,
+        ".csv": lambda p: read_joint_files([p], None, 30.0)[0][1],
+        ".c3d": lambda p: read_c3d(p, None),
+    }[path.suffix](path)
 
 
 def contents(folder):
@@ -205,7 +209,7 @@ def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind):
         before, after = read_trc(path).points[EDITED], read_trc(done.paths[0]).points[EDITED]
     else:
         name = f"cam1/cam1_{EDITED:012d}_keypoints.json"
-        before, after = (read_openpose(folder / name)[0] for folder in (path, tmp_path / "back"))
+        before, after = (read_openpose(folder / name)[0].points for folder in (path, tmp_path / "back"))
     differ = {n for n, a, b in zip(BODY_25.points, before, after, strict=True) if not np.array_equal(a, b)}
     assert differ == {"LWrist", "RKnee", "RAnkle", "RHeel", "RBigToe"}
 
@@ -238,8 +242,8 @@ def test_a_mended_frame_alone_differs_in_pictures(session, tmp_path, kind):
         if kind == "openpose":
             name = f"{camera.name}/{camera.name}_{EDITED:012d}_keypoints.json"
             (person,) = read_openpose(tmp_path / "back" / name)
-            found, nose = person[knee], person[0]
-            before_nose = read_openpose(path / name)[0][0]
+            found, nose = person.points[knee], person.points[0]
+            before_nose = read_openpose(path / name)[0].points[0]
         else:
             name = f"{camera.name}.csv"
             table = read_deeplabcut_csv(tmp_path / "back" / name)
@@ -406,6 +410,52 @@ def test_mended_points_of_coco_alone_differ(session, tmp_path, kind):
         assert new[knee, 2] == (2 if kind == "coco cameras" else 1)  # a flag, or a confidence
 
 
+def test_mended_points_of_alphapose_alone_differ(session, tmp_path):
+    bodies = poses(session)
+    write_alphapose(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
+    store(session, bodies)
+    export_like(session, imported(session, tmp_path / "f"), tmp_path / "back")
+    for camera in session.camera_names:
+        name = f"{camera}/alphapose-results.json"
+        before, after = (json.loads((tmp_path / folder / name).read_text()) for folder in ("f", "back"))
+        assert [a == b for a, b in zip(before, after, strict=True)] == [k != EDITED for k in range(N)]
+        assert before[EDITED] | {"keypoints": []} == after[EDITED] | {"keypoints": []}
+
+
+def test_other_columns_of_a_table_stay(session, tmp_path):
+    bodies = poses(session)
+    write_eks(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
+    store(session, bodies)
+    export_like(session, imported(session, tmp_path / "f"), tmp_path / "back")
+    name = f"multicam_{session.camera_names[1]}_results.csv"
+    before, after = ((tmp_path / folder / name).read_text().splitlines() for folder in ("f", "back"))
+    assert [a == b for a, b in zip(before, after, strict=True)] == [k != EDITED + 3 for k in range(N + 3)]
+    rows = [line.split(",") for line in (before[2], before[EDITED + 3], after[EDITED + 3])]
+    changed = {head for head, a, b in zip(*rows, strict=True) if a != b}
+    assert changed == {"x", "y", "likelihood"}
+
+
+def test_several_files_of_one_picture_are_not_sent_back(session, tmp_path):
+    bodies = poses(session)
+    write_openpose(tmp_path / "k", session.camera_names, seen(session, [observed(session, bodies)]))
+    for path in [*(tmp_path / "k").rglob("*.json")]:
+        path.with_name(path.name.replace("keypoints", "person2")).write_text('{"people": []}')
+    store(session, bodies)
+    with pytest.raises(FormatError, match="expected files with one picture each, found several of one"):
+        export_like(session, imported(session, tmp_path / "k"), tmp_path / "back")
+
+
+def test_programs_to_which_nothing_is_sent_back(session, tmp_path):
+    bodies = poses(session)
+    write_sleap_csv(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
+    found = imported(session, tmp_path / "f")
+    export_like(session, found, tmp_path / "untouched")
+    store(session, bodies)
+    with pytest.raises(FormatError, match="to which points are sent back, found SLEAP's analysis in CSV") as caught:
+        export_like(session, found, tmp_path / "back")
+    assert caught.value.remedy == Remedy("export_other_format")
+
+
 @pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])
 def test_a_person_is_added_to_coco_and_read_again(session, tmp_path, kind):
     bodies = poses(session)
@@ -449,8 +499,8 @@ def test_a_person_who_was_not_found_is_added(session, tmp_path):
     store(session, bodies)
     export_like(session, imported(session, path), tmp_path / "back")
     (person,) = read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json")
-    assert len(person) == 25
-    assert np.isnan(person[0]).tolist() == [True, True, False]  # the nose is no joint of the body
+    assert len(person.points) == 25
+    assert np.isnan(person.points[0]).tolist() == [True, True, False]  # the nose is no joint of the body
 
 
 def test_nobody_is_added_who_is_not_in_the_picture(session, tmp_path):
@@ -483,7 +533,7 @@ def test_choices_of_the_import_hold_on_the_way_back(session, tmp_path):
     observations = imported(session, path, first_frame=2, picture_size=(320, 240))
     export_like(session, observations, tmp_path / "back")
     name = f"cam0/cam0_{EDITED - 2:012d}_keypoints.json"
-    one, other = (read_openpose(folder / name)[0] for folder in (path, tmp_path / "back"))
+    one, other = (read_openpose(folder / name)[0].points for folder in (path, tmp_path / "back"))
     assert np.abs(one[:, :2] - other[:, :2]).max() < 0.01
 
 
@@ -550,6 +600,18 @@ def test_each_person_has_the_rows_of_their_own_file(tmp_path):
     before, after = read_trc(paths[1]), read_trc(tmp_path / "out" / "bob.trc")
     moved = np.abs(before.points - after.points).max(axis=(1, 2))
     assert np.flatnonzero(moved > 0.1).tolist() == [EDITED - late]
+
+
+@pytest.mark.parametrize("kind", ["people", "semicolon", "deeplabcut", "c3d", "easymocap"])
+def test_points_of_other_layouts_are_not_written_back(tmp_path, kind):
+    session = make_session(tmp_path / "s", N, people=("ann",))
+    bodies = poses(session)
+    truth = observed(session, bodies)
+    path = write_joints(kind, tmp_path, BODY_25.points, np.stack([truth, truth][: 1 + (kind in ("people", "c3d"))]))
+    observations = imported(session, path, unit_m=1.0)
+    store(session, bodies)
+    with pytest.raises(TrackerError, match=r"points are written back, found .*; export the poses as TRC or CSV"):
+        export_like(session, observations, tmp_path / "out")
 
 
 def test_rows_at_another_rate_are_where_their_time_is(session, tmp_path):

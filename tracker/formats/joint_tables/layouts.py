@@ -1,0 +1,149 @@
+"""The table of all layouts of joints in space that are known. `docs/observations.md` lists it."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
+from tracker.errors import FormatError
+from tracker.files import open_regular
+from tracker.formats.joint_tables import columns as head
+from tracker.formats.joint_tables.arrays import is_array, read_array
+from tracker.formats.joint_tables.scenes import Scenes, is_easymocap, is_panoptic, read_scenes
+from tracker.formats.joint_tables.table_reading import read_table
+from tracker.formats.observation_layout import ObservationLayout, Sample
+from tracker.formats.trc import MarkerTable
+
+JointLayout: TypeAlias = ObservationLayout[Scenes]
+_SECTIONS = {"trajectories", "devices", "model outputs", "joints", "segments", "events"}
+"""Sections of an ASCII file of Vicon Nexus, in lower case."""
+
+
+def _in_head(*tests: Callable[[list[str]], bool]) -> Callable[[Sample], bool]:
+    """Return a function for whether each of the first lines of a table passes its test, in lower case."""
+
+    def recognizes(sample: Sample) -> bool:
+        rows = [[cell.lower() for cell in cells] for cells in sample.cells]
+        return len(rows) >= len(tests) and all(test(row) for test, row in zip(tests, rows, strict=False))
+
+    return recognizes
+
+
+def _begins(word: str) -> Callable[[Sample], bool]:
+    return _in_head(lambda cells: cells[0].startswith(word))
+
+
+def _is_deeplabcut(sample: Sample) -> bool:
+    return any(cells[0].lower() == "coords" and "z" in cells for cells in sample.cells[:4])
+
+
+def _of_each(read: Callable[[Path, float | None, float], list[MarkerTable]]) -> Callable[..., Scenes]:
+    """Return a reader of files, each with the points of one or several people."""
+    return lambda paths, unit_m, rate: [(path, table) for path in paths for table in read(path, unit_m, rate)]
+
+
+def _table(columns_of: head.ColumnsOf) -> Callable[..., Scenes]:
+    return _of_each(partial(read_table, columns_of))
+
+
+def _is_long(cells: list[str]) -> bool:
+    return not {*head.NAMES}.isdisjoint(cells) and not {"z", "z_coord", "z_m", "z_mm"}.isdisjoint(cells)
+
+
+def _has_z(cells: list[str]) -> bool:
+    return any(m["axis"] == "z" for m in map(head.COORDINATE.fullmatch, cells) if m)
+
+
+# fmt: off
+WIDE: JointLayout = ObservationLayout(
+    "anipose, FreeMoCap, Caliscope (wide), our own tables and others", "a `.csv` or `.tsv`, of several people with a "
+    "column `person`", "columns `NAME_x`, `NAME_y`, `NAME_z`, perhaps with a unit",
+    _in_head(_has_z), _table(head.named_columns))
+SCENES: tuple[JointLayout, ...] = (
+    ObservationLayout("EasyMocap", "a `.json` for each frame", "`keypoints3d` of people", is_easymocap, read_scenes),
+    ObservationLayout("CMU Panoptic (`hdPose3d`)", "a `.json` for each frame, cm", "`bodies`",
+        is_panoptic, read_scenes))
+LAYOUTS: tuple[JointLayout, ...] = (
+    ObservationLayout("OptiTrack Motive", "a `.csv`", "`Format Version` first; markers and bones",
+        _begins("format version"), _table(head.motive_columns)),
+    ObservationLayout("Vicon Nexus (ASCII)", "a `.csv`", "the section `Trajectories`, or another one of Nexus first",
+        _in_head(lambda cells: {*cells} - {""} <= _SECTIONS), _table(head.nexus_columns)),
+    ObservationLayout("Qualisys Track Manager", "a `.tsv`, mm", "`NO_OF_FRAMES` first, then `MARKER_NAMES`",
+        _begins("no_of_"), _table(head.qualisys_columns)),
+    ObservationLayout("DeepLabCut 3-D, Lightning Pose and EKS (`multicam_3d_results.csv`)", "a `.csv`",
+        "rows `scorer`, `bodyparts` and `coords` with z", _is_deeplabcut, _table(head.stacked_columns)),
+    ObservationLayout("JARVIS (`data3D.csv`)", "a `.csv`", "names above x, y, z and confidence",
+        _in_head(any, lambda cells: {"z"} < {*cells} <= {"x", "y", "z", "confidence"}), _table(head.stacked_columns)),
+    ObservationLayout("FreeMoCap (tidy), Caliscope (`xyz_TRACKER.csv`)", "a `.csv`", "columns `frame` or `sync_index`, "
+        "`keypoint` or `point_id`, and x, y, z", _in_head(_is_long), _table(head.named_columns)),
+    WIDE, *SCENES,
+    ObservationLayout("arrays of body-model networks (SMPL, SMPL-X, MHR)", "a `.npy` or `.npz`",
+        "shape (frames, joints, 3) or (frames, people, joints, 3)", is_array, _of_each(read_array)))
+"""In the order in which they are tried."""
+_ARRAY = "the joints in space as a NumPy array (frames, joints, 3), saved with numpy.save"
+_NOT_READ = (
+    ("FBX", (".fbx",), b"Kaydara FBX", "BVH"),
+    ("glTF", (".glb", ".gltf"), b"glTF", "BVH"),
+    ("a Python pickle, as fits of SMPL", (".pkl", ".pickle"), b"\x80", _ARRAY),
+    ("a MATLAB file", (".mat",), b"MATLAB", "a CSV with columns NAME_x, NAME_y, NAME_z (writetable)"),
+    ("a workbook of Excel", (".xlsx", ".xls"), b"", "it as CSV"),
+    ("Parquet, as of FreeMoCap", (".parquet",), b"PAR1", "CSV, which FreeMoCap writes beside it"),
+    ("a file of Visual3D or Theia", (".cmz", ".cmo", ".p3d"), b"", "C3D with the joint centres as points"),
+    ("a project of Motive, Nexus or Qualisys Track Manager", (".tak", ".x2d", ".qtm"), b"", "C3D or a table"))
+# fmt: on
+
+
+def _is_of(suffixes: tuple[str, ...], first: bytes, sample: Sample) -> bool:
+    """Return whether a file has one of some suffixes, or begins with some bytes."""
+    if sample.path.suffix.lower() in suffixes:
+        return True
+    try:
+        with open_regular(sample.path) as file:
+            return bool(first) and file.read(len(first)) == first
+    except OSError:
+        return False
+
+
+NOT_READ: tuple[JointLayout, ...] = tuple(
+    ObservationLayout(program, ", ".join(f"`{s}`" for s in suffixes), "", partial(_is_of, suffixes, first), None, new)
+    for program, suffixes, first, new in _NOT_READ
+)
+"""Files that are known by name alone."""
+
+
+def find_layout(sample: Sample) -> JointLayout | None:
+    """Return the layout of a file by its content; None if it is of none that is read."""
+    return next((layout for layout in LAYOUTS if layout.recognizes(sample)), None)
+
+
+def refuse_unread(sample: Sample) -> None:
+    """Name a file that is known and not read.
+
+    Raises:
+        FormatError: it is one.
+    """
+    for layout in NOT_READ:
+        if layout.recognizes(sample):
+            found = f"{layout.program} in {sample.path}; export {layout.instead}"
+            raise FormatError(f"expected joints, key points or masks, found {found}")
+
+
+def read_joint_files(paths: Sequence[Path], unit_m: float | None, rate: float) -> Scenes:
+    """Read files of joints in space; several are of one person each, or of one frame each.
+
+    Raises:
+        FormatError: one is malformed, or states no unit where none is given.
+    """
+    first = find_layout(Sample(paths[0]))
+    if first in SCENES:
+        return read_scenes(paths, unit_m, rate)
+    layouts = [(path, find_layout(Sample(path)) or WIDE) for path in paths]
+    return [found for path, layout in layouts for found in layout.read([path], unit_m, rate)]
+
+
+def markdown_table() -> str:
+    """Return the table for documents."""
+    rows = ["| program | files | recognized by |", "|---|---|---|"]
+    rows += [f"| {x.program} | {x.files} | {x.recognized_by} |" for x in LAYOUTS]
+    rows += [f"| {x.program} | {x.files} | not read: export {x.instead} |" for x in NOT_READ]
+    return "\n".join(rows) + "\n"

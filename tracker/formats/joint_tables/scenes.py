@@ -1,0 +1,108 @@
+"""JSON files of a frame each with the people of a scene: EasyMocap's keypoints3d and CMU Panoptic's hdPose3d."""
+
+import re
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import msgspec
+import numpy as np
+
+from tracker.errors import FormatError, Remedy
+from tracker.formats.number_rows import MAX_NAMES, check_size
+from tracker.formats.observation_layout import Sample
+from tracker.formats.trc import METRES_BY_WORD, MarkerTable, mask_missing
+from tracker.geometry.arrays import Array, IntArray
+from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
+from tracker.validation import MAX_FRAMES, Number, check
+
+Scenes: TypeAlias = list[tuple[Path, MarkerTable]]
+"""The points of each person, with the file or folder that they are from."""
+_KIND = TextKind("file of people in space", DOCUMENT_BYTES, FormatError, "export it again")
+
+
+class _Person(msgspec.Struct):
+    id: Annotated[int, msgspec.Meta(ge=-MAX_FRAMES, le=MAX_FRAMES, description="the number of a person")]
+    keypoints3d: Annotated[list[list[Number]], msgspec.Meta(max_length=MAX_NAMES)] = []
+    joints19: Annotated[list[Number], msgspec.Meta(max_length=MAX_NAMES)] = []
+
+
+class _Scene(msgspec.Struct):
+    bodies: list[_Person]
+
+
+def is_easymocap(sample: Sample) -> bool:
+    """Return whether a file is of EasyMocap's keypoints3d; a frame without people is known by its folder."""
+    data = sample.data
+    if data == []:
+        return sample.path.parent.name == "keypoints3d"
+    return isinstance(data, list) and isinstance(data[0], dict) and "keypoints3d" in data[0]
+
+
+def is_panoptic(sample: Sample) -> bool:
+    """Return whether a file is of CMU Panoptic's hdPose3d."""
+    bodies = sample.data.get("bodies") if isinstance(sample.data, dict) else None
+    return isinstance(bodies, list) and not any(isinstance(b, dict) and "joints" in b for b in bodies)  # of AlphaPose
+
+
+def read_scenes(paths: Sequence[Path], unit_m: float | None, rate: float) -> Scenes:
+    """Read the people of a folder of files; a person is absent in the files that do not have him or her.
+
+    Args:
+        paths: the files.
+        unit_m: metres per unit of EasyMocap; CMU Panoptic has centimetres.
+        rate: frames per second.
+
+    Raises:
+        FormatError: a file is malformed, or two are of one frame.
+    """
+    folder = paths[0].parent
+    scale = METRES_BY_WORD["cm"] if is_panoptic(Sample(paths[0])) else unit_m
+    if scale is None:
+        raise FormatError(f"{folder}: expected the unit of the lengths, found none", Remedy("say_unit"))
+    people: dict[int, dict[int, Array]] = defaultdict(dict)
+    frames: dict[int, Path] = {}
+    for path in paths:
+        named = re.search(r"\d{1,9}$", path.stem)
+        if named is None or frames.setdefault(int(named[0]), path) != path:
+            raise FormatError(f"expected names that end in the number of the frame, each once, found {path}; rename it")
+        for person in _people(path):
+            people[person.id][int(named[0])] = _points(person, path)
+    numbers = np.array(sorted(frames), dtype=np.int64)
+    sizes = {len(points) for found in people.values() for points in found.values()}
+    if len(sizes) != 1:
+        raise FormatError(
+            f"{folder}: expected equally many points of people in all files, found {sorted(sizes) or 'none'}"
+        )
+    check_size((len(people), len(numbers), *sizes, 4), str(folder))
+    tables = []
+    for name, found in sorted(people.items()):
+        points = np.full((len(numbers), *sizes, 4), np.nan)
+        points[np.searchsorted(numbers, [*found])] = [*found.values()]
+        tables.append((folder, unnamed_table(points, numbers, scale, rate, str(name))))
+    return tables
+
+
+def unnamed_table(points: Array, frames: IntArray, scale: float, rate: float, person: str) -> MarkerTable:
+    """Return points, (n, m, 3) or with confidence (n, m, 4), named by their numbers; absent without confidence."""
+    out = scale * points[..., :3]
+    out[~np.isfinite(out).all(axis=-1) | (points[..., 3:] <= 0).any(axis=-1)] = np.nan
+    names = tuple(map(str, range(points.shape[1])))
+    return MarkerTable(names, frames, frames / rate, out, rate, None, tuple(mask_missing(out)), person)
+
+
+def _people(path: Path) -> list[_Person]:
+    data, where = read_json(path, _KIND), f"{_KIND.name} {path}"
+    if isinstance(data, dict):
+        return check(data, _Scene, where, FormatError).bodies
+    return check(data, list[_Person], where, FormatError)
+
+
+def _points(person: _Person, path: Path) -> Array:
+    """Return x, y, z and confidence of the points of a person, (n_points, 4)."""
+    rows = person.keypoints3d or [person.joints19[i : i + 4] for i in range(0, len(person.joints19), 4)]
+    if {*map(len, rows)} not in ({3}, {4}):
+        raise FormatError(f"{path}: expected x, y, z and confidence of each point, found other rows; export it again")
+    points = np.array(rows, dtype=np.float64)
+    return np.column_stack([points, np.ones(len(points))])[:, :4]

@@ -1,0 +1,213 @@
+"""Key points of detectors whose files need no more than a function: EasyMocap, mmpose, SLEAP's CSV, YOLO.
+
+Files of one picture have no number of their own: it is in their name.
+"""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+
+from tracker.errors import FormatError
+from tracker.formats.keypoints.openpose import MAX_PEOPLE
+from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of, triples
+from tracker.formats.number_rows import MAX_NAMES, not_a_number
+from tracker.text_files import read_json, read_lines
+from tracker.validation import MAX_FRAMES, MAX_NUMBER, Name, Number, check
+
+_Place = tuple[Number, Number]
+_Sure = tuple[Number, Number, Number]
+_FrameNumber = Annotated[int, msgspec.Meta(ge=0, le=MAX_FRAMES, description=f"a whole number of at most {MAX_FRAMES}")]
+_OF_POINTS = msgspec.Meta(max_length=MAX_NAMES, description=f"up to {MAX_NAMES} points")
+_OF_PEOPLE = msgspec.Meta(max_length=MAX_PEOPLE, description=f"up to {MAX_PEOPLE} people")
+_BOX = ("class", "x", "y", "width", "height")
+"""First numbers of a line of YOLO."""
+
+
+class _Annot(msgspec.Struct):
+    keypoints: Annotated[list[_Sure], _OF_POINTS]
+
+
+class _EasyMocapPicture(msgspec.Struct):
+    annots: Annotated[list[_Annot], _OF_PEOPLE]
+
+
+class _Instance(msgspec.Struct):
+    keypoints: Annotated[list[_Place], _OF_POINTS]
+    keypoint_scores: list[Number]
+
+
+class _Frame(msgspec.Struct):
+    frame_id: _FrameNumber
+    instances: Annotated[list[_Instance], _OF_PEOPLE]
+
+
+class _MetaInfo(msgspec.Struct):
+    keypoint_id2name: dict[str, Name] = {}
+
+
+class _MmposeVideo(msgspec.Struct):
+    instance_info: list[_Frame]
+    meta_info: _MetaInfo = msgspec.field(default_factory=_MetaInfo)
+
+
+def read_easymocap(path: Path) -> list[PicturePerson]:
+    """Read the people in a picture, as EasyMocap annotates them.
+
+    Raises:
+        FormatError: the file is malformed.
+    """
+    found = check(read_json(path, text_of("EasyMocap")), _EasyMocapPicture, f"EasyMocap file {path}", FormatError)
+    return [PicturePerson(triples(person.keypoints)) for person in found.annots]
+
+
+def read_mmpose_picture(path: Path) -> list[PicturePerson]:
+    """Read the people in a picture, as mmpose's inferencer writes those of images.
+
+    Raises:
+        FormatError: the file is malformed.
+    """
+    where = f"mmpose file {path}"
+    found = check(read_json(path, text_of("mmpose")), Annotated[list[_Instance], _OF_PEOPLE], where, FormatError)
+    return [_mmpose_person(person, where) for person in found]
+
+
+def read_mmpose_video(path: Path) -> PictureTable:
+    """Read the pictures of a video, as mmpose's inferencer and its demo write them.
+
+    Raises:
+        FormatError: the file is malformed, or has a picture twice.
+    """
+    where, data = f"mmpose file {path}", read_json(path, text_of("mmpose"))
+    found = check({"instance_info": data} if isinstance(data, list) else data, _MmposeVideo, where, FormatError)
+    people = {f.frame_id: [_mmpose_person(person, where) for person in f.instances] for f in found.instance_info}
+    if len(people) < len(found.instance_info):
+        raise FormatError(f"{where}: expected each frame_id once, found one twice; export it again")
+    by_number = found.meta_info.keypoint_id2name
+    names = tuple(by_number.get(str(i), "") for i in range(len(by_number)))
+    if not all(names) or len(set(names)) < len(names):
+        raise FormatError(f"{where}: expected a name for each number in 'keypoint_id2name', found others; correct it")
+    return table_of_people(people, where, names)
+
+
+def is_mmpose_video(data: Any) -> bool:
+    """Return whether plain data of a JSON file are pictures of a video by mmpose."""
+    frames = data.get("instance_info") if isinstance(data, dict) else data
+    return isinstance(frames, list) and _first_has(frames, "instances", "frame_id")
+
+
+def is_mmpose_picture(data: Any) -> bool:
+    """Return whether plain data of a JSON file are people in a picture by mmpose."""
+    return isinstance(data, list) and _first_has(data, "keypoints", "keypoint_scores")
+
+
+def read_yolo(path: Path) -> list[PicturePerson]:
+    """Read the people in a picture, a line each, in shares of its width and height; a last score or track is left out.
+
+    Raises:
+        FormatError: the file is malformed.
+    """
+    found = []
+    for number, line in enumerate(read_lines(path, text_of("YOLO")), 1):
+        if line.strip():
+            values = parse_numbers(line.split(), f"YOLO file {path}, line {number}")[len(_BOX) :]
+            n_points = len(values) // 3
+            if not 0 < n_points <= MAX_NAMES or len(found) >= MAX_PEOPLE:
+                raise FormatError(
+                    f"YOLO file {path}, line {number}: expected a box and x, y, visibility of each point, of up to "
+                    f"{MAX_PEOPLE} people, found {len(_BOX) + len(values)} numbers; export key points"
+                )
+            found.append(PicturePerson(triples(np.reshape(values[: 3 * n_points], (-1, 3)).tolist())))
+    return found
+
+
+def is_yolo(head: Sequence[str]) -> bool:
+    """Return whether the first lines of a file are people of YOLO: a class, a box and points, in shares."""
+    rows = [line.split() for line in head if line.strip()]
+    try:
+        values = np.array([[float(cell) for cell in row[: len(_BOX)]] for row in rows])
+    except ValueError:
+        return False
+    is_complete = values.ndim == 2 and values.shape[1] == len(_BOX) and all(len(row) > 2 * len(_BOX) for row in rows)
+    return is_complete and bool(((values[:, 1:] >= 0) & (values[:, 1:] <= 1)).all() and (values[:, 0] % 1 == 0).all())
+
+
+def read_sleap_csv(path: Path) -> PictureTable:
+    """Read an analysis that SLEAP exported as CSV: a row for each person in each picture.
+
+    Raises:
+        FormatError: the file is malformed.
+    """
+    where = f"SLEAP file {path}"
+    lines = read_lines(path, text_of("SLEAP"))
+    head = _cells(next(lines, ""), where)
+    names = tuple(cell.removesuffix(".x") for cell in head if cell.endswith(".x"))
+    columns = [f"{name}{part}" for name in names for part in (".x", ".y", ".score")]
+    if not 0 < len(names) <= MAX_NAMES or len(set(head)) < len(head) or {*columns, "track", "frame_idx"} - set(head):
+        raise FormatError(
+            f"{where}: expected track, frame_idx and NAME.x, NAME.y, NAME.score of each point, each once, found "
+            f"{', '.join(head)[:60]}; export it again"
+        )
+    at = [head.index(c) for c in ("frame_idx", *columns)]
+    people: dict[int, list[PicturePerson]] = {}
+    for number, line in enumerate(lines, 2):
+        here = f"{where}, line {number}"
+        cells = _cells(line, here)
+        if not cells:
+            continue
+        if len(cells) != len(head):
+            raise FormatError(f"{here}: expected {len(head)} columns, found {len(cells)}; export it again")
+        picture, *values = parse_numbers([cells[i] or "nan" for i in at], here)
+        if not (picture % 1 == 0 and 0 <= picture <= MAX_FRAMES):
+            raise FormatError(f"{here}: expected a whole number as frame_idx, found {picture:g}; export it again")
+        points = np.reshape(values, (-1, 3))
+        points[np.isnan(points).any(axis=1)] = (np.nan, np.nan, 0.0)
+        people.setdefault(int(picture), []).append(PicturePerson(points, cells[head.index("track")][:200]))
+    if not people:
+        raise FormatError(f"{where} has no rows of numbers; export it again")
+    return table_of_people(people, where, names)
+
+
+def is_sleap_csv(head: Sequence[str]) -> bool:
+    """Return whether the first lines of a CSV are those of SLEAP's analysis."""
+    return bool(head) and head[0].startswith("track,frame_idx,")
+
+
+def _mmpose_person(person: _Instance, where: str) -> PicturePerson:
+    if len(person.keypoints) != len(person.keypoint_scores):
+        raise FormatError(
+            f"{where}: expected a score for each of {len(person.keypoints)} points, found "
+            f"{len(person.keypoint_scores)}; export it again"
+        )
+    return PicturePerson(triples(person.keypoints, person.keypoint_scores))
+
+
+def _first_has(rows: list[Any], *keys: str) -> bool:
+    return bool(rows) and isinstance(rows[0], dict) and rows[0].keys() >= {*keys}
+
+
+def _cells(line: str, where: str) -> list[str]:
+    try:
+        return next(csv.reader([line]), [])
+    except csv.Error as error:
+        raise FormatError(f"{where}: {error}; export it again") from error
+
+
+def parse_numbers(cells: Sequence[str], where: str) -> list[float]:
+    """Return numbers of a table; `nan` stands for a missing one.
+
+    Raises:
+        FormatError: one is none, or too large; `where` names its place.
+    """
+    out = []
+    for cell in cells:
+        try:
+            out.append(float(cell))
+        except ValueError as error:
+            raise FormatError(f"{where}: {not_a_number(cell)}") from error
+    if wrong := next((value for value in out if abs(value) > MAX_NUMBER), None):
+        raise FormatError(f"{where}: expected numbers within {MAX_NUMBER:g}, found {wrong:g}; correct it")
+    return out
