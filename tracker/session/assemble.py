@@ -8,6 +8,7 @@ from typing import TypeVar
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import CalibratedCameras, read_cameras
 from tracker.errors import RecordingError, Remedy, SessionError
+from tracker.files import entries_below, paths_in
 from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.image_file import IMAGE_SUFFIXES
@@ -312,12 +313,7 @@ def footage_in(folder: Path) -> list[Path]:
     Raises:
         SessionError: there is neither.
     """
-    try:
-        entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
-    except OSError as error:
-        raise SessionError(
-            f"expected a folder of videos, found that {folder} cannot be read ({error.strerror}); check the path"
-        ) from error
+    entries = paths_in(folder, SessionError)
     videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
     found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
     if not found:
@@ -329,7 +325,8 @@ def footage_in(folder: Path) -> list[Path]:
 
 
 def _has_image(folder: Path) -> bool:
-    return any(path.suffix.lower() in IMAGE_SUFFIXES for path in folder.iterdir())
+    entries = entries_below(folder, SessionError, enters=False)
+    return any(entry.name.lower().endswith(IMAGE_SUFFIXES) for entry in entries)
 
 
 def find_background(folder: Path, camera: str) -> Path:
