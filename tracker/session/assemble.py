@@ -313,6 +313,8 @@ def footage_in(folder: Path) -> list[Path]:
     Raises:
         SessionError: there is neither.
     """
+    if not folder.is_dir():
+        raise SessionError(f"expected a folder of videos, found none at {folder}; check the path")
     entries = paths_in(folder, SessionError)
     videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
     found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
