@@ -40,7 +40,10 @@ from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
 from app.runtime.malloc_trim import give_back_freed_memory
 from app.runtime.plain_output import PlainOutput, printable
+from tracker.compute.extensions import pass_over_unread_packages
 from tracker.errors import TrackerError
+
+pass_over_unread_packages()  # as this module is imported, so that processes that it starts do, too
 
 _COMMANDS: dict[str, Callable[..., None]] = {
     "open": open_.command,
@@ -74,6 +77,8 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "bench": bench.command,
     "doctor": doctor.command,
 }
+_ADDED_HELP = {"evaluate": evaluate.added_help, "export": export.added_help}
+"""Sentence about the extensions of other packages, which are loaded when help is asked for."""
 _HELP = ("-h", "--help")
 _ABOUT = """Model-based human motion capture from several calibrated cameras.
 
@@ -86,6 +91,8 @@ def _command_line(words: list[str]) -> tyro.extras.SubcommandApp:
     app = tyro.extras.SubcommandApp()
     for name, command in _COMMANDS.items():
         summary = (command.__doc__ or "").partition("\n")[0]
+        if name == words[0] and name in _ADDED_HELP and set(words) & {*_HELP}:
+            command.__doc__ = f"{command.__doc__}\n    {_ADDED_HELP[name]()}\n    "
         app.command(name=name, help=summary if words[0] in _HELP else None)(command)
     return app
 

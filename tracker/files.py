@@ -1,13 +1,31 @@
-"""Read regular files alone, and write files: text atomically, nothing through links, names on the disk."""
+"""Read regular files alone, write files atomically and never through links, and look through folders within bounds."""
 
 import contextlib
 import os
 import secrets
 import stat
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
 from io import BufferedReader
 from pathlib import Path
+from typing import NamedTuple
 
-from tracker.errors import SessionError
+from tracker.errors import SessionError, TrackerError
+
+
+class WalkLimits(NamedTuple):
+    """Bounds of a walk through folders."""
+
+    entries: int = 1_000_000
+    """Files and folders at most: ten cameras with a file for each picture, half an hour at 50 Hz."""
+    depth: int = 32
+    """Folders within each other at most: below a path of 4096 characters, the system's limit, few have more."""
+    seconds: float = 20.0
+    """Time at most: a page waits for it."""
+
+
+LIMITS = WalkLimits()
 
 
 class IrregularFileError(OSError):
@@ -107,3 +125,68 @@ def sync_folder(folder: Path) -> None:
             os.fsync(number)
         finally:
             os.close(number)
+
+
+def entries_below(
+    folder: Path,
+    error: type[TrackerError],
+    enters: bool = True,
+    passes_unreadable: bool = False,
+) -> "Iterator[os.DirEntry[str]]":
+    """Yield the files and folders in a folder and in those inside; links to folders are not followed.
+
+    Args:
+        folder: to look through; may be a link itself.
+        error: kind of error to raise.
+        enters: whether folders inside are looked through, too.
+        passes_unreadable: whether folders inside that cannot be read are passed over.
+
+    Raises:
+        TrackerError: it is no folder that can be read, or a bound is reached.
+    """
+    limits = LIMITS
+    end, n, waiting = time.monotonic() + limits.seconds, 0, deque([(folder, 1)])
+    while waiting:
+        at, depth = waiting.popleft()
+        if depth > limits.depth:
+            raise error(
+                f"expected at most {limits.depth} folders within each other, found more at {at}; name one further in"
+            )
+        for entry in _read(at, error, passes_unreadable and at != folder):
+            n += 1
+            if n > limits.entries or time.monotonic() > end:
+                raise error(
+                    f"expected at most {limits.entries} files and folders in {folder}, looked through within "
+                    f"{limits.seconds:g} s, found more after {n - 1}; name a folder further in"
+                )
+            if enters and entry.is_dir(follow_symlinks=False):
+                waiting.append((Path(entry.path), depth + 1))
+            yield entry
+
+
+def paths_in(folder: Path, error: type[TrackerError], accepts: Callable[[str], bool] = lambda _: True) -> list[Path]:
+    """Return the files and folders in a folder whose names do not begin with a dot, by name.
+
+    Args:
+        folder: to look into.
+        error: kind of error to raise.
+        accepts: whether a name is wanted.
+
+    Raises:
+        TrackerError: it is no folder that can be read, or has too many entries.
+    """
+    found = (entry.name for entry in entries_below(folder, error, enters=False))
+    return sorted(folder / name for name in found if not name.startswith(".") and accepts(name))
+
+
+def _read(folder: Path, error: type[TrackerError], passes_unreadable: bool) -> "Iterator[os.DirEntry[str]]":
+    try:
+        with os.scandir(folder) as found:
+            yield from found
+    except (OSError, ValueError) as reason:
+        if not passes_unreadable:
+            why = getattr(reason, "strerror", None) or reason
+            raise error(
+                f"expected a folder that can be read, found that {folder} cannot be ({why}); check the path and that "
+                "you may read it"
+            ) from reason

@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 from platformdirs import user_cache_path, user_state_path
@@ -158,7 +159,7 @@ def _extras() -> list[Finding]:
 
 def _extensions() -> list[Finding]:
     from tracker.calibrations.calibration_layout import CalibrationLayout
-    from tracker.compute.extensions import GROUPS, extensions
+    from tracker.compute.extensions import GROUPS, extensions, unread_packages
     from tracker.evaluation.metric import Metric
     from tracker.exports.export_format import ExportFormat
 
@@ -168,8 +169,12 @@ def _extensions() -> list[Finding]:
         for one in extensions(group, kind):
             if one.package.startswith("quadrille "):
                 continue
-            state, text = ("warning", without_paths(one.error)) if one.error else ("ok", f"of {one.package}")
-            found.append(Finding(f"{group.removeprefix('quadrille.')} {one.name}", state, text))
+            odd = one.error or (one.printed and f"its module prints when it is loaded: '{one.printed}'")
+            text = f"of {one.package}" + (f": {without_paths(odd)}" if odd else "")
+            name = shorten(f"{group.removeprefix('quadrille.')} {one.name}", 60)
+            found.append(Finding(name, "warning" if odd else "ok", text))
+    for package, error in unread_packages().items():
+        found.append(Finding("entry points", "warning", f"those of {package} cannot be read: {without_paths(error)}"))
     return found
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from tracker.evaluation.metrics import Alignment
     from tracker.evaluation.references import Reference
 
-_METRICS = metrics()
-
 
 @dataclass(frozen=True)
 class EvaluateArguments:
@@ -66,9 +64,10 @@ def command(arguments: Annotated[EvaluateArguments, tyro.conf.arg(name="")]) -> 
     print(format_json(found) if arguments.json else _format(found))
 
 
-if _METRICS:
-    listed = "; ".join(f"{metric.name}: {metric.title}" for metric in _METRICS.values())
-    command.__doc__ = f"{command.__doc__}\n    Measures of other packages: {listed}.\n    "
+def added_help() -> str:
+    """Return a sentence for help about the measures of extensions; empty without any."""
+    listed = "; ".join(f"{metric.name}: {metric.title}" for metric in metrics().values())
+    return listed and f"Measures of extensions: {listed}."
 
 
 def evaluate(
@@ -126,7 +125,7 @@ def _format(found: dict[str, Any]) -> str:
 
 
 def _metric(name: str, value: float) -> str:
-    return f"{_METRICS[name].title} {value:.4g} {_METRICS[name].unit}".rstrip()
+    return f"{metrics()[name].title} {value:.4g} {metrics()[name].unit}".rstrip()
 
 
 def _lost(found: dict[str, Any]) -> str:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tracker.exports.dataset_card import RecordingSummary
     from tracker.exports.motion import Checked, ExportedMotion
 
-_FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.values())
+_FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.own.values())
 
 
 def _choice(words: str) -> Any:
@@ -80,6 +80,12 @@ class ExportArguments:
     """replace files that exist."""
     json: bool = False
     """print one JSON object."""
+
+
+def added_help() -> str:
+    """Return a sentence for help about the formats of extensions; empty without any."""
+    listed = "; ".join(f"{name}: {each.title}" for name, each in FORMATS.added.items())
+    return listed and f"Formats of extensions: {listed}."
 
 
 def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> None:

@@ -3,7 +3,6 @@
 import asyncio
 import itertools
 import logging
-from collections import deque
 from collections.abc import Coroutine, Sequence
 from typing import Any
 
@@ -15,7 +14,6 @@ from app.messages import encoding
 from app.messages.base import Message, encode_text
 from app.messages.observation import WatchProvenance
 from app.messages.parsing import MISUNDERSTOOD, MessageError, check_allowed, parse
-from app.messages.search import PreviewCandidate, ReplayStep, SetSearchSpeed
 from app.messages.server import HistoryMessage, NoticeMessage, StateMessage
 from app.page import commands
 from app.page.feeds.curves import CurveFeed
@@ -25,6 +23,7 @@ from app.page.feeds.overlay import OverlayFeed
 from app.page.feeds.pictures import PictureSets
 from app.page.feeds.provenance import ProvenanceFeed
 from app.page.feeds.search import SearchFeed
+from app.page.inbox import FloodError, Inbox
 from app.participants.participants import Participants, Visit
 from app.participants.presence_feed import PresenceFeed
 from app.remedies import page_text
@@ -42,16 +41,6 @@ _WATCHABLE_S = 1 / 60
 """Time between two updates of a running search: faster ones are invisible and take time from the search."""
 _MAX_HISTORY = 2000
 """Largest number of history entries, in each direction, that a page may request."""
-_COALESCED = (
-    wire.Seek,
-    wire.SetView,
-    wire.CheckEpipolar,
-    WatchProvenance,
-    ReplayStep,
-    PreviewCandidate,
-    SetSearchSpeed,
-)
-"""Messages of which only the newest in the queue is carried out."""
 
 
 class PaneSocket:
@@ -66,6 +55,7 @@ class PaneSocket:
         """
         self._participants, self._notices = participants, notices
         self._pages = itertools.count(1)
+        self._backlog = asyncio.Lock()
 
     async def serve(self, socket: web.WebSocketResponse, role: Role = "host", name: str = "") -> None:
         """Serve one page until its socket closes.
@@ -78,7 +68,7 @@ class PaneSocket:
         visit = await asyncio.to_thread(self._participants.join, role, name)
         presence = PresenceFeed(self._participants)
         try:
-            page = PageConnection(next(self._pages), visit, socket, presence)
+            page = PageConnection(next(self._pages), visit, socket, presence, self._backlog)
             await page.serve(self._notices)
         finally:
             presence.close()
@@ -88,7 +78,9 @@ class PaneSocket:
 class PageConnection:
     """The connection to one page."""
 
-    def __init__(self, number: int, visit: Visit, socket: web.WebSocketResponse, presence: PresenceFeed) -> None:
+    def __init__(
+        self, number: int, visit: Visit, socket: web.WebSocketResponse, presence: PresenceFeed, backlog: asyncio.Lock
+    ) -> None:
         """Prepare to serve a page.
 
         Args:
@@ -96,12 +88,13 @@ class PageConnection:
             visit: the controller that it shows, and its role; messages that this does not allow are refused.
             socket: to the page.
             presence: source of the places of all people.
+            backlog: shared by the pages of a session. Of those with a link that are behind, one at a time is served.
         """
+        self._backlog = backlog
         self._number, self._visit, self._socket, self._presence = number, visit, socket, presence
         self._controller = visit.controller
         self._changed = asyncio.Event()
-        self._arrived = asyncio.Event()
-        self._waiting: deque[wire.ClientMessage] = deque()
+        self._inbox = Inbox(has_limit=visit.role != "host")
         self._sent: State | None = None
         self._sent_text: StateMessage | None = None
         self._sent_text_at = 0.0
@@ -128,12 +121,10 @@ class PageConnection:
         """
         unsubscribe = self._controller.subscribe(self._wake)
         self._changed.set()
-        work = (self._send_all(notices), self._act(), self._send_presence())
+        work = (self._read(), self._send_all(notices), self._act(), self._send_presence())
         tasks = [asyncio.create_task(self._guarded(t)) for t in work]
         try:
-            async for message in self._socket:
-                if message.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY):
-                    await self._receive(message)
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)  # a reader may wait for those that failed
         finally:
             unsubscribe()
             for task in tasks:
@@ -157,14 +148,22 @@ class PageConnection:
             await work
         except ConnectionError:
             _LOG.debug("a page closed its socket during a message")
+        except FloodError as error:
+            _LOG.warning("the page of '%s' is closed: %s", self._visit.name, error)
+            await self._socket.close(code=aiohttp.WSCloseCode.POLICY_VIOLATION, message=str(error).encode())
         except Exception:
             _LOG.exception("a pane socket failed; the page connects again")
             await self._socket.close(code=aiohttp.WSCloseCode.INTERNAL_ERROR)
 
     # --- page to controller ------------------------------------------------------------------------------------
 
+    async def _read(self) -> None:
+        async for message in self._socket:
+            if message.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY):
+                await self._receive(message)
+
     async def _receive(self, received: aiohttp.WSMessage) -> None:
-        """Parse and queue a message. A newer seek, or a newer move of a drag, replaces one that waits."""
+        """Parse and queue a message; one that is refused waits for its turn, too."""
         try:
             if received.type is aiohttp.WSMsgType.BINARY:
                 raise MessageError("a text message", f"a binary one of {len(received.data)} bytes")
@@ -173,27 +172,31 @@ class PageConnection:
                 return  # sent on connecting, before the page knows that it has no 3-D view
             check_allowed(self._visit.role, message, self._visit.has_place)
         except TrackerError as error:
-            await self._refuse(error)
-            return
-        last = self._waiting[-1] if self._waiting else None
-        if last is not None and type(last) is type(message) and (_is_move(last, message) or type(last) in _COALESCED):
-            self._waiting.pop()
-        self._waiting.append(message)
-        self._arrived.set()
+            await self._inbox.put(error)
+        else:
+            await self._inbox.put(message)
 
     async def _act(self) -> None:
         while True:
-            await self._arrived.wait()
-            self._arrived.clear()
-            while self._waiting:
-                message = self._waiting.popleft()
-                try:
-                    await asyncio.to_thread(self._carry_out, message)
-                except TrackerError as error:
-                    await self._refuse(error)
-                except Exception as error:
-                    _LOG.exception("a message of a page failed: %s", message)
-                    await self._notice(f"expected to carry out '{type(message).__name__}', found a fault: {error!r}")
+            message = await self._inbox.take()
+            if self._visit.role == "host" or not len(self._inbox):
+                await self._answer(message)
+                continue
+            async with self._backlog:
+                began = self._loop.time()
+                await self._answer(message)
+                await asyncio.sleep(self._loop.time() - began)  # half of the time is for the host
+
+    async def _answer(self, message: wire.ClientMessage | TrackerError) -> None:
+        try:
+            if isinstance(message, TrackerError):
+                raise message
+            await asyncio.to_thread(self._carry_out, message)
+        except TrackerError as error:
+            await self._refuse(error)
+        except Exception as error:
+            _LOG.exception("a message of a page failed: %s", message)
+            await self._notice(f"expected to carry out '{type(message).__name__}', found a fault: {error!r}")
 
     def _carry_out(self, message: wire.ClientMessage) -> None:
         match message:
@@ -379,11 +382,6 @@ def view_of(message: wire.SetView, n_cameras: int) -> View:
     if len(reductions) != n_cameras or any(0 < r < 1 for r in reductions):
         raise MessageError(f"0 or a reduction from 1 to 64 for each of {n_cameras} cameras", str(reductions))
     return View(frozenset(message.layers), reductions, message.by_part)
-
-
-def _is_move(last: wire.ClientMessage, message: wire.ClientMessage) -> bool:
-    """Return whether two messages of one type are moves of a drag."""
-    return getattr(last, "phase", None) == getattr(message, "phase", None) == "move"
 
 
 def _value_names(session: Session) -> list[tuple[str, ...]]:

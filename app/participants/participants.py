@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from app.control.controller import Controller
-from app.participants.names import is_same, joined_name
+from app.participants.names import is_same, joined_name, looks_alike
 from app.state.role import Role
 from app.state.state import State
 from app.storage.turns import work_of
@@ -157,14 +157,15 @@ class Participants:
             return found
 
     def _named(self, role: Role, name: str) -> _Participant:
-        known = next((p for p in (self._host, *self._others) if is_same(p.name, name)), None)
+        everybody = (self._host, *self._others)
+        known = next((p for p in everybody if is_same(p.name, name)), None)
         if known is not None and known.role == role:
             return known
+        found = "who has joined with another role"
+        if known is None:
+            known, found = next((p for p in everybody if looks_alike(p.name, name)), None), "which looks alike"
         if known is not None and (known is self._host or not _is_idle(known)):
-            raise TrackerError(
-                f"expected a name that nobody else has, found {known.name}, who has joined with another role; "
-                "choose another"
-            )
+            raise TrackerError(f"expected a name that nobody else has, found {known.name}, {found}; choose another")
         if known is not None:
             self._drop(known)
         if len(self._others) >= _MAX_PEOPLE:

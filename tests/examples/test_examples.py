@@ -1,5 +1,6 @@
 """The programs of docs/examples run, and packages that extend the program are found by their entry points."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -11,9 +12,11 @@ import cv2
 import pytest
 from bodies import MODELS
 from command_line import SAMPLE
+from installed_packages import install
 from stored_motions import store_motion
 
 import tracker
+from tracker.compute.extensions import GROUPS
 from tracker.evaluation.references import read_joints
 from tracker.pipeline.given_pose import set_pose_at_joints
 
@@ -97,6 +100,28 @@ def test_a_strangers_metric_and_exporter_are_in_help_results_and_menu(packages, 
     menu = "from app.server.export_routes import FORMATS; print(*FORMATS)"
     assert "roots" in run("-c", menu, path=[packages]).split()
     assert "jerk-metric 1.0" in run(*app, "doctor", path=[packages])
+
+
+def test_packages_that_break_a_program_are_lines_of_the_doctor(tmp_path):
+    points = "".join(f"[{group}]\nodd = odd:thing\n" for group in GROUPS)
+    install(tmp_path, "odd", "print('odd text')\nraise SystemExit(3)", points)
+    install(tmp_path, "broken", "", "[a]\nno equals sign\n")
+    found = {f["name"]: f for f in json.loads(run("-m", "app", "doctor", "--json", path=[tmp_path]))["findings"]}
+    odd = [found[f"{group.removeprefix('quadrille.')} odd"] for group in GROUPS]
+    assert {(f["state"], f["text"]) for f in odd} == {("warning", "of odd 1.0: SystemExit: 3")}
+    assert found["entry points"]["text"].startswith("those of broken 1.0 cannot be read: TypeError")
+
+
+@pytest.mark.slow
+def test_a_command_loads_no_extension_that_it_does_not_use(tmp_path):
+    points = "".join(f"[{group}]\nodd = odd:thing\n" for group in GROUPS)
+    install(tmp_path, "odd", "print('odd text')\nraise SystemExit(3)", points)
+    install(tmp_path, "broken", "", "[a]\nno equals sign\n")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    words = [sys.executable, "-m", "app", "info", str(SAMPLE), "--json"]
+    done = subprocess.run(words, capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["frames"] == 50
 
 
 def test_an_extension_that_fails_is_left_out_and_named(packages, tmp_path):

@@ -50,13 +50,14 @@ class Page:
 
 
 @asynccontextmanager
-async def visiting(controller, notices=(), role="host", name="", participants=None):
+async def visiting(controller, notices=(), role="host", name="", participants=None, panes=None):
     people = participants or Participants(controller)
+    panes = panes or PaneSocket(people, notices)
 
     async def serve(request):
         socket = web.WebSocketResponse(decode_text=False)
         await socket.prepare(request)
-        await PaneSocket(people, notices).serve(socket, role, name)
+        await panes.serve(socket, role, name)
         return socket
 
     app = web.Application()

@@ -1,5 +1,6 @@
 """Merge two copies of one session into a new session folder."""
 
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +47,7 @@ def merge_sessions(a: Path, b: Path, into: Path, tolerance_m: float) -> MergeRep
     require_copies(*sessions)
     logs = [_read(session) for session in sessions]
     uids = [{edit.uid for edit in log.edits} for log in logs]
-    if not uids[0] & uids[1] and logs[0].settings.get("store_id") != logs[1].settings.get("store_id"):
+    if not (uids[0] & uids[1] or _has_one_origin(sessions, logs)):
         raise SessionError(
             f"expected two copies of one session, found {a} and {b} without a common edit in their histories; merge a "
             "copy with the session that it was copied from"
@@ -58,10 +59,17 @@ def merge_sessions(a: Path, b: Path, into: Path, tolerance_m: float) -> MergeRep
             "do not know; give both the same calibration.toml"
         )
     later, earlier = sorted(zip(logs, sessions, strict=True), key=_age, reverse=True)
-    session = replace(later[1], people=_people(later[1], earlier[1], merged))
+    people = _people(later[1], earlier[1], merged) if earlier[0].revisions else later[1].people  # never opened
+    session = replace(later[1], people=people)
     notes = write_session_copy(into, session, merged.log, merged.numbered, [later[1].folder, earlier[1].folder])
     own = len(uids[0] - uids[1]), len(uids[1] - uids[0])
     return MergeReport(len(merged.log.edits), own, tuple(merged.conflicts), tuple(notes))
+
+
+def _has_one_origin(sessions: Sequence[Session], logs: Sequence[EditLog]) -> bool:
+    """Return whether two sessions are copies of one folder, by the identity of the session or of its annotations."""
+    (one, other), stores = sessions, [log.settings.get("store_id") for log in logs]
+    return one.uid == other.uid != "" or stores[0] == stores[1]
 
 
 def require_copies(a: Session, b: Session) -> None:
@@ -109,6 +117,8 @@ def _words(value: Any) -> str:
 
 
 def _read(session: Session) -> EditLog:
+    if session.uid and not session.annotations_path.exists():  # nobody has opened it yet
+        return EditLog((), frozenset(), (), (), {}, {}, ((), (), ()))
     with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
         return store.read_log()
 

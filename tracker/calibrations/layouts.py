@@ -1,5 +1,7 @@
 """The table of all layouts of calibrations that are read. `docs/recordings.md` lists it."""
 
+from functools import cache
+
 from tracker.calibrations import data_layouts as data
 from tracker.calibrations import motion_capture as mocap
 from tracker.calibrations import toml_layouts as toml
@@ -129,22 +131,23 @@ _OWN: tuple[CalibrationLayout, ...] = (
         by_program=False,
     ),
 )
-LAYOUTS: tuple[CalibrationLayout, ...] = (
-    *usable("quadrille.calibrations", CalibrationLayout, [layout.name for layout in _OWN]).values(),
-    *_OWN,
-)
-"""In the order in which they are tried: those of other packages, then those that share words with others."""
+
+
+@cache
+def layouts() -> tuple[CalibrationLayout, ...]:
+    """Return the layouts in the order in which they are tried: those of other packages come first."""
+    return (*usable("quadrille.calibrations", CalibrationLayout, [layout.name for layout in _OWN]).values(), *_OWN)
 
 
 def find_layout(document: Document) -> CalibrationLayout | None:
     """Return the layout of a file by its content; None if it is of none."""
-    return next((layout for layout in LAYOUTS if layout.recognizes(document)), None)
+    return next((layout for layout in layouts() if layout.recognizes(document)), None)
 
 
 def markdown_table() -> str:
     """Return the table for documents."""
     rows = ["| layout | recognized by | poses | unit |", "|---|---|---|---|"]
-    for layout in LAYOUTS:
+    for layout in layouts():
         poses = f"`{layout.poses}`" if "=" in layout.poses else layout.poses
         rows.append(f"| {layout.name} | {layout.recognized_by} | {poses} | {layout.unit or 'given, else m'} |")
     return "\n".join(rows) + "\n"

@@ -19,6 +19,7 @@ from tracker.calibrations.rotation_forms import check_turned, refuse_angles, wit
 from tracker.calibrations.toml_layouts import board_square
 from tracker.calibrations.units import check_units
 from tracker.errors import CalibrationError, Remedy
+from tracker.files import paths_in
 from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
 from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry import rigid
@@ -111,7 +112,8 @@ def _documents(paths: Sequence[Path]) -> list[tuple[Document, CalibrationLayout]
 
 
 def _in_folder(folder: Path) -> list[tuple[Document, CalibrationLayout]]:
-    files = sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file())
+    found_files = paths_in(folder, CalibrationError, lambda name: name.lower().endswith(_SUFFIXES))
+    files = [path for path in found_files if path.is_file()]
     found: list[tuple[Document, CalibrationLayout]] = []
     failure: CalibrationError | None = None
     for path in files[:_MAX_FILES]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 from tracker.compute.extensions import usable
@@ -40,6 +41,7 @@ class Metric:
     """Computes it; NaN where it is not defined."""
 
 
+@cache
 def metrics() -> Mapping[str, Metric]:
     """Return the metrics of other packages by name; see `tracker.compute.extensions`."""
     return usable("quadrille.metrics", Metric)

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tracker.compute.extensions import usable
+from tracker.compute.extensions import Extended
 from tracker.errors import Remedy, TrackerError
 from tracker.exports.export_format import ExportFormat, Writer
 
@@ -158,7 +158,7 @@ _OWN: Mapping[str, ExportFormat] = {
         ),
     )
 }
-FORMATS: Mapping[str, ExportFormat] = {**_OWN, **usable("quadrille.exporters", ExportFormat, _OWN)}
+FORMATS = Extended(_OWN, "quadrille.exporters", ExportFormat)
 """All formats by name."""
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tracker.errors import RecordingError
+from tracker.files import paths_in
 from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_image_or_none
 from tracker.formats.keypoints.picture_numbers import PictureNumbers, picture_numbers
 from tracker.geometry.arrays import Image, IntArray
@@ -47,7 +48,7 @@ class ImageFolder:
         """
         self.path = path
         self._where = f"camera '{camera}': image folder {path}"
-        images = [f for f in path.iterdir() if f.suffix.lower() in IMAGE_SUFFIXES and not f.name.startswith(".")]
+        images = paths_in(path, RecordingError, lambda name: name.lower().endswith(IMAGE_SUFFIXES))
         kinds = sorted({f.suffix.lower() for f in images})
         if len(kinds) != 1:
             raise RecordingError(

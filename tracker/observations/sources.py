@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from tracker.errors import FormatError, Remedy
+from tracker.files import entries_below
 from tracker.formats.keypoints.picture_names import PictureName, picture_names
 from tracker.observations.observed import SourceFile, checksum
 from tracker.session.matching import check_names
@@ -47,16 +48,14 @@ def list_files(paths: Sequence[Path], suffixes: Sequence[str]) -> list[Found]:
     """Return the files of some suffixes among paths and in their folders, each with the folder it is relative to.
 
     Raises:
-        FormatError: a path is missing, or there is no such file.
+        FormatError: a path is missing, a folder is too large, or there is no such file.
     """
     found: list[Found] = []
     for path in paths:
         if path.is_dir():
-            found += [
-                (p, path)
-                for p in sorted(path.rglob("*"))
-                if p.suffix.lower() in suffixes and not p.name.startswith(".")
-            ]
+            named = (e for e in entries_below(path, FormatError) if not e.name.startswith("."))
+            inside = (Path(e.path) for e in named if e.name.lower().endswith(tuple(suffixes)) and e.is_file())
+            found += [(file, path) for file in sorted(inside)]
         elif path.exists():
             found.append((path, path.parent))
         else:

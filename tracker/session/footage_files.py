@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from tracker.errors import RecordingError, Remedy, SessionError
+from tracker.files import entries_below, paths_in
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.chapters import VIDEO_SUFFIXES
 from tracker.footage.image_file import IMAGE_SUFFIXES
@@ -16,12 +17,9 @@ def footage_in(folder: Path) -> list[Path]:
     Raises:
         SessionError: there is neither.
     """
-    try:
-        entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
-    except OSError as error:
-        raise SessionError(
-            f"expected a folder of videos, found that {folder} cannot be read ({error.strerror}); check the path"
-        ) from error
+    if not folder.is_dir():
+        raise SessionError(f"expected a folder of videos, found none at {folder}; check the path")
+    entries = paths_in(folder, SessionError)
     videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
     found = videos or [path for path in entries if path.is_dir() and _has_footage(path)]
     if not found:
@@ -33,7 +31,8 @@ def footage_in(folder: Path) -> list[Path]:
 
 
 def _has_footage(folder: Path) -> bool:
-    return any(path.suffix.lower() in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES) for path in folder.iterdir())
+    entries = entries_below(folder, SessionError, enters=False)
+    return any(entry.name.lower().endswith((*IMAGE_SUFFIXES, *VIDEO_SUFFIXES)) for entry in entries)
 
 
 def find_background(folder: Path, camera: str) -> Path:

@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from tracker.errors import RecordingError, Remedy, SessionError
+from tracker.files import paths_in
 from tracker.footage.frame_rates import same_rate, usual_rate
 from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.video import Footage
@@ -57,7 +58,8 @@ def find_entry(folder: Path, name: str) -> Path:
     """Return the path of a file or folder by its name, in whichever Unicode form the system stores it."""
     path = folder / name
     if not path.exists() and folder.is_dir():
-        return next((entry for entry in folder.iterdir() if same_form(entry.name) == same_form(name)), path)
+        wanted = same_form(name)
+        return next(iter(paths_in(folder, SessionError, lambda entry: same_form(entry) == wanted)), path)
     return path
 
 

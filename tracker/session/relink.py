@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tracker.errors import RecordingError, Remedy, SessionError, TrackerError
+from tracker.files import entries_below
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
@@ -145,11 +146,11 @@ def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, lis
         if not wanted:
             continue
         root = Path(os.path.abspath(folder))
-        everything = ((Path(at), name) for at, inner, files in os.walk(root) for name in (*inner, *files))
-        for at, name in chain([(root.parent, root.name)], everything):
-            key = same_form(name)
-            if key in wanted and at / name not in found.setdefault(key, []):
-                found[key].append(at / name)
+        everything = (Path(e.path) for e in entries_below(root, SessionError, passes_unreadable=True))
+        for path in chain([root], everything):
+            key = same_form(path.name)
+            if key in wanted and path not in found.setdefault(key, []):
+                found[key].append(path)
     return found
 
 

@@ -5,11 +5,13 @@
       calibration.toml     anipose / Pose2Sim layout, metres
       models/NAME.toml     a person's body model
       annotations.sqlite   poses (see `tracker.store.annotation_store`)
+      identity.txt         identity that copies of the folder share
 
 Footage may lie anywhere. Paths in session.toml are relative to the session folder for files in it or beside it, so
 that both can be moved together, and absolute otherwise.
 """
 
+import re
 import secrets
 import shutil
 from collections.abc import Sequence
@@ -22,7 +24,7 @@ import tomli_w
 
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
-from tracker.files import check_regular, refuse_links, write_text_atomic
+from tracker.files import check_regular, read_regular, refuse_links, write_text_atomic
 from tracker.footage.camera_source import CameraSource, Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
@@ -39,6 +41,7 @@ from tracker.validation import quoted
 
 CALIBRATION_FILE = "calibration.toml"
 ANNOTATIONS_FILE = "annotations.sqlite"
+IDENTITY_FILE = "identity.txt"
 PALETTE = ("#53a504", "#d062f2", "#f5b8c2", "#60c0d8", "#96f19e", "#abb179", "#8793a7", "#a78c85")
 """Colours of the people of a new session, distinct from one another with every kind of colour vision."""
 
@@ -71,6 +74,8 @@ class Session:
     """World axis that points up: x, y or z, with a minus sign for an axis that points down."""
     floor: GroundPlane | None = None
     """The floor set by a person; None for the plane through the world's origin across `up`."""
+    uid: str = ""
+    """Identity from its making on, 32 hexadecimal digits, which all copies share; empty for older sessions."""
 
     @property
     def camera_names(self) -> tuple[str, ...]:
@@ -116,7 +121,8 @@ def create_session(
         from tracker.footage.video import open_footage  # imported lazily: PyAV takes 0.1 s to load
 
         n_frames = min((open_footage(c.footage, c.camera.name).n_frames - c.offset for c in sources), default=0)
-    session = Session(folder, name or folder.name, float(fps), n_frames, sources, tuple(people), up)
+    title, uid = name or folder.name, secrets.token_hex(16)
+    session = Session(folder, title, float(fps), n_frames, sources, tuple(people), up, uid=uid)
     _checked_content(session)
     temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
     try:
@@ -167,6 +173,7 @@ def load_session(folder: str | Path) -> Session:
         tuple(Person(p.name, load_model(_resolve(p.model, folder)), p.color) for p in row.people),
         row.up,
         _load_floor(row.floor),
+        _read_uid(folder / IDENTITY_FILE),
     )
 
 
@@ -277,7 +284,27 @@ def _write(session: Session, into: Path) -> None:
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
     for person in session.people:
         write_text_atomic(into / "models" / f"{person.name}.toml", format_model(person.model))
+    if session.uid:
+        refuse_links(into, IDENTITY_FILE)
+        write_text_atomic(into / IDENTITY_FILE, f"{session.uid}\n")
     _write_session(session, into)
+
+
+def _read_uid(path: Path) -> str:
+    """Return the identity of a session; empty where the file is missing, as in sessions of older programs.
+
+    Raises:
+        SessionError: the file holds something else, or cannot be read.
+    """
+    try:
+        found = read_regular(path, 100).decode("ascii", "replace").strip()
+    except FileNotFoundError:
+        return ""
+    except OSError as error:
+        raise SessionError(f"{path} cannot be read: {error}; see that you may read it") from error
+    if not re.fullmatch("[0-9a-f]{32}", found):
+        raise SessionError(f"{path}: expected 32 hexadecimal digits, found {quoted(found)}; copy it again or remove it")
+    return found
 
 
 def _write_session(session: Session, into: Path) -> None:

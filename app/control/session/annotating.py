@@ -26,6 +26,8 @@ T = TypeVar("T")
 _LOG = logging.getLogger(__name__)
 _REST_S = 0.3
 """Minimum time between two readings of the plan: a tracker writes twice a second."""
+MAX_OPEN_COMMENTS = 500
+"""Open comments of one participant: more than a host reads in a day. Each page receives all after a change."""
 
 
 class Annotating:
@@ -133,8 +135,15 @@ class Annotating:
             text: the comment.
 
         Raises:
-            TrackerError: the text is empty, there is no such limb, or it cannot be written.
+            TrackerError: the text is empty, there is no such limb, it cannot be written, or a participant has too many.
         """
+        author, stored = self._session_state.saver.author, self._session_state.state.annotation.comments
+        n_open = sum(c.row.author == author and not c.resolved for c in stored)
+        if self._reader is not self and n_open >= MAX_OPEN_COMMENTS:
+            raise TrackerError(
+                f"expected at most {MAX_OPEN_COMMENTS} open comments of one participant, found as many of {author}; "
+                "resolve some before you write others"
+            )
         one = self._session_state.session.people[person]
         known = limbs(one.model)
         if limb is not None and limb >= len(known):

@@ -16,7 +16,7 @@ from tracker.pipeline.calibration_revisions import (
     same_calibration,
     with_corrections,
 )
-from tracker.session.session import load_session
+from tracker.session.session import create_session, load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.calibration_log import revisions_of_poses
 from tracker.store.records import PinChange, PoseChange, PoseRecord
@@ -174,6 +174,23 @@ def test_observations_of_one_name_with_other_content_are_both_kept(run, session,
     assert observed(tmp_path / "ab") == observed(tmp_path / "ba") == kept
     again = asked(run("merge", tmp_path / "ab", a, "--into", tmp_path / "again", "--json"))
     assert (again["notes"], observed(tmp_path / "again")) == ([], kept)
+
+
+def test_copies_of_a_session_that_nobody_had_opened_are_merged(run, session, tmp_path):
+    base, anna, ben = tmp_path / "base", tmp_path / "anna", tmp_path / "ben"
+    made = load_session(session)
+    create_session(base, cameras=made.cameras, people=made.people, fps=made.fps, n_frames=made.n_frames)
+    for folder, frame in ((anna, 10), (ben, 40)):
+        shutil.copytree(base, folder)
+        annotate(folder, 1.0, [frame], folder.name)
+    found = asked(run("merge", anna, ben, "--into", tmp_path / "both", "--json"))
+    assert found["edits"] == 2
+    assert sorted(stored(tmp_path / "both")) == [10, 40]
+    assert load_session(tmp_path / "both").uid == load_session(base).uid
+    assert run("merge", base, anna, "--into", tmp_path / "one")[0] == 0, "one of them is still untouched"
+    assert sorted(stored(tmp_path / "one")) == [10]
+    (ben / "identity.txt").unlink()
+    assert_refused(run("merge", anna, ben, "--into", tmp_path / "no"), ["without a common edit"])
 
 
 def test_what_is_no_copy_is_refused_and_nothing_is_written(run, session, tmp_path):

@@ -86,7 +86,7 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     assert "MPJPE" in out
     assert "part axes" in out
     assert sorted(p.name for p in s.iterdir()) == [
-        "annotations.sqlite", "backups", "calibration.toml", "models", "session.toml",
+        "annotations.sqlite", "backups", "calibration.toml", "identity.txt", "models", "session.toml",
     ]  # fmt: skip
 
 

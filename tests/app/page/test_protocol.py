@@ -9,7 +9,7 @@ import pytest
 from app.messages import client, observation, pose
 from app.messages.client import CLIENT_MESSAGES
 from app.messages.parsing import MessageError, parse
-from app.page import socket
+from app.page import inbox
 from app.page.commands import COMMANDS
 
 SUBSCRIPTIONS = {
@@ -29,7 +29,7 @@ def test_types_and_reference_are_those_of_the_declarations(path):
 def test_every_message_is_carried_out():
     assert set(COMMANDS) | SUBSCRIPTIONS == set(CLIENT_MESSAGES)
     assert not set(COMMANDS) & SUBSCRIPTIONS
-    assert set(socket._COALESCED) <= set(CLIENT_MESSAGES)
+    assert set(inbox.COALESCED) <= set(CLIENT_MESSAGES)
 
 
 def test_messages_of_one_type_differ_by_action():

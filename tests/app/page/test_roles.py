@@ -1,15 +1,23 @@
 """Messages that shared links may send: everything that is not named is refused."""
 
+import asyncio
+import threading
+import time
 from typing import get_args
 
 import pytest
 from gestures import FRONT, drag, pixel_of, wait_for
 from page_visits import visiting
 
+from app.control.session import annotating
+from app.control.session.annotating import Annotating
 from app.messages import annotation as plan_wire
 from app.messages import client as wire
 from app.messages.base import Command
 from app.messages.parsing import check_allowed
+from app.page import socket
+from app.page.inbox import MAX_HELD_UP, MAX_WAITING
+from app.page.socket import PaneSocket
 from app.participants.participants import Participants
 from tracker.annotation.frame_choice import FrameChoice
 from tracker.errors import TrackerError
@@ -125,3 +133,77 @@ async def test_a_second_page_of_another_name_is_refused_by_turn(opened):
         await page.send("drag", phase="start", camera=0, person=0, point="torso", u=u, v=v, seq=1, mode="move", frame=0)
         assert "drags on frame 0" in (await page.hear("notice"))["text"]
     people.close()
+
+
+async def test_who_sends_without_pause_is_read_no_further_and_then_closed(opened, monkeypatch):
+    host, gate = opened(), threading.Event()
+    read, done = [], []
+    real = socket.parse
+    monkeypatch.setattr(socket, "parse", lambda data: read.append(data) or real(data))
+    monkeypatch.setattr(Annotating, "comment", lambda *_: done.append(gate.wait()))
+    sent = 4 * MAX_WAITING
+    async with visiting(host, role="review", name="Rita") as page:
+        for _ in range(sent):
+            await page.send("annotation", action="comment", person=0, frame=0, limb=None, text="again")
+        while len(read) < MAX_WAITING:
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(0.1)
+        assert len(read) <= MAX_WAITING + 3, "one at work, one that waits for a place, and the first view"
+        gate.set()
+        with pytest.raises(AssertionError, match=r"data=1008.*more without pause"):
+            await page.hear("share")
+    assert len(read) <= MAX_WAITING + MAX_HELD_UP + 3
+    assert len(done) < len(read) < sent
+
+
+async def test_a_host_who_sends_without_pause_only_waits(opened, monkeypatch):
+    host, done = opened(), []
+    monkeypatch.setattr(Annotating, "comment", lambda *_: done.append(1))
+    sent = MAX_WAITING + MAX_HELD_UP + 100
+    async with visiting(host) as page:
+        for _ in range(sent):
+            await page.send("annotation", action="comment", person=0, frame=0, limb=None, text="again")
+        await page.send("seek", frame=3)
+        await page.hear("state", lambda m: m["frame"] == 3)
+    assert len(done) == sent
+
+
+async def test_one_participant_has_so_many_open_comments(opened, monkeypatch):
+    host = opened()
+    monkeypatch.setattr(annotating, "MAX_OPEN_COMMENTS", 2)
+    async with visiting(host, role="review", name="Rita") as page:
+        for text in "abc":
+            await page.send("annotation", action="comment", person=0, frame=0, limb=None, text=text)
+        assert "at most 2 open comments" in (await page.hear("notice"))["text"]
+        host.annotating.comment(0, 0, None, "of the host")
+        uid = next(c.row.uid for c in host.state.annotation.comments if c.row.text == "a")
+        await page.send("annotation", action="resolve", uid=uid)
+        await page.send("annotation", action="comment", person=0, frame=0, limb=None, text="d")
+        await page.hear("annotation", lambda m: "d" in [c["text"] for c in m["comments"]])
+
+
+async def test_pages_that_are_behind_are_served_one_at_a_time(opened, monkeypatch):
+    host, at_once = opened(), []
+    people, free = Participants(host), threading.Lock()
+
+    def slow(*_):
+        at_once.append(free.acquire(blocking=False))
+        time.sleep(0.002)
+        if at_once[-1]:
+            free.release()
+
+    monkeypatch.setattr(Annotating, "comment", slow)
+    panes = PaneSocket(people)
+    async with (
+        visiting(host, role="review", name="Rita", participants=people, panes=panes) as rita,
+        visiting(host, role="review", name="Sam", participants=people, panes=panes) as sam,
+    ):
+        for page in (rita, sam):
+            for _ in range(20):
+                await page.send("annotation", action="comment", person=0, frame=0, limb=None, text="again")
+            await page.send("seek", frame=3)
+        for page in (rita, sam):
+            await page.hear("state", lambda m: m["frame"] == 3)
+    people.close()
+    assert len(at_once) == 40
+    assert at_once.count(False) <= 2, "only messages that nothing follows are served beside others"

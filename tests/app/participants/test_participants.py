@@ -1,5 +1,6 @@
 """People on one session: each has a frame and an undo of their own, edits of one pose are taken in turn."""
 
+import re
 import threading
 import time
 
@@ -179,6 +180,45 @@ def test_the_host_has_no_name_twice(people):
     assert "nobody else has" in people.join("review", "ANNA").refusal
     second = people.join("host", "Anna's second tab")
     assert (second.role, second.controller is people.host) == ("annotate", False)
+
+
+@pytest.mark.parametrize("name", ["\u0430nna", "\u0391nna", "ANN\u0410", "ann\u0251"])
+def test_nobody_looks_like_the_host(people, name):
+    for role in ("host", "annotate", "review"):
+        assert "nobody else has, found anna" in people.join(role, name).refusal
+
+
+def test_names_that_look_alike_are_two_people_of_whom_one_joins(people):
+    first = people.join("annotate", "Marnie")
+    second = people.join("annotate", "MARNIE")
+    assert second.controller is first.controller
+    assert "found Marnie, which looks alike" in people.join("annotate", "Mamie").refusal
+    assert people.join("annotate", "Mandy").has_place
+    people.leave(first)
+    people.leave(second)
+    assert people.join("annotate", "Mamie").name == "Mamie"
+
+
+@pytest.mark.parametrize(
+    "name", ["Zoe\u0301", "Nguy\u1ec5n", "\u674e", "\u0645\u0631\u06cc\u0645", "\uac00\ub098", "ben \U0001f642"]
+)
+def test_names_of_any_script_are_joined_by(people, name):
+    assert people.join("annotate", name).has_place
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["ben\ufe0f", "ben\U000e0100", "b\u034fen", "b\u200den", "\u3164", "\uffa0", "\u115f", "\u2800", "ben\u2800"],
+)
+def test_what_nobody_can_see_is_no_part_of_a_name(people, name):
+    assert re.search(r"found U\+[0-9A-F]{4,5} in it", people.join("annotate", name).refusal)
+
+
+@pytest.mark.parametrize(
+    "name", ["n" + 60 * "\u0301", "be\u0330\u0331\u0332\u0333\u0334n", "\u0301ben", "...", "\U0001f642"]
+)
+def test_marks_without_a_letter_are_no_name(people, name):
+    assert people.join("annotate", name).refusal
 
 
 @pytest.mark.parametrize("name", ["x" * 61, "a\u202eb", "a\x00b", "\ud800"])

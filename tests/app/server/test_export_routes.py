@@ -156,7 +156,7 @@ async def test_one_runs_at_a_time_and_stops_when_the_page_goes(client, temporary
             loop.call_soon_threadsafe(reached.set)
 
     one = formats.FORMATS["coco"]
-    monkeypatch.setitem(formats.FORMATS, "coco", ExportFormat("coco", one.title, one.suffixes, slow))
+    monkeypatch.setitem(formats.FORMATS.own, "coco", ExportFormat("coco", one.title, one.suffixes, slow))
     try:
         first = asyncio.create_task(client.get("/export/coco"))
         await asyncio.wait_for(reached.wait(), 20)

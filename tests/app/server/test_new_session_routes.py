@@ -83,6 +83,21 @@ async def test_a_survey_says_how_cameras_stand_and_which_have_footage(folders, s
     assert status == 400
 
 
+async def test_a_folder_inside_the_footage_that_cannot_be_read_is_a_problem(serve, form, tmp_path, monkeypatch):
+    (tmp_path / "footage" / "private").mkdir(parents=True)
+    real = os.scandir
+
+    def scandir(path):
+        if str(path).endswith("private"):
+            raise PermissionError(13, "Permission denied", str(path))
+        return real(path)
+
+    client = await serve()
+    monkeypatch.setattr(os, "scandir", scandir)
+    status, text = await client.open({"footage": str(tmp_path / "footage"), "up": "z"}, "/sessions/survey")
+    assert (status, "private cannot be (Permission denied)" in text) == (200, True), text
+
+
 async def test_footage_is_given_to_cameras_by_hand(folders, serve, form):
     client, walk = await serve(), folders[0]
     (walk / "LEFT.mp4").rename(walk / "gopro7.mp4")

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import shutil
 
 import aiohttp
@@ -14,6 +15,7 @@ from app.server.access import Access
 from app.server.copy_routes import CopyRoutes
 from app.server.observation_routes import ObservationRoutes
 from app.server.static_files import static_folder
+from tracker import files
 from tracker.body.model import PosedBody
 from tracker.judging.judge import Judgement, LimbVerdict
 from tracker.pipeline.keypoint_evidence import read_points
@@ -126,6 +128,27 @@ async def test_wrong_forms_are_answered_with_the_reason(controller, serve, form,
     assert (status, expected in text) == (400, True), text
     assert controller.state.observations.plan is None
     assert not (controller.session.folder / "observations").exists()
+
+
+async def test_a_folder_that_cannot_be_looked_through_is_a_reason(serve, form, tmp_path, monkeypatch):
+    (tmp_path / "found" / "gone").mkdir()
+    real = os.scandir
+
+    def scandir(path):
+        if str(path).endswith("gone"):
+            raise FileNotFoundError(2, "No such file or directory", str(path))
+        return real(path)
+
+    post, _ = await serve()
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "scandir", scandir)
+        status, text = await post(PLAN, form)
+    assert (status, "gone cannot be (No such file or directory)" in text) == (400, True), text
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "LIMITS", files.WalkLimits(entries=3))
+        status, text = await post(PLAN, form)
+    assert (status, "expected at most 3 files and folders" in text) == (400, True), text
+    assert (await post(PLAN, form))[0] == 200, "nothing is held"
 
 
 async def test_a_body_that_is_no_form_or_too_large_is_refused(serve):

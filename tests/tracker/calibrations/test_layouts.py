@@ -11,7 +11,7 @@ from rigs import cameras, looking, ring
 from stated_poses import CONVENTIONS, stated
 
 from tracker.calibrations.document import read_document
-from tracker.calibrations.layouts import LAYOUTS, find_layout, markdown_table
+from tracker.calibrations.layouts import find_layout, layouts, markdown_table
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
@@ -39,7 +39,7 @@ def assert_same(entries, rig):
 
 
 def test_each_layout_has_a_writer_here():
-    assert [layout.name for layout in LAYOUTS] == list(WRITERS)
+    assert [layout.name for layout in layouts()] == list(WRITERS)
 
 
 @pytest.mark.parametrize("name", WRITERS)

@@ -139,13 +139,12 @@ def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_not
     def nothing(scene, model, is_known):
         raise TrackerError("expected a head, found none")
 
-    for name in GENERATORS:
-        monkeypatch.setitem(GENERATORS, name, nothing)
-    monkeypatch.setitem(GENERATORS, "mine", proposed)
+    generators = {**dict.fromkeys(GENERATORS, nothing), "mine": proposed}
+    monkeypatch.setattr(first_pose, "GENERATORS", generators)
     said = []
     found = find_first_poses_anywhere(session, OBSERVER, [0], [3], 0.05, said.append)
     assert found.poses[0].start.source == "mine"
-    assert [text.split(":")[0] for text in said] == [f"frame 3, {name}" for name in GENERATORS]
+    assert [text.split(":")[0] for text in said] == [f"frame 3, {name}" for name in generators]
 
 
 @pytest.mark.slow

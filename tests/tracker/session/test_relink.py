@@ -1,5 +1,6 @@
 """Moved footage gets its new place; other footage is refused, and nothing is written then."""
 
+import os
 import shutil
 import unicodedata
 from contextlib import closing
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from clips import SIZE, encode
 
+from tracker import files
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.proxy import FOLDER, Proxy
 from tracker.footage.video import open_footage
@@ -78,6 +80,23 @@ def test_everything_is_found_by_a_search(room):
         assert at.cameras[1].masks == room / "disk" / "take1" / "masks" / "b"
         assert (at.fps, at.cameras[1].declared_fps) == (90.0, 30.0)
     assert relink(again, Places(search=[room / "disk"]))[1] == ()
+
+
+def test_a_search_is_bounded_and_passes_over_what_nobody_may_read(room, monkeypatch):
+    moved(room)
+    (room / "disk" / "lost+found").mkdir()
+    real = os.scandir
+
+    def scandir(path):
+        if str(path).endswith("lost+found"):
+            raise PermissionError(13, "Permission denied", str(path))
+        return real(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "LIMITS", files.WalkLimits(entries=3))
+        refuse(room, SessionError, "at most 3 files and folders in .*disk", Places(search=[room / "disk"]))
+    assert len(relink(loaded(room), Places(search=[room / "disk"]))[1]) == 6
 
 
 def test_of_equal_names_the_one_in_the_folder_of_the_same_name(room):

@@ -276,3 +276,18 @@ def test_no_session(tmp_path):
     with pytest.raises(SessionError, match="is not a session") as caught:
         load_session(tmp_path)
     assert caught.value.remedy == Remedy("make_session")
+
+
+def test_a_session_has_an_identity_from_its_making_on(tmp_path, cameras):
+    make(tmp_path, cameras)
+    shutil.copytree(tmp_path / "s", tmp_path / "copy")
+    one, copy = load_session(tmp_path / "s"), load_session(tmp_path / "copy")
+    assert one.uid == copy.uid
+    assert re.fullmatch("[0-9a-f]{32}", one.uid)
+    save_session(one)
+    assert load_session(tmp_path / "s").uid == copy.uid
+    (tmp_path / "s" / "identity.txt").unlink()
+    assert load_session(tmp_path / "s").uid == "", "as those of older programs"
+    (tmp_path / "s" / "identity.txt").write_text("other text")
+    with pytest.raises(SessionError, match=r"identity\.txt: expected 32 hexadecimal digits, found 'other text'"):
+        load_session(tmp_path / "s")

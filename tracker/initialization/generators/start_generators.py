@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.extensions import usable
+from tracker.compute.extensions import Extended
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.initialization.generators.axis_start import search_on_axes
 from tracker.initialization.generators.body_axis import BodyAxis, find_body_axes
@@ -84,7 +84,7 @@ def from_search(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hy
 StartGenerator: TypeAlias = Callable[[PersonScene, BodyModel, bool], list[Hypothesis]]
 """Proposes starts from the person on a frame, the body, and whether its height is known."""
 _OWN: dict[str, StartGenerator] = {"voxels": from_voxels, "axis": from_axis, "search": from_search}
-GENERATORS: dict[str, StartGenerator] = {**_OWN, **usable("quadrille.starts", taken=_OWN)}
+GENERATORS = Extended(_OWN, "quadrille.starts")
 """Each generator by name, in the order of their cost, in which they are tried; those of other packages come last."""
 
 
