@@ -265,16 +265,6 @@ def _n_frames(recording: PlannedRecording, session: "Session") -> int:
 
 
 def plain(recording: PlannedRecording) -> dict[str, Any]:
-    """Return a recording as plain data for a file of tasks; `from_plain` reads it."""
+    """Return a recording as plain data for a file of tasks."""
     data: dict[str, Any] = msgspec.to_builtins(recording)
     return data
-
-
-def from_plain(data: Any) -> PlannedRecording:
-    """Return a recording of `plain` data.
-
-    Raises:
-        TrackerError: it is no recording.
-    """
-    found: PlannedRecording = check(data, PlannedRecording, "task", TrackerError)
-    return found

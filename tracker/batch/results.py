@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from tracker.api.pose_series import PoseSeries
 from tracker.api.results import read_poses
-from tracker.batch.manifest import Manifest, RecordingTask, Result, State
+from tracker.batch.manifest import Manifest, State
 from tracker.batch.plan import Settings
 from tracker.batch.stretches import SeamRow
+from tracker.batch.task_files import RecordingTask, Result
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array, IntArray

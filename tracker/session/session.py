@@ -25,6 +25,7 @@ from tracker.errors import SessionError
 from tracker.files import check_regular, refuse_links, write_text_atomic
 from tracker.footage.camera_source import CameraSource, Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.formats.file_names import file_stems
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
 from tracker.session.folder import SESSION_FILE, session_folder, tidy_path
@@ -252,12 +253,12 @@ def save_model(session: Session, person: int, model: BodyModel) -> Session:
     """
     people = [replace(p, model=model) if i == person else p for i, p in enumerate(session.people)]
     changed = replace(session, people=tuple(people))
-    path = session.folder / "models" / f"{people[person].name}.toml"
+    path = session.folder / _model_files(people)[person]
     refuse_links(session.folder, SESSION_FILE, f"models/{path.name}")
     try:
         path.parent.mkdir(exist_ok=True)
         write_text_atomic(path, format_model(model))
-        _write_session(changed, session.folder)  # which may have named another file
+        _write_session(changed, session.folder)
     except OSError as error:
         raise SessionError(f"cannot write {path}: {error}; see that you may write to the folder") from error
     return changed
@@ -272,17 +273,32 @@ def _load_floor(row: FloorRow | None) -> GroundPlane | None:
 
 def _write(session: Session, into: Path) -> None:
     """Write the files of a session into a folder that is, or will become, `session.folder`."""
-    refuse_links(into, CALIBRATION_FILE, *(f"models/{p.name}.toml" for p in session.people))
-    (into / "models").mkdir(exist_ok=True)
+    refuse_links(into, CALIBRATION_FILE)
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
-    for person in session.people:
-        write_text_atomic(into / "models" / f"{person.name}.toml", format_model(person.model))
+    _write_models(session, into)
     _write_session(session, into)
 
 
 def _write_session(session: Session, into: Path) -> None:
+    """Write session.toml, and bodies of people whose file it did not name so far."""
     refuse_links(into, SESSION_FILE)
+    _write_models(session, into, are_missing=True)
     write_text_atomic(into / SESSION_FILE, tomli_w.dumps(_checked_content(session)))
+
+
+def _write_models(session: Session, into: Path, are_missing: bool = False) -> None:
+    """Write the bodies of all people, or those whose file is missing."""
+    models = dict(zip(_model_files(session.people), session.people, strict=True))
+    wanted = [file for file in models if not (are_missing and (into / file).exists())]
+    refuse_links(into, *wanted)
+    for file in wanted:
+        (into / file).parent.mkdir(exist_ok=True)
+        write_text_atomic(into / file, format_model(models[file].model))
+
+
+def _model_files(people: Sequence[Person]) -> list[str]:
+    """Return the file of each person's body within the session."""
+    return [f"models/{stem}.toml" for stem in file_stems([p.name for p in people])]
 
 
 def _checked_content(session: Session) -> dict[str, Any]:
@@ -317,7 +333,10 @@ def _checked_content(session: Session) -> dict[str, Any]:
         "up": session.up,
         "calibration": CALIBRATION_FILE,
         "cameras": cameras,
-        "people": [{"name": p.name, "model": f"models/{p.name}.toml", "color": p.color} for p in session.people],
+        "people": [
+            {"name": p.name, "model": file, "color": p.color}
+            for p, file in zip(session.people, _model_files(session.people), strict=True)
+        ],
     }
     if session.floor is not None:
         data["floor"] = {"normal": session.floor.normal.tolist(), "offset_m": float(session.floor.offset_m)}

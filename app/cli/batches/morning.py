@@ -4,8 +4,9 @@ import shlex
 from typing import Any
 
 from app.remedies import PHRASES
-from tracker.batch.manifest import Manifest, Result
+from tracker.batch.manifest import Manifest
 from tracker.batch.results import RecordingRow, summarize, totals
+from tracker.batch.task_files import Result
 
 
 def record(manifest: Manifest) -> dict[str, Any]:

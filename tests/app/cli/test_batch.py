@@ -11,7 +11,8 @@ from command_line import assert_refused
 from stored_motions import store_motion
 
 from app.cli.batches.local import n_workers
-from tracker.batch.manifest import Manifest, Result
+from tracker.batch.manifest import Manifest
+from tracker.batch.task_files import Result
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
 

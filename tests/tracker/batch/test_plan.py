@@ -1,11 +1,12 @@
 """The plan of a batch: recordings by pattern and table, settings of folders and recordings, wrong plans."""
 
+import msgspec
 import pytest
 from bodies import MODELS
 from stored_motions import store_motion
 
 from tracker.batch.manifest import Manifest
-from tracker.batch.plan import FOLDER_FILE, from_plain, plain, read_plan
+from tracker.batch.plan import FOLDER_FILE, PlannedRecording, plain, read_plan
 from tracker.errors import TrackerError
 
 
@@ -54,7 +55,7 @@ def test_a_table_names_recordings_without_sessions(tmp_path):
     assert one.footage is not None
     assert one.footage.videos == (str(tmp_path / "a.mp4"), str(tmp_path / "b.mp4"))
     assert (one.footage.people, one.footage.height_m, one.footage.fps) == (("ann", "bob"), 1.8, 50.0)
-    assert from_plain(plain(one)) == one
+    assert msgspec.convert(plain(one), PlannedRecording) == one
 
 
 @pytest.mark.parametrize(

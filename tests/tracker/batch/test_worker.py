@@ -15,7 +15,7 @@ import pytest
 from batch_work import make_batch, write_line
 
 from tracker.batch import claims
-from tracker.batch.manifest import RecordingTask, Result
+from tracker.batch.task_files import RecordingTask, Result
 from tracker.batch.worker import work
 from tracker.session.holder import this_holder
 from tracker.session.lock import LOCK_FILE
