@@ -231,6 +231,7 @@ class Manifest:
         """
         if not held.is_held():
             return False
+        result = msgspec.structs.replace(result, settings=task.recording.settings)
         self._write(self.folder / "results" / f"{task.key}.json", result)
         held.release()
         return True

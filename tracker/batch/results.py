@@ -51,6 +51,8 @@ class RecordingRow:
     """The frames at which these were joined, the largest seam first."""
     result: Result | None = None
     """How the task ended; None while it has not."""
+    is_earlier: bool = False
+    """Whether it was done with other settings than those of the plan."""
 
     @property
     def share_doubted(self) -> float:
@@ -117,6 +119,7 @@ def _row(manifest: Manifest, task: RecordingTask) -> RecordingRow:
         result.n_stretches,
         tuple(sorted(result.seams, key=lambda seam: -seam.apart_mm)),
         result,
+        result.settings not in (None, recording.settings),
     )
 
 

@@ -89,8 +89,7 @@ def _do(
 
     def end(result: Result) -> bool:
         who, times = f"{socket.gethostname()} {os.getpid()}", used(manifest.spent_on_stretches(task))
-        settings = task.recording.settings
-        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, settings=settings, **times))
+        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **times))
 
     try:
         allowed = task.recording.settings.attempts or 3

@@ -63,7 +63,8 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
         local.work_here(out)
         return
     if arguments.table:
-        manifest = Manifest.load(out)
+        has_plan = arguments.plan.exists()
+        manifest = Manifest.load(out, read_plan(arguments.plan, out.resolve()) if has_plan else None)
     else:
         manifest = Manifest.create(read_plan(arguments.plan, out.resolve()), out.resolve())
     if arguments.retry:

@@ -13,6 +13,7 @@ from stored_motions import store_motion
 from app.cli.batches.local import n_workers
 from tracker.batch.manifest import Manifest
 from tracker.batch.task_files import Result
+from tracker.batch.worker import work
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
 
@@ -116,6 +117,60 @@ def test_what_a_person_verified_counts_and_is_no_longer_doubted(run, ended):
     store.close()
     done = json.loads(run("batch", ended, "--table", "--json")[1])["recordings"][1]
     assert (done["verified"], done["share_doubted"]) == (1, 0.0)
+
+
+def test_the_table_says_what_was_done_with_other_settings_than_the_plan_has(run, ended):
+    before = json.loads(run("batch", ended, "--table", "--json")[1])["recordings"]
+    assert [row["earlier"] for row in before] == ["", ""]
+    ended.write_text('sessions = ["a", "b"]\nsettings = {stride = 2}')
+    failed, done = json.loads(run("batch", ended, "--table", "--json")[1])["recordings"]
+    assert "with earlier settings" in done["earlier"]
+    assert failed["earlier"] == ""
+    assert f"a: {done['earlier']}" in run("batch", ended, "--table")[1]
+    ended.write_text('sessions = ["a"]')
+    assert_refused(run("batch", ended, "--table"), "expected the 2 recordings of the batch in")
+    ended.unlink()
+    assert run("batch", ended, "--table")[0] == 1  # without a plan, as it was run last
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "words"),
+    [
+        ("results/000000.json", "", ["a: ", "results/000000.json is damaged", "--retry"]),
+        ("results/000000.json", '{"state": "do', ["a: ", "results/000000.json is damaged", "--retry"]),
+        ("results/000000.json", '{"state": "done", "remedy": 3}', ["a: ", "is damaged", "Expected `str`"]),
+        ("results/000001.json", '{"state": "failed", "error": "x", "remedy": "of another version"}', ["b: x"]),
+        ("stretches/000001.json", "[]", ["b: ", "stretches/000001.json is damaged"]),
+        ("tasks/000000.json", None, ["task 000000: ", "expected the file of a task, found none", "with its plan"]),
+        ("tasks/000001.json", None, ["task 000001: ", "expected the file of a task, found none"]),
+        ("tasks/000000.json", "", ["task 000000: ", "tasks/000000.json is not valid JSON", "with its plan"]),
+        ("tasks/000001.json", '{"recording": 3}', ["task 000001: ", "tasks/000001.json"]),
+        ("tasks/notes.json", "", []),
+    ],
+)
+def test_a_damaged_file_is_one_row_that_says_so(run, ended, file, content, words):
+    folder = ended.with_name("plan_batch")
+    manifest = Manifest.load(folder)
+    before = {task.recording.name: manifest.result(task) for task in manifest.tasks}
+    if file.startswith("stretches"):
+        (folder / "results" / "000001.json").unlink()
+    (folder / file).unlink(missing_ok=True)
+    if content is not None:
+        (folder / file).write_text(content)
+    status, out, err = run("batch", ended, "--table")
+    assert (status, err) == (1, "")
+    assert len(out.splitlines()) <= 8
+    assert all(word in out for word in words)
+    damaged = Manifest.load(folder)
+    assert len(damaged.tasks) == 2
+    for task in damaged.tasks:  # each result is still that of its recording
+        number = int(file[-6]) if file[-6].isdigit() else -1
+        assert task.number == number or damaged.result(task) == before[task.recording.name]
+    assert work(folder, do=lambda *_: pytest.fail("nothing is left to do")) == 0
+    run("batch", ended, "--retry", "--slurm")
+    counts = Manifest.load(folder).counts()
+    assert counts["failed"] == 0
+    assert counts["waiting"] == (1 if counts["done"] else 2)
 
 
 def test_the_report_is_one_file_that_escapes_names(run, ended, tmp_path):

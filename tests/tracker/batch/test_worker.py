@@ -96,6 +96,28 @@ def test_a_worker_of_another_machine_is_dead_without_signs_of_life(tmp_path):
     assert manifest.claim_next() is not None
 
 
+@pytest.mark.parametrize(
+    "content", [b"", msgspec.json.encode(msgspec.structs.replace(this_holder(), host="elsewhere"))]
+)
+def test_a_claim_with_a_time_to_come_is_of_a_dead_worker(tmp_path, content):
+    manifest = make_batch(tmp_path, 1)
+    path = tmp_path / "claims" / "000000"
+    path.write_bytes(content)
+    future = time.time() + 30 * 86400
+    os.utime(path, (future, future))
+    assert manifest.state(manifest.tasks[0]) == "waiting"
+    assert manifest.claim_next() is not None
+
+
+def test_a_clock_that_differs_from_that_of_the_folder_counts_nothing(tmp_path, monkeypatch):
+    manifest = make_batch(tmp_path, 1)
+    (tmp_path / "claims" / "000000").write_bytes(
+        msgspec.json.encode(msgspec.structs.replace(this_holder(), host="elsewhere"))
+    )
+    monkeypatch.setattr(claims.time, "time", lambda: 0.0)
+    assert manifest.state(manifest.tasks[0]) == "running"
+
+
 def test_the_lock_of_somebody_else_stays(tmp_path):
     manifest = make_batch(tmp_path, 1)
     (tmp_path / "claims" / "000000").write_bytes(msgspec.json.encode(gone()))
