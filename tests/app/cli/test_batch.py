@@ -3,7 +3,9 @@
 import json
 import os
 import subprocess
+import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from bodies import MODELS
@@ -61,7 +63,7 @@ def ended(plan, run):
     ],
 )
 def test_wrong_words_are_a_sentence(run, plan, words, expected):
-    assert_refused(run("batch", plan, *words), expected)
+    assert_refused(run("batch", plan, *words), [expected])
 
 
 @pytest.mark.parametrize(
@@ -128,7 +130,7 @@ def test_the_table_says_what_was_done_with_other_settings_than_the_plan_has(run,
     assert failed["earlier"] == ""
     assert f"a: {done['earlier']}" in run("batch", ended, "--table")[1]
     ended.write_text('sessions = ["a"]')
-    assert_refused(run("batch", ended, "--table"), "expected the 2 recordings of the batch in")
+    assert_refused(run("batch", ended, "--table"), ["expected the 2 recordings of the batch in", "found 1 others"])
     ended.unlink()
     assert run("batch", ended, "--table")[0] == 1  # without a plan, as it was run last
 
@@ -179,6 +181,56 @@ def test_the_report_is_one_file_that_escapes_names(run, ended, tmp_path):
     assert "quadrille open" in text
     assert "camera &#x27;C&#x27; seems off" in text
     assert "http" not in text
+
+
+class FakeClient:
+    """A client of Dask whose scheduler dies, or whose workers fail."""
+
+    def __init__(self, address, timeout):
+        self.status, self.future = "running", SimpleNamespace(status="error", exception=self.exception, done=bool)
+
+    def nthreads(self):
+        return {"worker": 1}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        return None
+
+    def exception(self):
+        return ImportError("no module named tracker")
+
+
+class LosesScheduler(FakeClient):
+    def submit(self, *_, **__):
+        self.status = "closed"
+        raise RuntimeError("Client is closed. Can't send update-graph message.")
+
+
+class LosesSchedulerLater(FakeClient):
+    def submit(self, *_, **__):
+        self.status, self.future.status = "closed", "cancelled"
+        return self.future
+
+
+class HasOtherWorkers(FakeClient):
+    def submit(self, *_, **__):
+        return self.future
+
+
+@pytest.mark.parametrize(
+    ("client", "words"),
+    [
+        (LosesScheduler, "expected the Dask scheduler at tcp://x until all recordings have ended, found it gone"),
+        (LosesSchedulerLater, "expected the Dask scheduler at tcp://x until all recordings have ended, found it gone"),
+        (HasOtherWorkers, "found one that fails with ImportError: no module named tracker"),
+    ],
+)
+def test_a_cluster_that_fails_is_a_sentence(run, plan, monkeypatch, client, words):
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(Client=client, KilledWorker=KeyError))
+    monkeypatch.setattr("app.cli.batches.dask_cluster._LOOK_S", 0.0)
+    assert_refused(run("batch", plan, "--dask", "tcp://x", "--json"), [words])
 
 
 def test_failed_tasks_are_tried_again_on_demand(run, ended):
