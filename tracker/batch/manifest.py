@@ -275,6 +275,20 @@ class Manifest:
         return self.folder / "claims" / task.key
 
 
+def ended_names(folder: Path, retry: bool) -> set[str]:
+    """Return the names of the recordings of a batch that are not tracked any more; none before it has begun.
+
+    Args:
+        folder: of the batch.
+        retry: whether those that failed are tracked again.
+    """
+    with suppress(TrackerError):
+        manifest = Manifest.load(folder)
+        states = ("done",) if retry else ("done", "failed")
+        return {task.recording.name for task in manifest.tasks if manifest.state(task) in states}
+    return set()
+
+
 def _tasks(plan: BatchPlan) -> list[RecordingTask]:
     """Return a task for each recording. Of people with shared bodies, the first recording acquires the body."""
     tasks, first = list[RecordingTask](), dict[str, int]()

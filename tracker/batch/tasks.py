@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import msgspec
 
 from tracker.api.results import export
-from tracker.api.sessions import frames_of, new_session, open_session
+from tracker.api.sessions import frames_of, open_session
 from tracker.api.work import Progress, Tracked, track
+from tracker.batch.checks import frames_to_track
 from tracker.batch.join import TrackedStretch, join
 from tracker.batch.plan import PlannedRecording, plain
 from tracker.batch.stretch_work import begin, track_stretch
@@ -27,7 +28,7 @@ from tracker.files import write_text_atomic
 from tracker.formats.file_names import own_identifier
 from tracker.formats.model_toml import format_model, has_preset_proportions, load_model
 from tracker.pipeline.body_acquisition import store_body
-from tracker.session.frame_list import parse_frame_list
+from tracker.session.assemble import assemble
 from tracker.session.lock import SessionLock
 from tracker.session.session import ANNOTATIONS_FILE, Session, load_session
 from tracker.store.annotation_store import AnnotationStore
@@ -82,7 +83,7 @@ def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done | Div
         found = TrackedBefore(joined.tracked, joined.seams)
     elif found is None:
         session = _with_known_bodies(session, task, folder / "bodies")
-        frames = frames_of(session, _frames(recording, session.n_frames))[:: settings.stride or 1]
+        frames = frames_of(session, frames_to_track(settings, session))[:: settings.stride or 1]
         if isinstance(frames, range) and n_stretches(len(frames), settings.stretch_frames) > 1:
             division = begin(session, settings, frames, progress)
             _share_bodies(load_session(session.folder), task, folder / "bodies")
@@ -154,20 +155,7 @@ def _session(recording: PlannedRecording) -> Session:
     footage = recording.footage
     if footage is None or Path(recording.session).is_dir():
         return open_session(recording.session)
-    return new_session(
-        recording.session,
-        footage.videos,
-        footage.calibration,
-        footage.people,
-        background=footage.background,
-        heights=footage.height_m,
-        fps=footage.fps,
-    )
-
-
-def _frames(recording: PlannedRecording, n_frames: int) -> list[int] | None:
-    text = recording.settings.frames
-    return None if text is None else list(parse_frame_list(text, n_frames, f"frames of {recording.name}"))
+    return assemble(footage.request(recording.session))
 
 
 def _tracked_before(folder: Path, key: str) -> TrackedBefore | None:
@@ -211,8 +199,6 @@ def _export(session: Session, task: RecordingTask, exports: Path) -> tuple[Path,
     """Write files for other programs into a folder of the recording: those of two never have one name."""
     files, settings = list[Path](), task.recording.settings
     for name in settings.export or ():
-        if name not in FORMATS:
-            raise TrackerError(f"expected formats among {', '.join(FORMATS)}, found '{name}'; correct the plan")
         (exports / task.stem).mkdir(exist_ok=True)
         out = exports / task.stem / f"{task.stem}{FORMATS[name].suffixes[0]}"
         files += export(session, out, name, settings.people, overwrite=True)

@@ -118,7 +118,7 @@ def create_session(
 
         n_frames = min((open_footage(c.footage, c.camera.name).n_frames - c.offset for c in sources), default=0)
     session = Session(folder, name or folder.name, float(fps), n_frames, sources, tuple(people), up)
-    _checked_content(session)
+    check_content(session)
     temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)
@@ -139,7 +139,7 @@ def save_session(session: Session) -> None:
     Raises:
         SessionError: a name or axis is not allowed, or the folder cannot be written.
     """
-    _checked_content(session)
+    check_content(session)
     try:
         session.folder.mkdir(parents=True, exist_ok=True)
         _write(replace(session, cameras=tuple(_absolute(c) for c in session.cameras)), session.folder)
@@ -233,7 +233,7 @@ def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
 
 
 def _save_session_file(session: Session) -> None:
-    _checked_content(session)
+    check_content(session)
     try:
         _write_session(session, session.folder)
     except OSError as error:
@@ -283,7 +283,7 @@ def _write_session(session: Session, into: Path) -> None:
     """Write session.toml, and bodies of people whose file it did not name so far."""
     refuse_links(into, SESSION_FILE)
     _write_models(session, into, are_missing=True)
-    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(_checked_content(session)))
+    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(check_content(session)))
 
 
 def _write_models(session: Session, into: Path, are_missing: bool = False) -> None:
@@ -301,8 +301,8 @@ def _model_files(people: Sequence[Person]) -> list[str]:
     return [f"models/{stem}.toml" for stem in file_stems([p.name for p in people])]
 
 
-def _checked_content(session: Session) -> dict[str, Any]:
-    """Return the content of session.toml, checked as if it were read.
+def check_content(session: Session) -> dict[str, Any]:
+    """Check the content of a session.toml as if it were read, and return it.
 
     Raises:
         SessionError: a name, axis, rate, number or path is not allowed.

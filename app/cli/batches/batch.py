@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from app.cli.arguments import OptionalName, OptionalPath, OptionalWhole
+from app.remedies import command_line_text
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from tracker.batch.manifest import Manifest
+    from tracker.batch.plan import BatchPlan
 
 _SUFFIX = "_batch"
 
@@ -28,6 +30,8 @@ class BatchArguments:
     """folder of the batch: tasks, their states and results. PLAN_batch beside the plan by default."""
     workers: OptionalWhole = None
     """number of processes; by default as many as cores and free memory allow."""
+    check: bool = False
+    """check all recordings and their settings, and write and run nothing."""
     slurm: bool = False
     """write the scripts of a job array and of the step after it, and run nothing."""
     dask: OptionalName = None
@@ -47,7 +51,8 @@ class BatchArguments:
 def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> None:
     """Track the recordings of a plan, and show which of them need a person.
 
-    Ctrl+C stops it; run it again to go on. Recordings that fail are listed with the reason, and the others go on.
+    All recordings are checked before anything is written. Ctrl+C stops it; run it again to go on. Recordings that fail
+    are listed with the reason, and the others go on.
     """
     from platformdirs import user_state_path
 
@@ -62,14 +67,18 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
     if arguments.work:
         local.work_here(out)
         return
+    progress, is_stopped = Reporter(silent=arguments.json), False
     if arguments.table:
         has_plan = arguments.plan.exists()
         manifest = Manifest.load(out, read_plan(arguments.plan, out.resolve()) if has_plan else None)
     else:
-        manifest = Manifest.create(read_plan(arguments.plan, out.resolve()), out.resolve())
+        plan = read_plan(arguments.plan, out.resolve())
+        _check_recordings(plan, out, arguments, progress)
+        if arguments.check:
+            return
+        manifest = Manifest.create(plan, out.resolve())
     if arguments.retry:
         manifest.retry()
-    progress, is_stopped = Reporter(silent=arguments.json), False
     if arguments.slurm:
         from app.cli.batches.slurm import write_scripts
 
@@ -92,13 +101,41 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
 
 
 def _check(arguments: BatchArguments) -> None:
-    ways = ("slurm", "work", "table")
+    ways = ("check", "slurm", "work", "table")
     given = [f"--{w}" for w in ways if getattr(arguments, w)] + ["--dask"] * (arguments.dask is not None)
     given += ["--workers"] * (arguments.workers is not None)
     if len(given) > 1:
         raise TrackerError(f"expected one of {', '.join(given)}, found all of them; choose one")
     if arguments.workers is not None and arguments.workers < 1:
         raise TrackerError(f"expected --workers as a whole number from 1, found {arguments.workers}; correct it")
+
+
+def _check_recordings(plan: "BatchPlan", out: Path, arguments: BatchArguments, progress: Reporter) -> None:
+    """Check the recordings that are still to be tracked.
+
+    Raises:
+        TrackerError: some cannot be; the message has a line for each.
+    """
+    from tracker.batch.checks import problems
+    from tracker.batch.manifest import ended_names
+
+    ended = ended_names(out, arguments.retry)
+    with progress.over(len(plan.recordings), "checking recordings") as tick:
+        found = problems(plan, ended, tick)
+    if found:
+        lines = [f"{problem.name}: {command_line_text(problem.error)}" for problem in found]
+        ask = "correct them, or leave recordings out with skip = true"
+        first = f"expected recordings that can be tracked, found {len(found)} that cannot:"
+        raise TrackerError("\n".join([first, *lines, ask]))
+    if plan.unread:
+        progress.say(f"columns of the table that are not read: {', '.join(plan.unread)}")
+    if arguments.check:
+        checked = {
+            "recordings": [r.name for r in plan.recordings],
+            "ended": sorted(ended),
+            "columns_not_read": plan.unread,
+        }
+        print(format_json(checked) if arguments.json else f"{len(plan.recordings)} recordings can be tracked")
 
 
 def _run(manifest: "Manifest", arguments: BatchArguments, progress: Reporter) -> bool:

@@ -28,7 +28,11 @@ def plan(tmp_path):
     folder = tmp_path / "my lab"
     folder.mkdir()
     for name in ("a", "b"):
-        store_motion(folder / name, [MODELS["gavrila38"]], n_frames=4, lost={(0, 2)} if name == "b" else ())
+        session, _ = store_motion(
+            folder / name, [MODELS["gavrila38"]], n_frames=4, lost={(0, 2)} if name == "b" else ()
+        )
+        for camera in session.cameras:
+            camera.footage.touch()
     path = folder / "plan.toml"
     path.write_text('sessions = ["a", "b"]')
     return path
