@@ -6,7 +6,7 @@ from pathlib import Path
 from tracker.api.sessions import frames_of, open_session, people_of
 from tracker.api.work import track_plan
 from tracker.batch.plan import BatchPlan, PlannedRecording, Settings
-from tracker.batch.table import Problem
+from tracker.batch.table import Footage, Problem
 from tracker.errors import TrackerError
 from tracker.exports.formats import FORMATS
 from tracker.observations.stored import list_observations
@@ -49,6 +49,7 @@ def _check(recording: PlannedRecording) -> None:
         session = open_session(recording.session)
         require_files(session)
     else:
+        _require_files(recording.footage)
         session = check_parts(recording.footage.request(recording.session)).session
     people = people_of(session, settings.people)
     frames = frames_of(session, frames_to_track(settings, session))[:: settings.stride or 1]
@@ -58,6 +59,19 @@ def _check(recording: PlannedRecording) -> None:
         raise TrackerError(
             f"expected the name of imported observations as 'keypoints', among {', '.join(known) or 'none'}, found "
             f"'{settings.keypoints}'; import them, or correct it"
+        )
+
+
+def _require_files(footage: Footage) -> None:
+    """Check that the files of a row are there.
+
+    Raises:
+        TrackerError: some are not.
+    """
+    paths = (footage.calibration, *footage.videos, *([footage.background] if footage.background else []))
+    if missing := [path for path in paths if not Path(path).exists()]:
+        raise TrackerError(
+            f"expected files and folders that exist, found none at {', '.join(missing)}; correct the path"
         )
 
 

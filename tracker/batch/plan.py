@@ -122,8 +122,8 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
         TrackerError: a file is malformed, no recording is found, or a path has control characters: scripts have it.
     """
     path = path.resolve()
-    for place in (path, out):
-        check(str(place), FilePath, f"batch {place.name}", TrackerError)
+    for name, place in (("the plan", path), ("the folder of the batch", out)):
+        check(str(place), FilePath, name, TrackerError)
     row = check(read_toml(path, _KIND), _PlanFile, f"plan {path}", TrackerError)
     table = Table({}, (), ()) if row.table is None else read_table(path.parent / row.table)
     folders = dict(zip(table.footage, file_stems([*table.footage]), strict=True))

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -104,9 +105,8 @@ def matches(base: Path, pattern: str) -> list[Path]:
 def _cells(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     """Return the names of the columns, in small letters, and the rows that have a value, with their line numbers."""
     text = read_text(path, _KIND)
-    first = text.partition("\n")[0].strip()
-    if first.lower().startswith("sep=") and len(first) == 5:  # a line by which a spreadsheet program knows it
-        text = text.partition("\n")[2]
+    if re.match("sep=.\r?\n", text, re.IGNORECASE):  # for spreadsheet programs
+        text = text[text.index("\n") :]
 
     def read(separator: str) -> Iterator[tuple[int, list[str]]]:
         rows = csv.reader(StringIO(text, newline=""), delimiter=separator)
@@ -120,7 +120,7 @@ def _cells(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
 
     separator = max(_SEPARATORS, key=lambda s: len({*header(s)} & {*_COLUMNS}))
     rows = read(separator)
-    next(rows, None)
+    next(rows, None)  # the header
     return header(separator), rows
 
 

@@ -122,20 +122,19 @@ def _check_recordings(plan: "BatchPlan", out: Path, arguments: BatchArguments, p
     ended = ended_names(out, arguments.retry)
     with progress.over(len(plan.recordings), "checking recordings") as tick:
         found = problems(plan, ended, tick)
+    listed = [{"name": problem.name, "error": command_line_text(problem.error)} for problem in found]
+    names = [recording.name for recording in plan.recordings]
+    if arguments.check and arguments.json:
+        print(format_json({"recordings": names, "problems": listed, "columns_not_read": plan.unread}))
+        sys.exit(1 if found else 0)
     if found:
-        lines = [f"{problem.name}: {command_line_text(problem.error)}" for problem in found]
-        ask = "correct them, or leave recordings out with skip = true"
-        first = f"expected recordings that can be tracked, found {len(found)} that cannot:"
-        raise TrackerError("\n".join([first, *lines, ask]))
+        lines = [f"expected recordings that can be tracked, found {len(found)} that cannot:"]
+        lines += [f"{one['name']}: {one['error']}" for one in listed]
+        raise TrackerError("\n".join([*lines, "correct them, or leave recordings out with skip = true"]))
     if plan.unread:
         progress.say(f"columns of the table that are not read: {', '.join(plan.unread)}")
     if arguments.check:
-        checked = {
-            "recordings": [r.name for r in plan.recordings],
-            "ended": sorted(ended),
-            "columns_not_read": plan.unread,
-        }
-        print(format_json(checked) if arguments.json else f"{len(plan.recordings)} recordings can be tracked")
+        print(f"all recordings can be tracked: {len(names)}, of which {len(ended & {*names})} have ended")
 
 
 def _run(manifest: "Manifest", arguments: BatchArguments, progress: Reporter) -> bool:

@@ -100,6 +100,26 @@ def test_the_scripts_of_a_job_array_are_shell_and_name_what_is_there(run, plan):
     assert "--array=0-1" in (folder / "array.sh").read_text()
 
 
+@pytest.mark.parametrize("where", ["plan", "out", "session"])
+def test_a_line_end_in_a_path_never_reaches_a_script(run, plan, where):
+    odd = plan.parent / "odd\ntouch PWNED"
+    words = ["--out", odd] if where == "out" else []
+    if where == "plan":
+        plan = plan.parent.rename(plan.parent.with_name("odd\ntouch PWNED")) / plan.name
+    if where == "session":
+        (plan.parent / "a").rename(odd)
+        plan.write_text('sessions = ["*"]')
+    assert_refused(run("batch", plan, *words, "--slurm"), ["without line ends and other controls"])
+    assert [*plan.parent.parent.rglob("*.sh")] == []
+
+
+def test_what_has_ended_is_not_checked(run, ended):
+    for name in ("a", "b"):
+        (ended.with_name(name) / "session.toml").unlink()
+    assert run("batch", ended, "--slurm")[0] == 0
+    assert "found 1 that cannot" in run("batch", ended, "--slurm", "--retry")[2]
+
+
 def test_the_table_puts_failures_first_and_opens_at_the_worst_frame(run, ended):
     status, out, _ = run("batch", ended, "--table", "--json")
     assert status == 1
