@@ -17,7 +17,7 @@ from tempfile import TemporaryFile
 
 import msgspec
 
-from tracker.session.holder import Holder, is_alive, is_of_this_system, this_holder
+from tracker.session.holder import Holder, is_alive, is_of_this_system, read_holder, this_holder
 from tracker.session.lock import LOCK_FILE
 
 BEAT_S = 2.0
@@ -120,14 +120,6 @@ def _now(folder: Path) -> float:
             return os.fstat(file.fileno()).st_mtime
     except OSError:  # a folder that this program may only read
         return time.time()
-
-
-def read_holder(path: Path) -> Holder | None:
-    """Return the holder that a file names; None if it cannot be read."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=Holder)
-    except (OSError, msgspec.DecodeError):
-        return None
 
 
 def _take_away(path: Path) -> Holder | None:

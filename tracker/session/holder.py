@@ -57,6 +57,14 @@ def this_holder() -> Holder:
     )
 
 
+def read_holder(path: Path) -> Holder | None:
+    """Return the holder that a file names; None if it cannot be read."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Holder)
+    except (OSError, msgspec.DecodeError):
+        return None
+
+
 def is_of_this_system(holder: Holder) -> bool:
     """Return whether the number of a holder's process means a process of this system."""
     here = this_system()
