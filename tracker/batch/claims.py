@@ -82,18 +82,21 @@ def claim(path: Path) -> Claim | None:
         if dead is None and path.exists():
             return None
     me = this_holder()
-    temporary = path.with_name(f".{path.name}.{me.token}.tmp")
-    temporary.write_bytes(msgspec.json.encode(me))
+    temporary, text = path.with_name(f".{path.name}.{me.token}.tmp"), msgspec.json.encode(me)
     try:
+        temporary.write_bytes(text)
         os.link(temporary, path)  # it appears with its content, once
     except FileExistsError:
         return None
     except OSError:  # a drive without hard links
         try:
             with path.open("xb") as file:
-                file.write(msgspec.json.encode(me))
+                file.write(text)
         except FileExistsError:
             return None
+        except OSError:
+            path.unlink(missing_ok=True)  # without its content it would hold up others
+            raise
     finally:
         temporary.unlink(missing_ok=True)
     return Claim(path, me, dead)

@@ -94,7 +94,7 @@ def _do(
     try:
         allowed = task.recording.settings.attempts or 3
         if manifest.count_attempt(task) > allowed:
-            error = f"{allowed} workers died over it; look at memory, and track it alone"
+            error = f"{allowed} workers died over it; look at memory and room on the disk, and track it alone"
             return end(Result("failed", error=error))
         with held.beating():
             done = do(task, manifest.folder, go_on)

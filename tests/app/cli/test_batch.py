@@ -257,6 +257,23 @@ def test_a_cluster_that_fails_is_a_sentence(run, plan, monkeypatch, client, word
     assert_refused(run("batch", plan, "--dask", "tcp://x", "--json"), [words])
 
 
+def test_workers_that_end_early_are_a_sentence_with_their_last_words(plan, run, monkeypatch):
+    class Ended:
+        def __init__(self, words, stdout, **_):
+            stdout.write(b"begun\nquadrille: cannot write x: No space left on device\n")
+
+        def poll(self):
+            return 1
+
+        kill = wait = terminate = poll
+        __class_getitem__ = classmethod(lambda cls, _: cls)
+
+    monkeypatch.setattr("app.cli.batches.local.subprocess.Popen", Ended)
+    monkeypatch.setattr("app.cli.batches.local.compile_kernels", lambda progress: None)
+    found = run("batch", plan, "--json")
+    assert_refused(found, ["found none that said: quadrille: cannot write x: No space left", "run the batch again"])
+
+
 def test_failed_tasks_are_tried_again_on_demand(run, ended):
     run("batch", ended, "--retry", "--slurm")
     manifest = Manifest.load(ended.with_name("plan_batch"))

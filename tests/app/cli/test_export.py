@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bodies import MODELS
 from command_line import assert_refused
+from full_disks import full_disk
 from stored_motions import store_motion
 
 from tracker.errors import TrackerError
@@ -287,3 +288,12 @@ def test_a_name_that_no_file_can_have_is_a_sentence(run, couple, tmp_path, words
 def test_a_name_whose_side_file_would_be_too_long_is_a_sentence(run, couple, tmp_path):
     words = ("export", couple, "--person", "ann", "--out", tmp_path / f"{'m' * 245}.trc")
     assert_refused(run(*words), ["File name too long", "choose a shorter name"])
+
+
+@pytest.mark.parametrize("name", ["trc", "csv", "mot", "coco", "bvh", "glb", "openpose", "npz"])
+def test_a_full_disk_is_a_sentence_and_nothing_is_left(run, couple, tmp_path, name):
+    out = tmp_path / f"m{FORMATS[name].suffixes[0]}"
+    with full_disk(1000):
+        found = run("export", couple, "--person", "ann", "--format", name, "--out", out, "--json")
+    assert_refused(found, [f"cannot write {out}: File too large; choose a folder that you may write to, with room"])
+    assert {p.name for p in tmp_path.iterdir() if "state" not in p.name} == {"s"}
