@@ -199,7 +199,7 @@ def _refuse_existing(paths: Sequence[Path], overwrite: bool | None, may_replace:
         if found.exists() and not (overwrite and may_overwrite):
             kind = "folder" if found.is_dir() else "file"
             is_offered = may_overwrite and overwrite is not None
-            remedy = Remedy("another_file_or_overwrite" if is_offered else "another_file")
+            remedy = Remedy("another_file_or_overwrite") if is_offered else Remedy("another_file")
             raise TrackerError(f"expected {found} not to exist, found a {kind}", remedy)
 
 
