@@ -1,6 +1,7 @@
 """`quadrille batch`: track the recordings of a plan."""
 
 import sys
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -87,7 +88,8 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
     if not arguments.table and not manifest.is_finished():
         is_stopped = _run(manifest, arguments, progress)
     found = morning.record(manifest)
-    write_text_atomic(manifest.folder / TABLE_FILE, format_json(found))
+    with suppress(OSError) if arguments.table else nullcontext():  # a batch of others may be one to read only
+        write_text_atomic(manifest.folder / TABLE_FILE, format_json(found))
     remember_batch(user_state_path("quadrille", appauthor=False), manifest.folder)
     if arguments.report is not None:
         from app.export.batch_report import write_batch_report
@@ -106,6 +108,10 @@ def _check(arguments: BatchArguments) -> None:
     given += ["--workers"] * (arguments.workers is not None)
     if len(given) > 1:
         raise TrackerError(f"expected one of {', '.join(given)}, found all of them; choose one")
+    if arguments.report is not None and not arguments.report.parent.is_dir():
+        raise TrackerError(
+            f"expected --report in a folder that exists, found none at {arguments.report.parent}; make it"
+        )
     if arguments.workers is not None and arguments.workers < 1:
         raise TrackerError(f"expected --workers as a whole number from 1, found {arguments.workers}; correct it")
 

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 from bodies import MODELS
 from command_line import assert_refused
+from full_disks import full_disk
 from stored_motions import store_motion
 
 from app.cli.batches.local import n_workers
@@ -64,6 +65,8 @@ def ended(plan, run):
         (["--dask", "tcp://x", "--table"], "expected one of --table, --dask"),
         (["--workers", "0"], "expected --workers as a whole number from 1, found 0"),
         (["--table"], "expected the folder of a batch, found no tasks"),
+        (["--check", "--slurm"], "expected one of --check, --slurm"),
+        (["--report", "nowhere/morning.html"], "expected --report in a folder that exists, found none at nowhere"),
     ],
 )
 def test_wrong_words_are_a_sentence(run, plan, words, expected):
@@ -272,6 +275,11 @@ def test_workers_that_end_early_are_a_sentence_with_their_last_words(plan, run, 
     monkeypatch.setattr("app.cli.batches.local.compile_kernels", lambda progress: None)
     found = run("batch", plan, "--json")
     assert_refused(found, ["found none that said: quadrille: cannot write x: No space left", "run the batch again"])
+
+
+def test_the_table_of_a_folder_that_cannot_be_written_is_shown(run, ended):
+    with full_disk():
+        assert "1 done, 1 failed" in run("batch", ended, "--table")[1]
 
 
 def test_failed_tasks_are_tried_again_on_demand(run, ended):
