@@ -1,11 +1,12 @@
 """The command line: `quadrille COMMAND ...`; without a command, the page on the bundled sample."""
 
+import errno
 import os
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext, redirect_stdout
 from importlib import metadata
-from typing import TextIO, cast
+from typing import NoReturn, TextIO, cast
 
 import tyro
 from rich.console import Console
@@ -80,6 +81,10 @@ _COMMANDS: dict[str, Callable[..., None]] = {
 _ADDED_HELP = {"evaluate": evaluate.added_help, "export": export.added_help}
 """Sentence about the extensions of other packages, which are loaded when help is asked for."""
 _HELP = ("-h", "--help")
+_OF_DISKS = (
+    errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENAMETOOLONG
+)  # fmt: skip
+"""Errors of folders and disks, which commands meet in many places."""
 _ABOUT = """Model-based human motion capture from several calibrated cameras.
 
 Without a command, the page opens with a bundled sample; quadrille SESSION opens a session. quadrille COMMAND --help
@@ -120,19 +125,24 @@ def main() -> None:
             )
             sys.stdout.flush()
     except TrackerError as error:
-        Console(stderr=True).print(
-            printable(f"quadrille: {command_line_text(error)}"),
-            style="bold red",
-            markup=False,
-            highlight=False,
-            soft_wrap=True,
-        )
-        sys.exit(1)
+        _refuse(command_line_text(error))
     except KeyboardInterrupt as stopped:
         sys.exit(stopped.status if isinstance(stopped, process_exit.TerminationError) else process_exit.INTERRUPTED)
     except BrokenPipeError:  # as in `quadrille evaluate S | head -1`: the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discard what is still buffered
         sys.exit(141)
+    except OSError as error:
+        if error.errno not in _OF_DISKS:
+            raise
+        place = "a file" if error.filename is None else error.filename
+        _refuse(f"cannot read or write {place}: {error.strerror}; check its name, your permissions and the room there")
+
+
+def _refuse(sentence: str) -> NoReturn:
+    """Show why the command ends, and end it."""
+    text = printable(f"quadrille: {sentence}")
+    Console(stderr=True).print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
+    sys.exit(1)
 
 
 def _version() -> str:

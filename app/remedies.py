@@ -237,6 +237,8 @@ PHRASES = {
     "check_cameras": Phrases(
         "run quadrille check to measure it", "press Check the cameras in the inspector's Calibration to measure it"
     ),
+    # a batch
+    "do_again": Phrases("say --retry to do it again", "do it again on the command line"),
     # references and exports
     "check_reference_frames": Phrases(
         "check --frames, --person and the reference's frame numbers",

@@ -91,8 +91,10 @@ def write_text_atomic(path: Path, text: str, mode: int = 0o666) -> None:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
-    except BaseException:
+    except BaseException as error:
         temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):  # a full disk names no file, others the temporary one
+            error.filename = str(path)
         raise
 
 

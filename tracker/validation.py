@@ -46,8 +46,13 @@ FileStem: TypeAlias = Annotated[
 ]
 """A name after which files are named too; it must not lead out of their folder."""
 FilePath: TypeAlias = Annotated[
-    str, Meta(pattern=r"^[^\x00-\x1f\x7f-\x9f]{1,1000}\Z", description="the path of a file or folder")
+    str,
+    Meta(
+        pattern=r"^[^\x00-\x1f\x7f-\x9f]{1,1000}\Z",
+        description="at most 1000 characters without line ends and other controls, the path of a file or folder",
+    ),
 ]
+"""Scripts and files have it, where a line end would begin a line of its own."""
 Color: TypeAlias = Annotated[str, Meta(pattern=r"^#[0-9a-fA-F]{6}\Z", description="a colour such as #f2a33a")]
 FrameRate: TypeAlias = Annotated[
     float, Meta(ge=1e-3, le=1e5, description="a frame rate above 0, from 0.001 to 100000 per second")

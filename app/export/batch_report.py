@@ -62,7 +62,7 @@ def write_batch_report(found: dict[str, Any], path: Path) -> None:
 def _row(row: dict[str, Any]) -> str:
     notes = [f'<br><span class="failed">{html.escape(row["error"])}</span>'] if row["error"] else []
     notes += [f'<br><span class="alarm">{html.escape(row["contradiction"])}</span>'] if row["contradiction"] else []
-    notes += [f"<br>{html.escape(row['joined'])}"] if row["joined"] else []
+    notes += [f"<br>{html.escape(row[key])}" for key in ("joined", "earlier") if row[key]]
     error = row["expected_error_mm"]
     posed = row["poses"] > 0
     cells = [

@@ -11,8 +11,7 @@ from app.session.footage_indices import footage_indices
 from app.share.content import SharedComment, describe
 from app.share.overlay_lines import UNITS_PER_PX, compact, view_lines
 from app.share.pictures import GRADES, Encoder, choose_encoder
-from tracker.errors import TrackerError
-from tracker.exports.export_files import moved_at_end, refuse_existing
+from tracker.exports.export_files import moved_at_end, unwritable
 from tracker.exports.motion import ExportedMotion
 from tracker.footage.recording import Recording
 
@@ -53,11 +52,11 @@ def share(
         RecordingError: the footage cannot be read.
     """
     is_file = out.suffix.lower() == ".html"
-    if not (not is_file and out.is_dir() and not any(out.iterdir())):
-        refuse_existing([out], overwrite, None if is_file else is_shared_folder)
     try:
+        is_empty = not is_file and out.is_dir() and not any(out.iterdir())
+        may_replace = None if is_file else (lambda path: is_empty or is_shared_folder(path))
         with (
-            moved_at_end([out]) as temporary,
+            moved_at_end([out], overwrite or is_empty, may_replace) as temporary,
             Recording(motion.session.cameras, indices=footage_indices()) as recording,
         ):
             largest = Encoder(motion.session, GRADES[0])
@@ -68,8 +67,7 @@ def share(
             data = describe(motion, encoder.views, comments) | _content(motion, recording, encoder, folder, tick)
             return _write_file(target, data) if is_file else _write_folder(target, data)
     except OSError as error:
-        why = error.strerror or str(error)
-        raise TrackerError(f"cannot write {out}: {why}; choose a folder that you may write to, with room") from error
+        raise unwritable(out, error) from error
 
 
 def _content(

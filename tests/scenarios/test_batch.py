@@ -27,7 +27,10 @@ settings = {acquire = false, frames = "0:4", export = ["csv"], options = {audit 
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory):
-    """Ten copies of the bundled sample with a first pose, one without footage, and one that is no session."""
+    """Ten copies of the bundled sample with a first pose, one whose footage is no video, and one with a damaged store.
+
+    The check before the batch finds neither.
+    """
     folder = tmp_path_factory.mktemp("batch")
     first = shutil.copytree(SAMPLE, folder / "r00")
     session = tracker.open_session(first)
@@ -35,8 +38,8 @@ def recordings(tmp_path_factory):
     for i in range(1, 12):
         shutil.copytree(first, folder / f"r{i:02d}")
     for file in (folder / "r03").glob("*.mp4"):
-        file.unlink()
-    (folder / "r07" / "session.toml").write_text("no session")
+        file.write_text("no video")
+    (folder / "r07" / "annotations.sqlite").write_text("no store")
     (folder / "plan.toml").write_text(PLAN)
     return folder
 
@@ -80,8 +83,8 @@ def check(lab, found, expected):
     assert (found["totals"]["done"], found["totals"]["failed"]) == (10, 2)
     failed = {r["name"]: r["error"] for r in found["recordings"] if r["state"] == "failed"}
     assert set(failed) == {"r03", "r07"}
-    assert "relink" in failed["r03"]
-    assert "session.toml" in failed["r07"]
+    assert ".mp4" in failed["r03"]
+    assert "annotations" in failed["r07"]
     poses = poses_of(lab)
     assert poses.keys() == expected.keys()
     for name, joints in poses.items():

@@ -34,8 +34,8 @@ def random_poses(model, n, seed, sigma_rad=0.5):
     return np.array([model.clip(model.retract(model.neutral(), start + t * (end - start))) for t in shares])
 
 
-def store_motion(folder, models, n_frames=8, gaps=(), lost=(), seed=0, up="z"):
-    """Make a session of people called ann, bob, ... with random poses.
+def store_motion(folder, models, n_frames=8, gaps=(), lost=(), seed=0, up="z", names=("ann", "bob", "cid")):
+    """Make a session of people with random poses.
 
     Args:
         folder: of the session.
@@ -45,13 +45,13 @@ def store_motion(folder, models, n_frames=8, gaps=(), lost=(), seed=0, up="z"):
         lost: (person, frame) whose status is lost.
         seed: of the poses.
         up: world axis that points up.
+        names: of the people.
 
     Returns:
         The session and, for each person, the body by frame.
     """
-    names = ["ann", "bob", "cid"][: len(models)]
     cameras = [CameraSource(c, Path(folder).parent / f"{c.name}.mp4") for c in distorted_cameras()]
-    people = [Person(n, m, "#f2a33a") for n, m in zip(names, models, strict=True)]
+    people = [Person(n, m, "#f2a33a") for n, m in zip(names, models, strict=False)]
     session = create_session(folder, cameras=cameras, people=people, fps=FPS, n_frames=n_frames, up=up)
     store = AnnotationStore(session.annotations_path)
     truth = []

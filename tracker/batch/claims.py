@@ -13,10 +13,11 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import msgspec
 
-from tracker.session.holder import Holder, is_alive, is_of_this_system, this_holder
+from tracker.session.holder import Holder, is_alive, is_of_this_system, read_holder, this_holder
 from tracker.session.lock import LOCK_FILE
 
 BEAT_S = 2.0
@@ -81,18 +82,21 @@ def claim(path: Path) -> Claim | None:
         if dead is None and path.exists():
             return None
     me = this_holder()
-    temporary = path.with_name(f".{path.name}.{me.token}.tmp")
-    temporary.write_bytes(msgspec.json.encode(me))
+    temporary, text = path.with_name(f".{path.name}.{me.token}.tmp"), msgspec.json.encode(me)
     try:
+        temporary.write_bytes(text)
         os.link(temporary, path)  # it appears with its content, once
     except FileExistsError:
         return None
     except OSError:  # a drive without hard links
         try:
             with path.open("xb") as file:
-                file.write(msgspec.json.encode(me))
+                file.write(text)
         except FileExistsError:
             return None
+        except OSError:
+            path.unlink(missing_ok=True)  # without its content it would hold up others
+            raise
     finally:
         temporary.unlink(missing_ok=True)
     return Claim(path, me, dead)
@@ -101,21 +105,24 @@ def claim(path: Path) -> Claim | None:
 def has_living(path: Path) -> bool:
     """Return whether a worker that lives has claimed a task."""
     try:
-        age_s = time.time() - path.stat().st_mtime
+        touched = path.stat().st_mtime
     except FileNotFoundError:
         return False
     holder = read_holder(path)
-    if holder is None:  # it is being written, or a power cut left it empty
-        return age_s < DEAD_S
-    return is_alive(holder) if is_of_this_system(holder) else is_alive(holder) and age_s < DEAD_S
+    if holder is not None and is_of_this_system(holder):
+        return is_alive(holder)
+    # A clock that was wrong leaves a time to come, which no worker that lives shows.
+    has_beaten = abs(_now(path.parent) - touched) < DEAD_S
+    return has_beaten and (holder is None or is_alive(holder))  # without one it is being written, or was cut
 
 
-def read_holder(path: Path) -> Holder | None:
-    """Return the holder that a file names; None if it cannot be read."""
+def _now(folder: Path) -> float:
+    """Return the present time of the system that keeps a folder, s: clocks of machines differ."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Holder)
-    except (OSError, msgspec.DecodeError):
-        return None
+        with TemporaryFile(dir=folder) as file:
+            return os.fstat(file.fileno()).st_mtime
+    except OSError:  # a folder that this program may only read
+        return time.time()
 
 
 def _take_away(path: Path) -> Holder | None:
@@ -131,7 +138,8 @@ def _take_away(path: Path) -> Holder | None:
         with suppress(OSError):
             os.link(aside, path)
         found = None
-    aside.unlink(missing_ok=True)
+    with suppress(OSError):  # a folder
+        aside.unlink()
     return found
 
 

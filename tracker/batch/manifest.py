@@ -10,12 +10,17 @@ The task of a long recording is done in parts. Its first visit ends with the div
 which have claims and results of their own, `000007_003`. Once all have ended, the last visit joins them.
 
 BATCH/bodies/NAME.toml      bodies that recordings share
-BATCH/exports               files for other programs
+BATCH/exports/NAME          files of a recording for other programs
+
+A file is known by its name. One that is damaged or missing fails its recording, and no other.
 """
 
+import re
+import shutil
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -23,87 +28,15 @@ import msgspec
 
 from tracker.batch import claims
 from tracker.batch.claims import Claim
-from tracker.batch.plan import BatchPlan, PlannedRecording, from_plain, plain
-from tracker.batch.stretches import Division, RecordingStretch, SeamRow, n_stretches
-from tracker.errors import TrackerError
+from tracker.batch.plan import BatchPlan, plain
+from tracker.batch.stretches import Division, n_stretches
+from tracker.batch.task_files import STRETCHES, RecordingTask, Result, damaged, missing_task, read_file, read_task
+from tracker.errors import Remedy, TrackerError
 from tracker.files import write_text_atomic
-from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
+from tracker.formats.file_names import identifiers
 
-STRETCHES = "stretches"
-"""Folder of the divisions and of the copies of sessions."""
 State: TypeAlias = Literal["waiting", "running", "done", "failed"]
-_KIND = TextKind("task", DOCUMENT_BYTES, TrackerError, "make the batch again in another folder")
-
-
-class Result(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The end of a task."""
-
-    state: Literal["done", "failed"]
-    worker: str = ""
-    """Host and process."""
-    seconds: float = 0.0
-    """By the clock."""
-    cpu_seconds: float = 0.0
-    """Processor time of the worker."""
-    first_pose: int | None = None
-    """Frame that tracking went out from."""
-    statuses: dict[str, dict[str, int]] = {}
-    """Number of frames by person and status."""
-    contradiction: str = ""
-    """A sentence on a camera that seems off; empty without one."""
-    files: list[str] = []
-    """Exported files, by their paths below the folder of the batch."""
-    error: str = ""
-    """Why it failed, for people; empty if it is done."""
-    remedy: str = ""
-    """Code of `tracker.errors.Remedy`; empty without one."""
-    remedy_fields: dict[str, str] = {}
-    n_stretches: int = 1
-    """Number of stretches that the recording was cut into."""
-    seams: list[SeamRow] = []
-    """The frames at which they were joined."""
-
-
-@dataclass(frozen=True)
-class RecordingTask:
-    """A recording to track."""
-
-    number: int
-    recording: PlannedRecording
-    after: tuple[int, ...] = ()
-    """Numbers of the tasks that must have ended before: those that acquire bodies which it shares."""
-    bodies: tuple[str, ...] = ()
-    """Names of the people whose bodies are shared."""
-    n_expected: int = 1
-    """Number of stretches that it is expected to have."""
-    division: Division | None = None
-    """The stretches of a long recording; None before it is divided, and for a short one."""
-    stretch: RecordingStretch | None = None
-    """The stretch that is to be tracked; None for the recording itself."""
-    failed: tuple[tuple[int, str], ...] = ()
-    """Stretches that failed, by number, with the reason."""
-
-    @property
-    def key(self) -> str:
-        """Name of its files."""
-        return f"{self.number:06d}" if self.stretch is None else f"{self.number:06d}_{self.stretch.key}"
-
-    @property
-    def name(self) -> str:
-        """Name of what is tracked, for people."""
-        if self.stretch is None:
-            return self.recording.name
-        return f"{self.recording.name}, frames {self.stretch.first}:{self.stretch.last + 1}"
-
-    def session(self, batch: Path) -> Path:
-        """Return the session folder in which poses are stored while the task is done."""
-        return Path(self.recording.session) if self.stretch is None else batch / STRETCHES / self.key
-
-    def stretches(self) -> list["RecordingTask"]:
-        """Return the tasks of its stretches; none before it is divided."""
-        if self.division is None:
-            return []
-        return [replace(self, stretch=s) for s in self.division.stretches]
+_FOLDERS = ("tasks", "claims", "results", "attempts", "bodies", "exports", "sessions", STRETCHES)
 
 
 class Manifest:
@@ -121,61 +54,88 @@ class Manifest:
             TrackerError: the folder is that of another batch, or cannot be written.
         """
         tasks = _tasks(plan)
-        try:
-            for name in ("tasks", "claims", "results", "attempts", "bodies", "exports", "sessions", STRETCHES):
-                (folder / name).mkdir(parents=True, exist_ok=True)
-            before = cls.load(folder).tasks if any((folder / "tasks").iterdir()) else ()
-            if before and [t.recording.name for t in before] != [t.recording.name for t in tasks]:
-                raise TrackerError(
-                    f"expected the {len(before)} recordings of the batch in {folder}, found {len(tasks)} others in the "
-                    "plan; choose another folder"
-                )
-            for task in tasks:
-                data = {
-                    "recording": plain(task.recording),
-                    "after": list(task.after),
-                    "bodies": list(task.bodies),
-                    "stretches": task.n_expected,
-                }
-                write_text_atomic(folder / "tasks" / f"{task.key}.json", msgspec.json.encode(data).decode())
-        except OSError as error:
-            raise TrackerError(f"cannot write {folder}: {error.strerror}; choose another folder") from error
-        return cls(folder, tasks)
+        if any((folder / "tasks").glob("*.json")):
+            cls.load(folder)._check_same(tasks)
+        manifest = cls(folder, tasks)
+        manifest.make_folders()
+        for task in tasks:
+            data = {
+                "recording": plain(task.recording),
+                "after": task.after,
+                "bodies": task.bodies,
+                "stretches": task.n_expected,
+                "stem": task.stem,
+                "n_tasks": len(tasks),
+            }
+            manifest._write(folder / "tasks" / f"{task.key}.json", data)
+        return manifest
 
     @classmethod
-    def load(cls, folder: Path) -> "Manifest":
+    def load(cls, folder: Path, plan: BatchPlan | None = None) -> "Manifest":
         """Read the tasks of a batch.
 
+        Args:
+            folder: of the batch.
+            plan: as it is now; without one, the tasks have the settings of the plan that was run last.
+
         Raises:
-            TrackerError: it is not the folder of a batch.
+            TrackerError: it is not the folder of a batch, or that of another plan.
         """
-        files = sorted((folder / "tasks").glob("*.json")) if (folder / "tasks").is_dir() else []
+        paths = (folder / "tasks").glob("*.json") if (folder / "tasks").is_dir() else []
+        files = {int(p.stem): p for p in paths if re.fullmatch(r"[0-9]{6}", p.stem)}
         if not files:
             raise TrackerError(f"expected the folder of a batch, found no tasks in {folder}; name the right folder")
-        tasks = []
-        for number, file in enumerate(files):
-            data = read_json(file, _KIND)
-            try:
-                recording, after, bodies = from_plain(data["recording"]), tuple(data["after"]), tuple(data["bodies"])
-            except (KeyError, TypeError) as error:
-                raise TrackerError(f"task {file}: expected recording, after and bodies, found other keys") from error
-            tasks.append(RecordingTask(number, recording, after, bodies, data.get("stretches", 1)))
-        return cls(folder, tasks)
+        rows = {number: read_task(number, path) for number, path in files.items()}
+        n_tasks = max((n for _, n in rows.values() if n), default=max(files) + 1)
+        manifest = cls(folder, [rows[i][0] if i in rows else missing_task(i, folder) for i in range(n_tasks)])
+        if plan is not None:
+            now = _tasks(plan)
+            manifest._check_same(now)
+            manifest.tasks = tuple(a if a.damage else b for a, b in zip(manifest.tasks, now, strict=True))
+        return manifest
+
+    def _check_same(self, tasks: Sequence[RecordingTask]) -> None:
+        """Refuse tasks that are not of the recordings of this batch, as far as its files can be read.
+
+        Raises:
+            TrackerError: there are others.
+        """
+        known = {t.number: t.recording.name for t in self.tasks if not t.damage}
+        if len(self.tasks) != len(tasks) or any(name != tasks[i].recording.name for i, name in known.items()):
+            raise TrackerError(
+                f"expected the {len(self.tasks)} recordings of the batch in {self.folder}, found {len(tasks)} others "
+                "in the plan; choose another folder"
+            )
+
+    def make_folders(self) -> None:
+        """Make the folders of the batch that are missing.
+
+        Raises:
+            TrackerError: they cannot be written.
+        """
+        try:
+            for name in _FOLDERS:
+                (self.folder / name).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise _unwritable(self.folder, error) from error
 
     def result(self, task: RecordingTask) -> Result | None:
-        """Return how a task ended; None if it has not."""
+        """Return how a task ended; None if it has not. A task with a damaged file has failed."""
         try:
-            return msgspec.json.decode((self.folder / "results" / f"{task.key}.json").read_bytes(), type=Result)
-        except FileNotFoundError:
-            return None
+            found = read_file(self.folder / "results" / f"{task.key}.json", Result)
+        except TrackerError as error:
+            return damaged(str(error), error.remedy)
+        is_whole = task.division is None and task.stretch is None
+        damage = self.divided(task).damage if found is None and is_whole else task.damage
+        return damaged(damage, None if task.damage else Remedy("do_again")) if damage else found
 
     def divided(self, task: RecordingTask) -> RecordingTask:
         """Return the task of a recording with its stretches, if it has some by now."""
         try:
-            text = (self.folder / STRETCHES / f"{task.key}.json").read_bytes()
-        except FileNotFoundError:
-            return task
-        return replace(task, division=msgspec.json.decode(text, type=Division))
+            division = None if task.damage else read_file(self.folder / STRETCHES / f"{task.key}.json", Division)
+        except TrackerError as error:
+            return replace(task, damage=str(error))
+        return replace(task, division=division)
 
     def state(self, task: RecordingTask) -> State:
         """Return the state of a task. A recording is running while one of its stretches is."""
@@ -221,17 +181,16 @@ class Manifest:
         """
         if not held.is_held():
             return False
-        text = msgspec.json.format(msgspec.json.encode(division)).decode()
-        write_text_atomic(self.folder / STRETCHES / f"{task.key}.json", text)
+        self._write(self.folder / STRETCHES / f"{task.key}.json", division)
         held.release()
         return True
 
     def spent_on_stretches(self, task: RecordingTask) -> tuple[float, float]:
         """Return the time that the stretches of a recording took, by the clock and of processors, s."""
-        found = [
-            msgspec.json.decode(path.read_bytes(), type=Result)
-            for path in sorted((self.folder / "results").glob(f"{task.key}_*.json"))
-        ]
+        found = list[Result]()
+        for path in sorted((self.folder / "results").glob(f"{task.key}_*.json")):
+            with suppress(TrackerError):  # a damaged one has failed
+                found += [result] if (result := read_file(path, Result)) else []
         return sum(r.seconds for r in found), sum(r.cpu_seconds for r in found)
 
     def n_parts(self) -> int:
@@ -257,7 +216,7 @@ class Manifest:
         path = self.folder / "attempts" / task.key
         with path.open("a", encoding="utf-8") as file:
             file.write("begun\n")
-        return len(path.read_text("utf-8").splitlines())
+        return len(path.read_bytes().splitlines())
 
     def forget_attempt(self, task: RecordingTask) -> None:
         """Take the last attempt back: its worker was stopped, and did not die of the task."""
@@ -272,29 +231,69 @@ class Manifest:
         """
         if not held.is_held():
             return False
-        path = self.folder / "results" / f"{task.key}.json"
-        write_text_atomic(path, msgspec.json.format(msgspec.json.encode(result)).decode())
+        result = msgspec.structs.replace(result, settings=task.recording.settings)
+        self._write(self.folder / "results" / f"{task.key}.json", result)
         held.release()
         return True
 
     def retry(self) -> int:
         """Make failed tasks wait again; return their number."""
         failed = [task for task in self.tasks if (found := self.result(task)) and found.state == "failed"]
-        for task in failed:
-            for part in [*self.divided(task).stretches(), task]:
-                if (found := self.result(part)) is None or found.state == "failed":
-                    (self.folder / "attempts" / part.key).unlink(missing_ok=True)
-                    (self.folder / "results" / f"{part.key}.json").unlink(missing_ok=True)
+        try:
+            for task in failed:
+                divided = self.divided(task)
+                if divided.damage:  # its stretches would be taken for those of the next division
+                    self._forget_stretches(task)
+                for part in [*divided.stretches(), task]:
+                    if (found := self.result(part)) is None or found.state == "failed":
+                        (self.folder / "attempts" / part.key).unlink(missing_ok=True)
+                        (self.folder / "results" / f"{part.key}.json").unlink(missing_ok=True)
+        except OSError as error:
+            raise _unwritable(self.folder, error) from error
         return len(failed)
+
+    def _forget_stretches(self, task: RecordingTask) -> None:
+        """Remove the division of a recording, its copies of the session and their results."""
+        for path in (self.folder / STRETCHES).glob(f"{task.key}_*"):
+            shutil.rmtree(path)
+        for name in (f"results/{task.key}_*.json", f"attempts/{task.key}_*", f"{STRETCHES}/{task.key}.json"):
+            for path in self.folder.glob(name):
+                path.unlink()
+
+    def _write(self, path: Path, data: object) -> None:
+        """Write a file of the batch.
+
+        Raises:
+            TrackerError: it cannot be written.
+        """
+        try:
+            write_text_atomic(path, msgspec.json.format(msgspec.json.encode(data)).decode())
+        except OSError as error:
+            raise _unwritable(path, error) from error
 
     def _claim_path(self, task: RecordingTask) -> Path:
         return self.folder / "claims" / task.key
 
 
+def ended_names(folder: Path, retry: bool) -> set[str]:
+    """Return the names of the recordings of a batch that are not tracked any more; none before it has begun.
+
+    Args:
+        folder: of the batch.
+        retry: whether those that failed are tracked again.
+    """
+    with suppress(TrackerError):
+        manifest = Manifest.load(folder)
+        states = ("done",) if retry else ("done", "failed")
+        return {task.recording.name for task in manifest.tasks if manifest.state(task) in states}
+    return set()
+
+
 def _tasks(plan: BatchPlan) -> list[RecordingTask]:
     """Return a task for each recording. Of people with shared bodies, the first recording acquires the body."""
     tasks, first = list[RecordingTask](), dict[str, int]()
-    for number, recording in enumerate(plan.recordings):
+    stems = identifiers([r.name for r in plan.recordings])
+    for number, (recording, stem) in enumerate(zip(plan.recordings, stems, strict=True)):
         people = plan.people.get(recording.name, ())
         wanted = recording.settings.people
         shared = [p for p in people if wanted is None or p in wanted] if plan.freeze_bodies else []
@@ -302,5 +301,10 @@ def _tasks(plan: BatchPlan) -> list[RecordingTask]:
         for person in shared:
             first.setdefault(person, number)
         n_expected = n_stretches(plan.n_frames.get(recording.name, 0), recording.settings.stretch_frames)
-        tasks.append(RecordingTask(number, recording, tuple(after), tuple(shared), n_expected))
+        tasks.append(RecordingTask(number, recording, tuple(after), tuple(shared), n_expected, stem=stem))
     return tasks
+
+
+def _unwritable(path: Path, error: OSError) -> TrackerError:
+    reason = error.strerror or str(error)
+    return TrackerError(f"cannot write {path}: {reason}; choose a folder that you may write to, with room")

@@ -1,6 +1,5 @@
 """The plan of a batch: which recordings, and what to do with each. docs/batch.md describes the file."""
 
-import csv
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -10,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
+from tracker.batch.table import Footage, Problem, Table, matches, read_table
 from tracker.errors import TrackerError
+from tracker.formats.file_names import file_stems
 from tracker.session.folder import SESSION_FILE
 from tracker.session.frame_list import parse_frame_list
-from tracker.text_files import DOCUMENT_BYTES, TextKind, read_lines, read_toml
-from tracker.validation import Name, check
+from tracker.text_files import DOCUMENT_BYTES, TextKind, read_toml
+from tracker.validation import FilePath, Name, check
 
 if TYPE_CHECKING:
     from tracker.session.session import Session
@@ -22,11 +23,6 @@ if TYPE_CHECKING:
 FOLDER_FILE = "batch.toml"
 """Name of a file of settings for the recordings in its folder and below."""
 _KIND = TextKind("plan", DOCUMENT_BYTES, TrackerError)
-_TABLE = TextKind("table", DOCUMENT_BYTES, TrackerError)
-_COLUMNS = ("name", "calibration", "videos", "background", "people", "height", "fps")
-_REQUIRED = ("name", "calibration", "videos")
-_MANY = ";"
-"""Separates several values in a cell of a table."""
 
 
 class Settings(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -86,18 +82,6 @@ class _PlanFile(msgspec.Struct, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True)
-class Footage:
-    """A recording that has no session yet: a row of the table."""
-
-    calibration: str
-    videos: tuple[str, ...]
-    background: str | None = None
-    people: tuple[str, ...] = ("person",)
-    height_m: float | None = None
-    fps: float | None = None
-
-
-@dataclass(frozen=True)
 class PlannedRecording:
     """A recording of a plan."""
 
@@ -121,6 +105,10 @@ class BatchPlan:
     """Names of the people of each recording that has a session, as far as it can be read."""
     n_frames: Mapping[str, int] = field(default_factory=dict)
     """Number of frames to track of each recording, as far as it is known."""
+    problems: tuple[Problem, ...] = ()
+    """Of the rows of the table that cannot be used."""
+    unread: tuple[str, ...] = ()
+    """Names of the columns of the table that are not read."""
 
 
 def read_plan(path: Path, out: Path) -> BatchPlan:
@@ -131,17 +119,26 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
         out: folder of the batch, where sessions of the table are made.
 
     Raises:
-        TrackerError: a file is malformed, or no recording is found.
+        TrackerError: a file is malformed, no recording is found, or a path has control characters: scripts have it.
     """
     path = path.resolve()
+    for name, place in (("the plan", path), ("the folder of the batch", out)):
+        check(str(place), FilePath, name, TrackerError)
     row = check(read_toml(path, _KIND), _PlanFile, f"plan {path}", TrackerError)
-    found = {**_by_pattern(row, path), **_of_table(row, path, out)}
-    if unknown := sorted(row.recordings.keys() - found.keys()):
+    table = Table({}, (), ()) if row.table is None else read_table(path.parent / row.table)
+    folders = dict(zip(table.footage, file_stems([*table.footage]), strict=True))
+    of_table = {name: (out / "sessions" / folders[name], footage) for name, footage in table.footage.items()}
+    by_pattern = _by_pattern(row, path)
+    if twice := sorted(by_pattern.keys() & of_table.keys()):
+        raise TrackerError(f"plan {path}: expected another name in the table than the session '{twice[0]}'; change it")
+    found = {**by_pattern, **of_table}
+    unknown = sorted(row.recordings.keys() - found.keys())
+    if unknown and not table.problems:  # which hide the names of their rows
         raise TrackerError(
             f"plan {path}: expected settings of recordings among {', '.join(sorted(found))[:300] or 'none'}, found "
             f"'{unknown[0]}'; correct the name"
         )
-    if not found:
+    if not found and not table.problems:
         raise TrackerError(
             f"plan {path}: expected sessions or a table with recordings, found none; 'sessions' takes paths such as "
             f"lab/*/session, of folders with {SESSION_FILE}"
@@ -155,74 +152,22 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
     sessions = {r.name: _session_of(r) for r in chosen}
     people = {r.name: names for r in chosen if (names := _people_of(r, sessions[r.name]))}
     n_frames = {r.name: _n_frames(r, s) for r in chosen if (s := sessions[r.name]) is not None}
-    return BatchPlan(path, tuple(chosen), row.freeze_bodies, people, n_frames)
+    return BatchPlan(path, tuple(chosen), row.freeze_bodies, people, n_frames, table.problems, table.unread)
 
 
 def _by_pattern(row: _PlanFile, path: Path) -> dict[str, tuple[Path, Footage | None]]:
     """Return the session folders that the patterns of a plan name."""
     found = dict[str, tuple[Path, Footage | None]]()
     for pattern in row.sessions:
-        base, relative = path.parent, pattern
-        if Path(pattern).is_absolute():
-            base, relative = Path(Path(pattern).anchor), str(Path(pattern).relative_to(Path(pattern).anchor))
-        folders = [p for p in sorted(base.glob(relative)) if p.is_dir()]
+        folders = [p for p in matches(path.parent, pattern) if p.is_dir()]
         if not folders:
             raise TrackerError(f"plan {path}: expected session folders at '{pattern}', found none; correct the path")
         for folder in folders:
             whole = folder.resolve()
+            check(str(whole), FilePath, f"plan {path}", TrackerError)
             inside = whole.is_relative_to(path.parent)
             found[(whole.relative_to(path.parent) if inside else whole).as_posix()] = (whole, None)
     return found
-
-
-def _of_table(row: _PlanFile, path: Path, out: Path) -> dict[str, tuple[Path, Footage | None]]:
-    """Return the recordings of the table of a plan."""
-    if row.table is None:
-        return {}
-    table = path.parent / row.table
-    lines = list(csv.reader(read_lines(table, _TABLE)))
-    header = [cell.strip() for cell in lines[0]] if lines else []
-    if wrong := [c for c in header if c not in _COLUMNS] or [c for c in _REQUIRED if c not in header]:
-        raise TrackerError(
-            f"table {table}: expected columns {', '.join(_COLUMNS)}, of which {', '.join(_REQUIRED)} are needed; found "
-            f"{', '.join(header)[:200] or 'none'}; correct '{wrong[0]}'"
-        )
-    found = dict[str, tuple[Path, Footage | None]]()
-    for number, line in enumerate(lines[1:], 2):
-        if not any(cell.strip() for cell in line):
-            continue
-        cells = {k: v.strip() for k, v in zip(header, line, strict=False) if v.strip()}
-        where = f"table {table}, line {number}"
-        name = cells.get("name", "")
-        if missing := [c for c in _REQUIRED if c not in cells]:
-            raise TrackerError(f"{where}: expected a value as '{missing[0]}', found none; fill it in")
-        if name in found or Path(name).name != name or name.startswith("."):
-            raise TrackerError(
-                f"{where}: expected a name of its own that can be a folder's, found '{name}'; give it another name"
-            )
-        found[name] = (out / "sessions" / name, _footage(cells, table.parent, where))
-    return found
-
-
-def _footage(cells: Mapping[str, str], base: Path, where: str) -> Footage:
-    def several(key: str) -> tuple[str, ...]:
-        return tuple(part.strip() for part in cells.get(key, "").split(_MANY) if part.strip())
-
-    def number(key: str) -> float | None:
-        try:
-            return float(cells[key]) if key in cells else None
-        except ValueError:
-            raise TrackerError(f"{where}: expected a number as '{key}', found '{cells[key]}'; correct it") from None
-
-    background = cells.get("background")
-    return Footage(
-        str(base / cells["calibration"]),
-        tuple(str(base / video) for video in several("videos")),
-        None if background is None else str(base / background),
-        several("people") or ("person",),
-        number("height"),
-        number("fps"),
-    )
 
 
 def _inherited(top: Path, session: Path, settings: Settings) -> Settings:
@@ -265,16 +210,6 @@ def _n_frames(recording: PlannedRecording, session: "Session") -> int:
 
 
 def plain(recording: PlannedRecording) -> dict[str, Any]:
-    """Return a recording as plain data for a file of tasks; `from_plain` reads it."""
+    """Return a recording as plain data for a file of tasks."""
     data: dict[str, Any] = msgspec.to_builtins(recording)
     return data
-
-
-def from_plain(data: Any) -> PlannedRecording:
-    """Return a recording of `plain` data.
-
-    Raises:
-        TrackerError: it is no recording.
-    """
-    found: PlannedRecording = check(data, PlannedRecording, "task", TrackerError)
-    return found

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from tracker.api.pose_series import PoseSeries
 from tracker.api.results import read_poses
-from tracker.batch.manifest import Manifest, RecordingTask, Result, State
+from tracker.batch.manifest import Manifest, State
 from tracker.batch.plan import Settings
 from tracker.batch.stretches import SeamRow
+from tracker.batch.task_files import RecordingTask, Result
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array, IntArray
@@ -50,6 +51,8 @@ class RecordingRow:
     """The frames at which these were joined, the largest seam first."""
     result: Result | None = None
     """How the task ended; None while it has not."""
+    is_earlier: bool = False
+    """Whether it was done with other settings than those of the plan."""
 
     @property
     def share_doubted(self) -> float:
@@ -116,6 +119,7 @@ def _row(manifest: Manifest, task: RecordingTask) -> RecordingRow:
         result.n_stretches,
         tuple(sorted(result.seams, key=lambda seam: -seam.apart_mm)),
         result,
+        result.settings not in (None, recording.settings),
     )
 
 

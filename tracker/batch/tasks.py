@@ -14,20 +14,21 @@ from typing import Any, NamedTuple
 import msgspec
 
 from tracker.api.results import export
-from tracker.api.sessions import frames_of, new_session, open_session
+from tracker.api.sessions import frames_of, open_session
 from tracker.api.work import Progress, Tracked, track
+from tracker.batch.checks import frames_to_track
 from tracker.batch.join import TrackedStretch, join
-from tracker.batch.manifest import RecordingTask
 from tracker.batch.plan import PlannedRecording, plain
 from tracker.batch.stretch_work import begin, track_stretch
 from tracker.batch.stretches import Division, SeamRow, n_stretches
+from tracker.batch.task_files import RecordingTask
 from tracker.errors import TrackerError
 from tracker.exports.formats import FORMATS
 from tracker.files import write_text_atomic
-from tracker.formats.file_names import identifier
+from tracker.formats.file_names import own_identifier
 from tracker.formats.model_toml import format_model, has_preset_proportions, load_model
 from tracker.pipeline.body_acquisition import store_body
-from tracker.session.frame_list import parse_frame_list
+from tracker.session.assemble import assemble
 from tracker.session.lock import SessionLock
 from tracker.session.session import ANNOTATIONS_FILE, Session, load_session
 from tracker.store.annotation_store import AnnotationStore
@@ -82,7 +83,7 @@ def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done | Div
         found = TrackedBefore(joined.tracked, joined.seams)
     elif found is None:
         session = _with_known_bodies(session, task, folder / "bodies")
-        frames = frames_of(session, _frames(recording, session.n_frames))[:: settings.stride or 1]
+        frames = frames_of(session, frames_to_track(settings, session))[:: settings.stride or 1]
         if isinstance(frames, range) and n_stretches(len(frames), settings.stretch_frames) > 1:
             division = begin(session, settings, frames, progress)
             _share_bodies(load_session(session.folder), task, folder / "bodies")
@@ -96,7 +97,7 @@ def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done | Div
     for part in task.stretches():
         shutil.rmtree(part.session(folder), ignore_errors=True)
     _share_bodies(load_session(session.folder), task, folder / "bodies")
-    return Done(found.tracked, _export(session, recording, folder / "exports"), found.seams)
+    return Done(found.tracked, _export(session, task, folder / "exports"), found.seams)
 
 
 def _digest(task: RecordingTask) -> str:
@@ -154,20 +155,7 @@ def _session(recording: PlannedRecording) -> Session:
     footage = recording.footage
     if footage is None or Path(recording.session).is_dir():
         return open_session(recording.session)
-    return new_session(
-        recording.session,
-        footage.videos,
-        footage.calibration,
-        footage.people,
-        background=footage.background,
-        heights=footage.height_m,
-        fps=footage.fps,
-    )
-
-
-def _frames(recording: PlannedRecording, n_frames: int) -> list[int] | None:
-    text = recording.settings.frames
-    return None if text is None else list(parse_frame_list(text, n_frames, f"frames of {recording.name}"))
+    return assemble(footage.request(recording.session))
 
 
 def _tracked_before(folder: Path, key: str) -> TrackedBefore | None:
@@ -185,7 +173,7 @@ def _tracked_before(folder: Path, key: str) -> TrackedBefore | None:
 def _with_known_bodies(session: Session, task: RecordingTask, bodies: Path) -> Session:
     """Give people the bodies that other recordings have acquired, unless they have sizes of their own."""
     known = [
-        (i, bodies / f"{identifier(p.name)}.toml")
+        (i, bodies / f"{own_identifier(p.name)}.toml")
         for i, p in enumerate(session.people)
         if p.name in task.bodies and has_preset_proportions(p.model)
     ]
@@ -202,16 +190,16 @@ def _with_known_bodies(session: Session, task: RecordingTask, bodies: Path) -> S
 def _share_bodies(session: Session, task: RecordingTask, bodies: Path) -> None:
     """Write the bodies that this recording acquired, for others. The first one stays."""
     for person in session.people:
-        path = bodies / f"{identifier(person.name)}.toml"
+        path = bodies / f"{own_identifier(person.name)}.toml"
         if person.name in task.bodies and not path.exists() and not has_preset_proportions(person.model):
             write_text_atomic(path, format_model(person.model))
 
 
-def _export(session: Session, recording: PlannedRecording, exports: Path) -> tuple[Path, ...]:
-    files = list[Path]()
-    for name in recording.settings.export or ():
-        if name not in FORMATS:
-            raise TrackerError(f"expected formats among {', '.join(FORMATS)}, found '{name}'; correct the plan")
-        out = exports / f"{identifier(recording.name.replace('/', '_'))}{FORMATS[name].suffixes[0]}"
-        files += export(session, out, name, recording.settings.people, overwrite=True)
+def _export(session: Session, task: RecordingTask, exports: Path) -> tuple[Path, ...]:
+    """Write files for other programs into a folder of the recording: those of two never have one name."""
+    files, settings = list[Path](), task.recording.settings
+    for name in settings.export or ():
+        (exports / task.stem).mkdir(exist_ok=True)
+        out = exports / task.stem / f"{task.stem}{FORMATS[name].suffixes[0]}"
+        files += export(session, out, name, settings.people, overwrite=True)
     return tuple(files)

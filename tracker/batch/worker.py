@@ -11,8 +11,9 @@ from typing import TypeAlias
 import msgspec
 
 from tracker.batch.claims import BEAT_S, Claim
-from tracker.batch.manifest import Manifest, RecordingTask, Result
+from tracker.batch.manifest import Manifest
 from tracker.batch.stretches import Division
+from tracker.batch.task_files import RecordingTask, Result
 from tracker.batch.tasks import Done, do_task
 from tracker.compute.threads import one_blas_thread
 from tracker.errors import TrackerError
@@ -48,6 +49,7 @@ def work(
     import scipy.linalg  # noqa: F401  before its threads are limited, which every task would load
 
     manifest, n_done = Manifest.load(folder), 0
+    manifest.make_folders()
     with one_blas_thread():  # a worker has its share of the cores already
         while not is_stopped() and (max_tasks is None or n_done < max_tasks) and not manifest.is_finished():
             found = manifest.claim_next()
@@ -92,15 +94,10 @@ def _do(
     try:
         allowed = task.recording.settings.attempts or 3
         if manifest.count_attempt(task) > allowed:
-            error = f"{allowed} workers died over it; look at memory, and track it alone"
+            error = f"{allowed} workers died over it; look at memory and room on the disk, and track it alone"
             return end(Result("failed", error=error))
         with held.beating():
             done = do(task, manifest.folder, go_on)
-    except TrackerError as error:
-        remedy = error.remedy
-        fields = {} if remedy is None else {k: str(v) for k, v in remedy.fields.items()}
-        code = "" if remedy is None else remedy.code
-        return end(Result("failed", error=str(error), remedy=code, remedy_fields=fields))
     except LostClaimError:
         _LOG.warning("%s was taken by another worker; this one goes on with the next task", task.name)
         return False
@@ -109,9 +106,7 @@ def _do(
         held.release()
         raise
     except Exception as error:  # one recording must not end the others
-        _LOG.exception("%s failed", task.name)
-        text = f"internal error: {type(error).__name__}: {error}; please report it with the log"
-        return end(Result("failed", error=text))
+        return end(_failed(task, error))
     if isinstance(done, Division):
         manifest.forget_attempt(task)
         return manifest.divide(task, held, msgspec.structs.replace(done, **used()))
@@ -126,3 +121,17 @@ def _do(
             seams=list(done.seams),
         )
     )
+
+
+def _failed(task: RecordingTask, error: Exception) -> Result:
+    """Return the result of a task that ended with an error."""
+    if isinstance(error, TrackerError):
+        remedy = error.remedy
+        fields = {} if remedy is None else {k: str(v) for k, v in remedy.fields.items()}
+        return Result("failed", error=str(error), remedy="" if remedy is None else remedy.code, remedy_fields=fields)
+    _LOG.error("%s failed", task.name, exc_info=error)
+    if isinstance(error, OSError):
+        text = f"cannot read or write: {error}; see that there is room, and that you may write"
+    else:
+        text = f"internal error: {type(error).__name__}: {error}; please report it with the log"
+    return Result("failed", error=text)

@@ -28,7 +28,7 @@ from tracker.exports.array_writers import write_npz
 from tracker.exports.dataset_card import LabelCounts, RecordingSummary, format_card, summarize
 from tracker.exports.dataset_labels import DatasetLabels, DatasetRecording, RecordingLabels, plan_labels
 from tracker.exports.dataset_splits import SplitChoice, divide
-from tracker.exports.export_files import FOLDER_PROVENANCE, is_export_folder, moved_at_end, refuse_existing, unwritable
+from tracker.exports.export_files import FOLDER_PROVENANCE, is_export_folder, moved_at_end, unwritable
 from tracker.exports.label_writers import write_views
 from tracker.exports.motion import ExportedMotion
 from tracker.exports.options import ExportOptions
@@ -95,9 +95,8 @@ def export_dataset(
     Raises:
         TrackerError: the folder exists or cannot be written, or footage cannot be read.
     """
-    refuse_existing([out], overwrite, is_export_folder)
     try:
-        with moved_at_end([out]) as folder:
+        with moved_at_end([out], overwrite, is_export_folder) as folder:
             return _write(folder / out.name, plan, options, tick)
     except OSError as error:
         raise unwritable(out, error) from error

@@ -1,5 +1,6 @@
 """Export a session to files: all of them appear complete, or none."""
 
+import errno
 import os
 import secrets
 import shutil
@@ -9,12 +10,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from tracker.errors import Remedy, TrackerError
 from tracker.exports.export_format import ExportFormat
 from tracker.exports.motion import ExportedMotion
 from tracker.exports.options import ExportOptions
 from tracker.exports.provenance import SIDE_FILE, write_provenance
 from tracker.formats.file_names import identifiers
+from tracker.session.holder import is_alive, read_holder, this_holder
 
 if TYPE_CHECKING:
     from tracker.session.session import Session
@@ -22,6 +26,10 @@ if TYPE_CHECKING:
 
 FOLDER_PROVENANCE = "provenance.json"
 """Name of the file of provenance in a folder; a folder that has it is one of an export."""
+_HOLDER = ".holder"
+"""Name of a file in the temporary folder of an export: the program that makes it (`tracker.session.holder`)."""
+_BEFORE = ".before"
+"""End of the name of a folder that is being replaced."""
 
 
 @dataclass(frozen=True)
@@ -127,9 +135,8 @@ def export(
     has_side_files = options.provenance and not chosen.holds_provenance and not chosen.is_folder
     names = [n for files in groups for n in (*files.names, *[files.side_file] * has_side_files)]
     paths = [out.with_name(name) for name in names]
-    refuse_existing(paths, overwrite, is_export_folder if chosen.is_folder else None)
     try:
-        with moved_at_end(paths) as folder:
+        with moved_at_end(paths, overwrite, is_export_folder if chosen.is_folder else None) as folder:
             for files in groups:
                 part = replace(motion, chosen=files.people)
                 chosen.write(part, options, [folder / name for name in files.names], tick)
@@ -143,41 +150,91 @@ def export(
 def unwritable(out: Path, error: OSError) -> TrackerError:
     """Return the error of an export that cannot be written."""
     reason = error.strerror or str(error)
-    return TrackerError(f"cannot write {out}: {reason}; choose a folder that you may write to, with room")
+    advice = "a shorter name" if error.errno == errno.ENAMETOOLONG else "a folder that you may write to, with room"
+    return TrackerError(f"cannot write {out}: {reason}; choose {advice}")
 
 
-def refuse_existing(paths: Sequence[Path], overwrite: bool, may_replace: Callable[[Path], bool] | None) -> None:
-    """Refuse to replace files.
+@contextmanager
+def moved_at_end(
+    paths: Sequence[Path], overwrite: bool | None, may_replace: Callable[[Path], bool] | None = None
+) -> Generator[Path, None, None]:
+    """Yield an empty folder beside some files; at the end, files of the same names move from there to their places.
+
+    Of two programs that make a file at the same time, one does. Folders that killed programs left are removed.
 
     Args:
         paths: the files or folders to write.
-        overwrite: whether files may be replaced.
+        overwrite: whether they may be replaced; None where that is not offered.
         may_replace: returns whether a folder may be replaced then; None for no folder.
 
     Raises:
         TrackerError: one exists that may not be replaced.
+        OSError: they cannot be written.
     """
+    _refuse_existing(paths, overwrite, may_replace)
+    _remove_left(paths[0].parent)
+    folder, placed = paths[0].with_name(f".{paths[0].name}.{secrets.token_hex(4)}.tmp"), list[Path]()
+    folder.mkdir()
+    try:
+        (folder / _HOLDER).write_bytes(msgspec.json.encode(this_holder()))
+        yield folder
+        for path in paths:
+            try:
+                _place(folder / path.name, path, bool(overwrite))
+            except OSError:
+                _refuse_existing([path], overwrite, may_replace)  # another program was quicker
+                raise
+            placed.append(path)
+    except BaseException:
+        for path in [] if overwrite else placed:
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        raise
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _refuse_existing(paths: Sequence[Path], overwrite: bool | None, may_replace: Callable[[Path], bool] | None) -> None:
     for found in paths:
         may_overwrite = may_replace(found) if found.is_dir() and may_replace else not (found.is_dir() or may_replace)
         if found.exists() and not (overwrite and may_overwrite):
             kind = "folder" if found.is_dir() else "file"
-            remedy = Remedy("another_file_or_overwrite") if may_overwrite else Remedy("another_file")
+            is_offered = may_overwrite and overwrite is not None
+            remedy = Remedy("another_file_or_overwrite") if is_offered else Remedy("another_file")
             raise TrackerError(f"expected {found} not to exist, found a {kind}", remedy)
 
 
-@contextmanager
-def moved_at_end(paths: Sequence[Path]) -> Generator[Path, None, None]:
-    """Yield an empty folder beside some files; at the end, files of the same names move from there to their places."""
-    folder = paths[0].with_name(f".{paths[0].name}.{secrets.token_hex(4)}.tmp")
-    folder.mkdir()
-    try:
-        yield folder
-        for path in paths:
-            if path.is_dir():  # it moves away first: a folder does not replace one that has files
-                os.replace(path, folder / f"{path.name}.before")
-            os.replace(folder / path.name, path)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+def _place(made: Path, path: Path, overwrite: bool) -> None:
+    """Move a file or folder to its place. Without `overwrite`, it must be free until then.
+
+    Raises:
+        OSError: it is not, or cannot be written.
+    """
+    if overwrite:
+        if path.is_dir():  # it moves away first: a folder does not replace one that has files
+            os.replace(path, made.with_name(path.name + _BEFORE))
+        os.replace(made, path)
+    elif made.is_dir():
+        made.rename(path)
+    else:
+        try:
+            os.link(made, path)
+        except FileExistsError:
+            raise
+        except OSError:  # a drive without hard links
+            path.open("xb").close()
+            os.replace(made, path)
+
+
+def _remove_left(parent: Path) -> None:
+    """Remove the folders that killed exports left; a folder that one was about to replace goes back to its place."""
+    for holder_file in parent.glob(f".*.tmp/{_HOLDER}"):
+        holder, left = read_holder(holder_file), holder_file.parent
+        if holder is None or is_alive(holder):
+            continue
+        for before in left.glob(f"*{_BEFORE}"):
+            if not (place := parent / before.name.removesuffix(_BEFORE)).exists():
+                before.rename(place)
+        shutil.rmtree(left, ignore_errors=True)
 
 
 def _camera_names(session: "Session") -> tuple[str, ...]:

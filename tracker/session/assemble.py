@@ -37,7 +37,7 @@ from tracker.session.matching import (
     match_footage,
 )
 from tracker.session.rig_summary import summarize_rig
-from tracker.session.session import PALETTE, Person, Session, create_session
+from tracker.session.session import PALETTE, Person, Session, check_content, create_session
 from tracker.validation import same_form
 
 T = TypeVar("T")
@@ -99,6 +99,12 @@ class SessionParts:
     fps: float
     """Frames per second."""
     n_frames: int
+
+    @property
+    def session(self) -> Session:
+        """The session that they make, which is not written."""
+        folder = self.request.folder
+        return Session(folder, folder.name, self.fps, self.n_frames, self.cameras, self.people, self.request.up)
 
     def make(self) -> Session:
         """Make the session folder.
@@ -212,7 +218,9 @@ def check_parts(
         report(rig.sentence)
         for sentence in rig.doubts:
             note(sentence)
-    return SessionParts(request, sources, people, fps, n_frames)
+    parts = SessionParts(request, sources, people, fps, n_frames)
+    check_content(parts.session)
+    return parts
 
 
 def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = None) -> list[str]:

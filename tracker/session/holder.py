@@ -17,6 +17,8 @@ from typing import Annotated, NamedTuple, TypeAlias
 import msgspec
 from msgspec import Meta
 
+from tracker.files import read_regular
+
 _FIRST_NAMESPACE = "pid:[4026531836]"
 """The namespace of processes outside of any container (`PROC_PID_INIT_INO` of Linux)."""
 
@@ -55,6 +57,14 @@ def this_holder() -> Holder:
         here.namespace,
         here.machine,
     )
+
+
+def read_holder(path: Path) -> Holder | None:
+    """Return the holder that a file names; None if it cannot be read."""
+    try:
+        return msgspec.json.decode(read_regular(path, 10_000), type=Holder)
+    except (OSError, msgspec.DecodeError):
+        return None
 
 
 def is_of_this_system(holder: Holder) -> bool:

@@ -27,6 +27,7 @@ from tracker.errors import SessionError
 from tracker.files import check_regular, read_regular, refuse_links, write_text_atomic
 from tracker.footage.camera_source import CameraSource, Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.formats.file_names import file_stems
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
 from tracker.session.folder import SESSION_FILE, session_folder, tidy_path
@@ -123,7 +124,7 @@ def create_session(
         n_frames = min((open_footage(c.footage, c.camera.name).n_frames - c.offset for c in sources), default=0)
     title, uid = name or folder.name, secrets.token_hex(16)
     session = Session(folder, title, float(fps), n_frames, sources, tuple(people), up, uid=uid)
-    _checked_content(session)
+    check_content(session)
     temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)
@@ -144,7 +145,7 @@ def save_session(session: Session) -> None:
     Raises:
         SessionError: a name or axis is not allowed, or the folder cannot be written.
     """
-    _checked_content(session)
+    check_content(session)
     try:
         session.folder.mkdir(parents=True, exist_ok=True)
         _write(replace(session, cameras=tuple(_absolute(c) for c in session.cameras)), session.folder)
@@ -239,7 +240,7 @@ def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
 
 
 def _save_session_file(session: Session) -> None:
-    _checked_content(session)
+    check_content(session)
     try:
         _write_session(session, session.folder)
     except OSError as error:
@@ -259,12 +260,12 @@ def save_model(session: Session, person: int, model: BodyModel) -> Session:
     """
     people = [replace(p, model=model) if i == person else p for i, p in enumerate(session.people)]
     changed = replace(session, people=tuple(people))
-    path = session.folder / "models" / f"{people[person].name}.toml"
+    path = session.folder / _model_files(people)[person]
     refuse_links(session.folder, SESSION_FILE, f"models/{path.name}")
     try:
         path.parent.mkdir(exist_ok=True)
         write_text_atomic(path, format_model(model))
-        _write_session(changed, session.folder)  # which may have named another file
+        _write_session(changed, session.folder)
     except OSError as error:
         raise SessionError(f"cannot write {path}: {error}; see that you may write to the folder") from error
     return changed
@@ -279,11 +280,9 @@ def _load_floor(row: FloorRow | None) -> GroundPlane | None:
 
 def _write(session: Session, into: Path) -> None:
     """Write the files of a session into a folder that is, or will become, `session.folder`."""
-    refuse_links(into, CALIBRATION_FILE, *(f"models/{p.name}.toml" for p in session.people))
-    (into / "models").mkdir(exist_ok=True)
+    refuse_links(into, CALIBRATION_FILE)
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
-    for person in session.people:
-        write_text_atomic(into / "models" / f"{person.name}.toml", format_model(person.model))
+    _write_models(session, into)
     if session.uid:
         refuse_links(into, IDENTITY_FILE)
         write_text_atomic(into / IDENTITY_FILE, f"{session.uid}\n")
@@ -308,12 +307,29 @@ def _read_uid(path: Path) -> str:
 
 
 def _write_session(session: Session, into: Path) -> None:
+    """Write session.toml, and bodies of people whose file it did not name so far."""
     refuse_links(into, SESSION_FILE)
-    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(_checked_content(session)))
+    _write_models(session, into, are_missing=True)
+    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(check_content(session)))
 
 
-def _checked_content(session: Session) -> dict[str, Any]:
-    """Return the content of session.toml, checked as if it were read.
+def _write_models(session: Session, into: Path, are_missing: bool = False) -> None:
+    """Write the bodies of all people, or those whose file is missing."""
+    models = dict(zip(_model_files(session.people), session.people, strict=True))
+    wanted = [file for file in models if not (are_missing and (into / file).exists())]
+    refuse_links(into, *wanted)
+    for file in wanted:
+        (into / file).parent.mkdir(exist_ok=True)
+        write_text_atomic(into / file, format_model(models[file].model))
+
+
+def _model_files(people: Sequence[Person]) -> list[str]:
+    """Return the file of each person's body within the session."""
+    return [f"models/{stem}.toml" for stem in file_stems([p.name for p in people])]
+
+
+def check_content(session: Session) -> dict[str, Any]:
+    """Check the content of a session.toml as if it were read, and return it.
 
     Raises:
         SessionError: a name, axis, rate, number or path is not allowed.
@@ -344,7 +360,10 @@ def _checked_content(session: Session) -> dict[str, Any]:
         "up": session.up,
         "calibration": CALIBRATION_FILE,
         "cameras": cameras,
-        "people": [{"name": p.name, "model": f"models/{p.name}.toml", "color": p.color} for p in session.people],
+        "people": [
+            {"name": p.name, "model": file, "color": p.color}
+            for p, file in zip(session.people, _model_files(session.people), strict=True)
+        ],
     }
     if session.floor is not None:
         data["floor"] = {"normal": session.floor.normal.tolist(), "offset_m": float(session.floor.offset_m)}

@@ -18,7 +18,7 @@ def run_on_cluster(manifest: Manifest, address: str, progress: Reporter) -> bool
     A worker that dies gives its task back as any other does (`tracker.batch.claims`), to the workers that are left.
 
     Raises:
-        TrackerError: the package `distributed` is missing, or no scheduler answers.
+        TrackerError: the package `distributed` is missing, no scheduler answers, it goes away, or the workers fail.
     """
     try:
         from distributed import Client
@@ -43,6 +43,13 @@ def run_on_cluster(manifest: Manifest, address: str, progress: Reporter) -> bool
         except KeyboardInterrupt:
             client.cancel(futures, force=True)
             return True
+        except Exception as error:
+            if client.status == "running":
+                raise
+            raise TrackerError(
+                f"expected the Dask scheduler at {address} until all recordings have ended, found it gone; start it "
+                "and run the batch again, which goes on where it was"
+            ) from error
     return False
 
 
@@ -61,7 +68,26 @@ def _wait(manifest: Manifest, futures: list[Any], threads: int, client: Any, pro
             if task.number not in shown and (result := manifest.result(task)) is not None:
                 shown.add(task.number)
                 progress.say(f"{len(shown)}/{len(manifest.tasks)} {task.recording.name}: {result.state}")
+        for future in futures:
+            _check(future)
         futures[:] = [f for f in futures if not f.done()]
         for _ in range(min(threads, manifest.n_parts()) - len(futures)):
             futures.append(client.submit(work_once, str(manifest.folder), pure=False))
+        if client.status == "closed":
+            raise ConnectionError("the client has lost its scheduler")
         time.sleep(_LOOK_S)
+
+
+def _check(future: Any) -> None:
+    """Refuse workers that cannot run this program. One that died gives its task back.
+
+    Raises:
+        TrackerError: a call has failed otherwise.
+    """
+    from distributed import KilledWorker
+
+    if future.status == "error" and not isinstance(error := future.exception(), KilledWorker):
+        raise TrackerError(
+            "expected workers with this version of the program that can write the folder of the batch, found one that "
+            f"fails with {type(error).__name__}: {error}; correct it and run the batch again"
+        )

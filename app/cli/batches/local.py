@@ -11,6 +11,7 @@ from pathlib import Path
 from app.runtime.memory import WORKER_BYTES, free_bytes, n_cores
 from app.runtime.progress import Reporter
 from tracker.batch.manifest import Manifest
+from tracker.errors import TrackerError
 
 _LOOK_S = 0.5
 _END_S = 10.0
@@ -24,6 +25,9 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
         manifest: of the batch.
         wanted: number of workers; as many as cores and memory allow by default.
         progress: shows a line for each task.
+
+    Raises:
+        TrackerError: the workers ended before the tasks, as on a full disk.
     """
     n_open = len(manifest.tasks) - sum(n for s, n in manifest.counts().items() if s in ("done", "failed"))
     n, note = n_workers(wanted, manifest.n_parts(), n_cores(), free_bytes())
@@ -48,6 +52,13 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
         for worker in workers:
             worker.kill()
             worker.wait()
+    if not manifest.is_finished():
+        found = [line for log in sorted(logs.glob("*.txt")) for line in log.read_text("utf-8", "replace").splitlines()]
+        last = f" that said: {found[-1]}" if found else ""
+        raise TrackerError(
+            f"expected workers until all recordings have ended, found none{last}; see that there are memory and room "
+            f"for {manifest.folder}, and run the batch again, which goes on where it was"
+        )
     return False
 
 

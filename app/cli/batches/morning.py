@@ -4,8 +4,11 @@ import shlex
 from typing import Any
 
 from app.remedies import PHRASES
-from tracker.batch.manifest import Manifest, Result
+from tracker.batch.manifest import Manifest
 from tracker.batch.results import RecordingRow, summarize, totals
+from tracker.batch.task_files import Result
+
+_EARLIER = "done with earlier settings of the plan; give the batch another --out to do it with the present ones"
 
 
 def record(manifest: Manifest) -> dict[str, Any]:
@@ -38,9 +41,8 @@ def format_table(found: dict[str, Any]) -> str:
         at = "" if row["worst_frame"] is None else f"frame {row['worst_frame']} ({row['worst_person']})"
         numbers = f"{error:>9}  {doubted:>7}  {verified:>8}  {row['seconds']:4.0f}"
         lines.append(f"{row['name']:{width}}  {row['state']:7} {numbers}  {at}")
-    lines += [f"{row['name']}: {row['error']}" for row in rows if row["error"]]
-    lines += [f"{row['name']}: {row['contradiction']}" for row in rows if row["contradiction"]]
-    lines += [f"{row['name']}: {row['joined']}" for row in rows if row["joined"]]
+    for key in ("error", "contradiction", "joined", "earlier"):
+        lines += [f"{row['name']}: {row[key]}" for row in rows if row[key]]
     sums = found["totals"]
     counts = ", ".join(f"{sums[s]} {s}" for s in ("done", "failed", "running", "waiting") if sums[s])
     lines.append(
@@ -71,6 +73,7 @@ def _record(row: RecordingRow) -> dict[str, Any]:
         "stretches": row.n_stretches,
         "seams": [{"frame": s.frame, "person": s.person, "apart_mm": s.apart_mm, "over": s.is_over} for s in row.seams],
         "joined": _joined(row),
+        "earlier": _EARLIER if row.is_earlier else "",
         "error": "" if row.result is None else _error(row.result),
         "files": [] if row.result is None else row.result.files,
         "open": shlex.join(words) if row.state == "done" else "",
@@ -93,6 +96,7 @@ def _joined(row: RecordingRow) -> str:
 
 def _error(result: Result) -> str:
     """Return why a task failed, with what to do in the words of the command line."""
-    if not result.remedy:
+    try:
+        return f"{result.error}; {PHRASES[result.remedy].command_line.format(**result.remedy_fields)}"
+    except LookupError:  # none, or one of another version of the program
         return result.error
-    return f"{result.error}; {PHRASES[result.remedy].command_line.format(**result.remedy_fields)}"

@@ -12,7 +12,7 @@ _ARRAY = """#!/bin/sh
 #SBATCH --array=0-{last}
 #SBATCH --cpus-per-task=2
 #SBATCH --mem=4G
-#SBATCH --output={folder}/logs/array_%a.txt
+#SBATCH --output={logs}/logs/array_%a.txt
 # Each job does tasks until none is left, so that fewer jobs than recordings do, too.
 # Kernels are compiled once, by the first line; the folder must be shared by all machines.
 export NUMBA_CACHE_DIR={kernels}
@@ -45,6 +45,7 @@ def write_scripts(manifest: Manifest, plan: Path) -> str:
         "name": shlex.quote(folder.name),
         "last": manifest.n_parts() - 1,
         "folder": shlex.quote(str(folder)),
+        "logs": shlex.quote(str(folder).replace("%", "%%")),
         "plan": shlex.quote(str(plan)),
         "kernels": shlex.quote(str(folder / "kernels")),
         "python": shlex.quote(sys.executable),

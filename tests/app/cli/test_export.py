@@ -2,18 +2,24 @@
 
 import errno
 import json
+import os
+import subprocess
 
+import msgspec
 import numpy as np
 import pytest
 from bodies import MODELS
 from command_line import assert_refused
+from full_disks import full_disk
 from stored_motions import store_motion
 
+from tracker.errors import TrackerError
 from tracker.exports.export_files import export
 from tracker.exports.formats import FORMATS
 from tracker.exports.motion import read_motion
 from tracker.exports.options import ExportOptions
 from tracker.formats.trc import read_trc
+from tracker.session.holder import this_holder
 from tracker.session.session import load_session
 
 
@@ -209,3 +215,85 @@ def test_a_character_that_is_none(run, couple, tmp_path, character, expected):
     found = run("export", couple, "--out", tmp_path / "m.mp4", "--character", character)
     assert_refused(found, [expected])
     assert not (tmp_path / "m.mp4").exists()
+
+
+def exported(couple, out, name, tick=lambda: None, overwrite=False):
+    session = load_session(couple)
+    options = ExportOptions(provenance=True)
+    return export(FORMATS[name], read_motion(session, (0,), None, False), options, out, overwrite, tick)
+
+
+@pytest.mark.parametrize("name", ["trc", "csv", "npz", "openpose"])
+def test_of_two_exports_to_one_place_at_the_same_time_one_succeeds(couple, tmp_path, name):
+    out, contents = tmp_path / f"m{FORMATS[name].suffixes[0]}", []
+
+    def other():
+        if not contents:
+            contents.append(None)
+            paths = exported(couple, out, name)
+            contents[0] = {path: stamp(path) for path in paths}
+
+    def stamp(path):
+        return {p: (p.stat().st_ino, p.stat().st_mtime_ns) for p in [path, *path.rglob("*")]}
+
+    with pytest.raises(TrackerError, match=r"expected .* not to exist, found a f"):
+        exported(couple, out, name, other)
+    assert {path: stamp(path) for path in contents[0]} == contents[0]
+    assert {p.name for p in tmp_path.iterdir()} == {"s", *(p.name for p in contents[0])}
+
+
+def test_of_several_files_none_is_left_where_another_program_made_one(couple, tmp_path):
+    def other():
+        (tmp_path / "m_angles.csv").write_text("of another program")
+
+    with pytest.raises(TrackerError, match=r"expected .*m_angles.csv not to exist, found a file"):
+        exported(couple, tmp_path / "m.csv", "csv", other)
+    assert {p.name for p in tmp_path.iterdir()} == {"s", "m_angles.csv"}
+
+
+def test_a_drive_without_hard_links_has_exports_too(couple, tmp_path, monkeypatch):
+    def link(*_):
+        raise OSError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", link)
+    assert exported(couple, tmp_path / "m.trc", "trc")[0].is_file()
+    with pytest.raises(TrackerError, match="not to exist, found a file"):
+        exported(couple, tmp_path / "n.trc", "trc", lambda: (tmp_path / "n.trc").write_text("of another program"))
+    assert (tmp_path / "n.trc").read_text() == "of another program"
+
+
+def test_what_a_killed_export_left_is_removed_by_the_next_one(couple, tmp_path):
+    child = subprocess.Popen(["true"])
+    child.wait()
+    dead = msgspec.structs.replace(this_holder(), process=child.pid, started="1")
+    for name, holder in (("dead", dead), ("alive", this_holder()), ("elsewhere", None)):
+        left = tmp_path / f".m.trc.{name}.tmp"
+        left.mkdir()
+        (left / "m.trc").write_text("half")
+        if holder is not None:
+            (left / ".holder").write_bytes(msgspec.json.encode(holder))
+    (tmp_path / ".m.trc.dead.tmp" / "labels_openpose.before").mkdir()
+    exported(couple, tmp_path / "other.npz", "npz")
+    assert sorted(p.name for p in tmp_path.iterdir() if p.name != "s") == [
+        ".m.trc.alive.tmp", ".m.trc.elsewhere.tmp", "labels_openpose", "other.npz"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("words", [("export", "S", "--format", "csv", "--out"), ("batch",)])
+def test_a_name_that_no_file_can_have_is_a_sentence(run, couple, tmp_path, words):
+    words = [couple if word == "S" else word for word in words]
+    assert_refused(run(*words, tmp_path / f"{'m' * 300}.csv"), ["File name too long"])
+
+
+def test_a_name_whose_side_file_would_be_too_long_is_a_sentence(run, couple, tmp_path):
+    words = ("export", couple, "--person", "ann", "--out", tmp_path / f"{'m' * 245}.trc")
+    assert_refused(run(*words), ["File name too long", "choose a shorter name"])
+
+
+@pytest.mark.parametrize("name", ["trc", "csv", "mot", "coco", "bvh", "glb", "openpose", "npz"])
+def test_a_full_disk_is_a_sentence_and_nothing_is_left(run, couple, tmp_path, name):
+    out = tmp_path / f"m{FORMATS[name].suffixes[0]}"
+    with full_disk(1000):
+        found = run("export", couple, "--person", "ann", "--format", name, "--out", out, "--json")
+    assert_refused(found, [f"cannot write {out}: File too large; choose a folder that you may write to, with room"])
+    assert {p.name for p in tmp_path.iterdir() if "state" not in p.name} == {"s"}

@@ -13,10 +13,11 @@ from stored_motions import store_motion
 
 from tracker.api.work import Tracked
 from tracker.batch.join import TrackedStretch, join
-from tracker.batch.manifest import Manifest, Result
+from tracker.batch.manifest import Manifest
 from tracker.batch.plan import Settings
 from tracker.batch.stretch_work import FOUND
 from tracker.batch.stretches import Division, RecordingStretch, divide
+from tracker.batch.task_files import Result
 from tracker.batch.tasks import Done
 from tracker.batch.worker import work
 from tracker.errors import TrackerError

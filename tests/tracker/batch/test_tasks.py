@@ -2,15 +2,20 @@
 
 import shutil
 from contextlib import closing
+from dataclasses import replace
 
 import pytest
+from bodies import MODELS
 from command_line import SAMPLE
+from stored_motions import store_motion
 
 import tracker
+from tracker.api.work import Tracked
 from tracker.batch.manifest import Manifest
 from tracker.batch.plan import read_plan
 from tracker.batch.tasks import do_task
 from tracker.evaluation.references import read_joints
+from tracker.formats.model_toml import load_model
 from tracker.pipeline.given_pose import set_pose_at_joints
 from tracker.store.annotation_store import AnnotationStore
 
@@ -43,3 +48,22 @@ def test_a_task_that_died_before_its_result_does_not_track_again(manifest, tmp_p
     assert again == first
     assert again.tracked.statuses == {"person": {"good": 2}}
     assert [path.name for path in again.files] == ["a.csv", "a_angles.csv"]
+
+
+def test_recordings_and_people_of_like_names_have_files_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.setattr("tracker.batch.tasks.track", lambda *_, **__: Tracked(1, {}, 1.0, 0, ""))
+    people = {"x/y": ("Ann",), "x_y": ("ann",), "x/z": ("y", "w_v"), "x/z_w": ("v", "u")}
+    for i, (name, own) in enumerate(people.items()):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        body = replace(MODELS["gavrila22"], name="own", height_m=1.5 + 0.1 * i)
+        store_motion(tmp_path / name, [body] * len(own), n_frames=2, names=own)
+    plan = tmp_path / "plan.toml"
+    plan.write_text(f"sessions = {list(people)}\nfreeze_bodies = true\nsettings = {{export = ['trc', 'csv']}}")
+    Manifest.create(read_plan(plan, tmp_path / "out"), tmp_path / "out")
+    tasks = Manifest.load(tmp_path / "out").tasks
+    files = [path for task in tasks for path in do_task(task, tmp_path / "out", lambda stage, share: None).files]
+    assert len({str(path).casefold() for path in files}) == len(files) == 6 + 2 * 4
+    assert all(path.is_file() for path in files)
+    bodies = [load_model(path).height_m for path in (tmp_path / "out" / "bodies").iterdir()]
+    assert len(bodies) == 6
+    assert min(bodies) == 1.5

@@ -13,10 +13,12 @@ import batch_work
 import msgspec
 import pytest
 from batch_work import make_batch, write_line
+from full_disks import full_disk
 
 from tracker.batch import claims
-from tracker.batch.manifest import RecordingTask, Result
+from tracker.batch.task_files import RecordingTask, Result
 from tracker.batch.worker import work
+from tracker.errors import TrackerError
 from tracker.session.holder import this_holder
 from tracker.session.lock import LOCK_FILE
 
@@ -94,6 +96,54 @@ def test_a_worker_of_another_machine_is_dead_without_signs_of_life(tmp_path):
     past = time.time() - claims.DEAD_S - 1
     os.utime(path, (past, past))
     assert manifest.claim_next() is not None
+
+
+@pytest.mark.parametrize(
+    "content", [b"", msgspec.json.encode(msgspec.structs.replace(this_holder(), host="elsewhere"))]
+)
+def test_a_claim_with_a_time_to_come_is_of_a_dead_worker(tmp_path, content):
+    manifest = make_batch(tmp_path, 1)
+    path = tmp_path / "claims" / "000000"
+    path.write_bytes(content)
+    future = time.time() + 30 * 86400
+    os.utime(path, (future, future))
+    assert manifest.state(manifest.tasks[0]) == "waiting"
+    assert manifest.claim_next() is not None
+
+
+def test_a_clock_that_differs_from_that_of_the_folder_counts_nothing(tmp_path, monkeypatch):
+    manifest = make_batch(tmp_path, 1)
+    (tmp_path / "claims" / "000000").write_bytes(
+        msgspec.json.encode(msgspec.structs.replace(this_holder(), host="elsewhere"))
+    )
+    monkeypatch.setattr(claims.time, "time", lambda: 0.0)
+    assert manifest.state(manifest.tasks[0]) == "running"
+
+
+def test_a_full_disk_leaves_no_claim_without_its_holder(tmp_path):
+    manifest = make_batch(tmp_path, 1)
+    with full_disk(), pytest.raises(OSError, match="File too large"):
+        manifest.claim_next()
+    assert [*(tmp_path / "claims").iterdir()] == []
+    assert manifest.claim_next() is not None
+
+
+def test_a_result_that_cannot_be_written_is_a_sentence(tmp_path):
+    manifest = make_batch(tmp_path, 1)
+
+    def do(task, folder, progress):
+        resource = full_disk()
+        resource.__enter__()
+        unlimited.append(resource)
+        return write_line(task, folder, progress)
+
+    unlimited = []
+    try:
+        with pytest.raises(TrackerError, match=r"cannot write .*000000.json: File too large; choose a folder"):
+            work(tmp_path, do=do)
+    finally:
+        unlimited[0].__exit__(None, None, None)
+    assert manifest.result(manifest.tasks[0]) is None
 
 
 def test_the_lock_of_somebody_else_stays(tmp_path):

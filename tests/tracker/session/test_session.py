@@ -11,7 +11,7 @@ from tracker.footage.camera_source import CameraSource, Clock, LostFrames
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.session.session import Person, create_session, load_session, save_session
+from tracker.session.session import Person, create_session, load_session, save_floor, save_model, save_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
 
@@ -54,6 +54,24 @@ def test_round_trip(tmp_path, cameras):
     session = make(tmp_path, cameras, people=people("ann", "bob"), name="A title", up="-y")
     assert_same(load_session(tmp_path / "s"), session)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["s"]
+
+
+def test_people_whose_names_file_systems_take_for_one_have_bodies_of_their_own(tmp_path, cameras):
+    bodies = [Person(n, load_model("gavrila22", h), "#112233") for n, h in (("Ann", 1.5), ("ann", 1.6), ("con", 1.7))]
+    session = save_model(make(tmp_path, cameras, people=bodies), 0, load_model("gavrila22", 1.8))
+    files = sorted(p.stem for p in (tmp_path / "s" / "models").iterdir())
+    assert len({stem.casefold() for stem in files}) == 3
+    assert "con" not in files
+    assert [p.model.height_m for p in load_session(session.folder).people] == [1.8, 1.6, 1.7]
+
+
+def test_a_body_that_lies_elsewhere_stays_that_of_the_person(tmp_path, cameras):
+    session = make(tmp_path, cameras)
+    (tmp_path / "s" / "models" / "ann.toml").rename(tmp_path / "s" / "body.toml")
+    text = (tmp_path / "s" / "session.toml").read_text()
+    (tmp_path / "s" / "session.toml").write_text(text.replace("models/ann.toml", "body.toml"))
+    save_floor(load_session(session.folder), "y", None)
+    assert_same(load_session(session.folder), replace(session, up="y"))
 
 
 def test_defaults(tmp_path, cameras):

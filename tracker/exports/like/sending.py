@@ -1,13 +1,10 @@
 """Send imported files back in their own format: what was mended is replaced, all other bytes stay."""
 
-import os
-import secrets
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tracker.errors import FormatError, Remedy, SessionError, TrackerError
-from tracker.exports.export_files import unwritable
+from tracker.errors import FormatError, SessionError
+from tracker.exports.export_files import moved_at_end, unwritable
 from tracker.exports.like.mended_points import PoseChoice, mended_points
 from tracker.exports.like.patches import Files, mended_pictures, mended_space
 from tracker.observations.assignment import people_by_poses
@@ -107,23 +104,13 @@ def _write(out: Path, contents: Files) -> dict[str, Path]:
     """
     if out.is_dir() and len(contents) == 1:
         out = out / Path(next(iter(contents))).name
-    if out.exists():
-        kind = "a folder" if out.is_dir() else "a file"
-        raise TrackerError(f"expected {out} not to exist, found {kind}", Remedy("another_file"))
-    temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
+    is_one = len(contents) == 1
     try:
-        if len(contents) == 1:
-            ((path, data),) = contents.items()
-            temporary.write_bytes(data)
-            os.replace(temporary, out)
-            return {path: out}
-        for path, data in contents.items():
-            (temporary / path).parent.mkdir(parents=True, exist_ok=True)
-            (temporary / path).write_bytes(data)
-        os.replace(temporary, out)
+        with moved_at_end([out], None, (lambda _: False) if not is_one else None) as folder:
+            for path, data in contents.items():
+                target = folder / out.name if is_one else folder / out.name / path
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(data)
     except OSError as error:
         raise unwritable(out, error) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        temporary.unlink(missing_ok=True)
-    return {path: out / path for path in contents}
+    return {path: out if is_one else out / path for path in contents}
