@@ -184,6 +184,26 @@ def _flat(group: Mapping[str, Any], depth: int = 0) -> Iterator[tuple[str, Any]]
     yield from ((str(k), v) for k, v in group.items() if k not in inner)
 
 
+def unusable(name: str, reason: str = "") -> Section:
+    """Return a camera that has nothing, or that cannot be used for a reason, a sentence without its end."""
+    keys = ("size", "matrix", "distortions", "rotation", "translation")
+    return {"name": name, "fisheye": False} | dict.fromkeys(keys) | ({"refusal": reason} if reason else {})
+
+
+def once(document: Document, cameras: Iterable[tuple[str, Section]]) -> dict[str, Section]:
+    """Return cameras by name.
+
+    Raises:
+        CalibrationError: a name is there twice.
+    """
+    found: dict[str, Section] = {}
+    for name, section in cameras:
+        if name in found:
+            raise CalibrationError(f"{document.where}: two cameras are named {quoted(name)}; give each its own name")
+        found[name] = section
+    return found
+
+
 def plain_text(value: Any) -> str:
     """Return text as it is, and a short form of anything else."""
     return value if isinstance(value, str) else quoted(value)
