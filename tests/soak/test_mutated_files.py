@@ -9,12 +9,13 @@ import time
 import tomllib
 import traceback
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from calibration_files import WRITERS, colmap, easymocap, rig_for
+from calibration_files import WRITERS, colmap, easymocap, rig_for, wildtrack
 from memory import memory_mb
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
 from rigs import cameras, looking
@@ -68,7 +69,7 @@ def written(write):
             data = (path.parent / "intri.yml").read_bytes() + own
         elif write is colmap:  # one file of both
             data += path.with_name("images.txt").read_bytes()
-        return f"cameras{files[0].suffix}", [data]
+        return f"{'extr_' if write is wildtrack else ''}cameras{files[0].suffix}", [data]
 
 
 def shown_camera(camera):
@@ -168,6 +169,7 @@ def test_mutated_files_are_read_or_refused(kind, tmp_path, cases, report, monkey
     others = [e for _, some, _, _ in KINDS.values() for e in some]
     (tmp_path / "models").mkdir()
     (tmp_path / "camera_scale.pkl").write_bytes(pickle.dumps(1.5))  # beside cameras of MVHumanNet
+    wildtrack(tmp_path, [replace(RIG[0], name="cameras")])  # the other half of its lens
     for other in ("session.toml", "calibration.toml", "models/person.toml"):
         (tmp_path / other).write_bytes((sample / other).read_bytes())
     if kind == "session":  # that of the dancers names their models and cameras

@@ -108,7 +108,8 @@ def read_google(document: Document) -> dict[str, Section]:
             lens["focal_length"] = [float(focal), float(focal * ratio)]
         section = section_of(lens, name or document.stem, document)
         if section["fisheye"]:
-            section["distortions"] = [*plain_array(group.get("radial_distortion", [])).ravel(), 0.0, 0.0, 0.0, 0.0][:4]
+            radial = plain_array(group.get("radial_distortion", [])).ravel().tolist()
+            section["distortions"] = [*radial, 0.0, 0.0, 0.0, 0.0][:4]
         found[name] = _posed(section, group.get("orientation"), group.get("position")) | {"name": name or None}
     return found
 

@@ -23,8 +23,6 @@ from tracker.validation import quoted
 _SKELETOOL = "Skeletool Camera Calibration File"
 _OF_FISHEYE = ("polynomial", "affine", "imageCircleRadius")
 _MAYACAM = ("image size", "camera matrix", "rotation", "translation")
-_N_DLT = 11
-"""Coefficients of the direct linear transformation; the twelfth is 1 (Abdel-Aziz and Karara, 1971)."""
 _COLMAP = {
     "SIMPLE_PINHOLE": "f cx cy",
     "PINHOLE": "fx fy cx cy",
@@ -161,9 +159,9 @@ def read_mayacam1(document: Document) -> dict[str, Section]:
 
 
 def is_dlt(document: Document) -> bool:
-    """Return whether there are eleven lines with as many numbers each."""
+    """Return whether there are eleven lines with as many numbers each (Abdel-Aziz and Karara 1971)."""
     counts = [len(_numbers(line)) for line in filter(None, _lines(document))]
-    return len(counts) == _N_DLT and min(counts) == max(counts) > 0
+    return len(counts) == 11 and min(counts) == max(counts) > 0
 
 
 def read_dlt(document: Document) -> dict[str, Section]:
@@ -257,8 +255,9 @@ def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, po
     K = np.array([[fx, 0.0, numbers["cx"] - 0.5], [0.0, fy, numbers["cy"] - 0.5], [0.0, 0.0, 1.0]])
     fisheye = lens[1].endswith("FISHEYE")
     order = _FISHEYE_ORDER if fisheye else _ORDER[: 8 if "k3" in numbers else 4]
-    found = _section(name, [float(side) for side in lens[2:4]], K, [numbers.get(key, 0.0) for key in order],
-                     rigid.transform(R, translation))  # fmt: skip
+    size = _row(document, name, "size", " ".join(lens[2:4]), 2)
+    lens_of = [numbers.get(key, 0.0) for key in order]
+    found = _section(name, size, K, lens_of, rigid.transform(R, translation))
     return found | {"fisheye": fisheye}
 
 
