@@ -17,7 +17,7 @@ from tracker.calibrations.layouts import find_layout
 from tracker.calibrations.pose_conventions import check_convention, odd_camera, read_pose
 from tracker.calibrations.rotation_forms import check_turned, refuse_angles, with_quaternions
 from tracker.calibrations.toml_layouts import board_square
-from tracker.calibrations.units import check_units
+from tracker.calibrations.units import check_focal_lengths, check_units
 from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
 from tracker.formats.trc import METRES_BY_WORD
@@ -48,6 +48,7 @@ def read_cameras(
     units: Units | None = None,
     poses: PoseConvention | None = None,
     footage: Collection[str] = (),
+    any_size: bool = False,
 ) -> CalibratedCameras:
     """Read the cameras of a calibration.
 
@@ -56,6 +57,7 @@ def read_cameras(
         units: unit of the translations; by default the one that the layout fixes, else metres.
         poses: convention of the poses; by default that of the layout, if the cameras do not contradict it.
         footage: names of cameras that have footage, by which the names of files with one camera are told.
+        any_size: whether to take unusual distances and focal lengths.
 
     Raises:
         CalibrationError: a file is missing or malformed, of an unknown layout, or describes impossible cameras.
@@ -83,7 +85,9 @@ def read_cameras(
     check_names(entries, where)
     notes += [*pose_notes, *_alike([entry.name for entry in entries])]
     square = next((s for d, _ in documents if (s := board_square(d)) is not None), None)
-    notes += check_units(entries, where, used, square)
+    notes += check_units(entries, where, used, square, any_size)
+    if not any_size:
+        check_focal_lengths(entries, where)
     return CalibratedCameras(entries, left_out, tuple(notes))
 
 

@@ -436,7 +436,7 @@ def test_a_camera_without_a_pose_is_left_out_unless_it_is_asked_for(room):
         ({"offsets": {"left": 9}}, RecordingError, "below its 9 frames, found 9; check the footage and the offsets"),
         ({"models": {"bob": "gavrila22"}}, SessionError, "unknown person 'bob' among the body models"),
         ({"heights": {"bob": 1.7}}, SessionError, "unknown person 'bob' among the heights"),
-        ({"heights": 17.5}, ModelError, "0.3 to 3 metres"),
+        ({"heights": 17.5}, SessionError, "height of a person of 0.6 to 2.3 metres, found 17.5"),
         ({"models": "gavrila23"}, ModelError, "gavrila22"),
         ({"units": "mm"}, CalibrationError, "found 1.41 millimetres, so that the unit is another"),
         ({"up": "q"}, SessionError, "axis that points up"),
