@@ -13,7 +13,7 @@ from tracker.boards.rig_fit import HELD_OUT_EVERY, RigCalibration, adjust_rig, h
 from tracker.boards.view_choice import MAX_LENS_VIEWS, choose_frames, choose_views, outlines, posed_views
 from tracker.calibration.camera_columns import FOCAL
 from tracker.calibration.reprojection import column_ends
-from tracker.calibration.solvable import solvable
+from tracker.calibration.solvable import check_apart, solvable
 from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import CalibrationError
@@ -152,8 +152,10 @@ def _check_determined(found: BoardCalibration, board: Board) -> None:
     """Check that the views determine the cameras, as far as their covariance and the places of the board show it.
 
     Raises:
-        CalibrationError: the board stood still or stayed in one plane, or a focal length is as good as unknown.
+        CalibrationError: two cameras stand at one place, the board stood still or stayed in one plane, or a focal
+            length is as good as unknown.
     """
+    check_apart(found.rig.cameras)
     points = found.rig.points_world - found.rig.points_world.mean(axis=0)
     thickness_m = float(np.linalg.svd(points, compute_uv=False)[-1] / np.sqrt(len(points)))
     extent_m = float(np.linalg.norm(np.ptp(board.outline, axis=0)))

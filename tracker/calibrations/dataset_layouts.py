@@ -23,17 +23,16 @@ _MVHUMANNET = {"rotation", "translation", "focal_length", "image_center"}
 _WILDTRACK = {"intr_": {"camera_matrix", "distortion_coefficients"}, "extr_": {"rvec", "tvec"}}
 
 
-def _groups(document: Document) -> dict[str, Mapping[str, Any]]:
-    """Return the groups of a file, or the rows of its list, by name; of a lone camera the file itself."""
-    rows = document.data if isinstance(document.data, list) else None
-    if rows is None:
-        return dict(document.groups) or ({"": document.data} if isinstance(document.data, dict) else {})
-    named = [row for row in rows if isinstance(row, dict)]
-    return {str(row.get("name", i)): row for i, row in enumerate(named)}
+def _rows(document: Document) -> list[tuple[str, dict[str, Any]]]:
+    """Return the groups of a file, or the rows of its list, with their names; of a lone camera the file itself."""
+    data = document.data
+    if isinstance(data, list):
+        return [(str(row.get("name", i)), row) for i, row in enumerate(data) if isinstance(row, dict)]
+    return list(document.groups.items()) or ([("", data)] if isinstance(data, dict) else [])
 
 
 def _have(document: Document, keys: set[str]) -> bool:
-    return any(keys <= group.keys() for group in _groups(document).values())
+    return any(keys <= row.keys() for _, row in _rows(document))
 
 
 def _posed(section: Section, R: Any, position: Any) -> Section:
@@ -85,7 +84,7 @@ def is_voxelpose(document: Document) -> bool:
 def read_voxelpose(document: Document) -> dict[str, Section]:
     """Read cameras whose `T` is their place, in millimetres."""
     found = {}
-    for name, group in _groups(document).items():
+    for name, group in once(document, _rows(document)).items():
         words = {"radial": group.get("k"), "tangential": group.get("p")}
         words |= {key: group.get(key) for key in ("fx", "fy", "cx", "cy", "width", "height")}
         section = section_of(words, name or document.stem, document)
@@ -101,7 +100,7 @@ def is_google(document: Document) -> bool:
 def read_google(document: Document) -> dict[str, Section]:
     """Read cameras of Google's light fields and of Nerfies: `orientation` maps world to camera."""
     found = {}
-    for name, group in _groups(document).items():
+    for name, group in once(document, _rows(document)).items():
         lens = {key: value for key, value in group.items() if key not in ("orientation", "position")}
         focal, ratio = plain_array(group.get("focal_length")), plain_array(group.get("pixel_aspect_ratio", 1.0))
         if focal.shape == ratio.shape == ():
@@ -176,7 +175,7 @@ def read_mvhumannet(document: Document) -> dict[str, Section]:
     """
     scale = _camera_scale(document)
     rows = []
-    for key, group in _groups(document).items():
+    for key, group in once(document, _rows(document)).items():
         name = key.partition(".")[0].rpartition("_")[2]
         center = plain_array(group.get("image_center")).ravel()
         words = {"focal_length": group.get("focal_length"), "principal_point": center[:2].tolist()}

@@ -17,6 +17,7 @@ from board_rigs import (
 
 from tracker.boards import pose_choice
 from tracker.boards.board_calibration import MIN_LENS_VIEWS, calibrate_rig
+from tracker.boards.board_problem import SeenCorners
 from tracker.boards.camera_graph import link_cameras
 from tracker.boards.expected_error import expected_error
 from tracker.boards.lens_fit import blank_camera, fit_lens
@@ -203,6 +204,16 @@ def test_cameras_of_a_tiny_board_are_those_of_a_large_one(rig, found):
     assert 1000 * tiny.rig.volume.expected_m == pytest.approx(found.rig.volume.expected_m, rel=0.05)
     assert "check the unit of its squares" in tiny.notes[0]
     assert not any("squares" in note for note in found.notes)
+
+
+@pytest.mark.slow
+def test_one_video_under_two_names_is_refused(rig):
+    cameras = [rig.cameras[0], rig.cameras[0], rig.cameras[1]]
+    parts = [rig.seen.of_camera(i) for i in (0, 0, 1)]
+    seen = SeenCorners(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    seen = seen._replace(cameras=np.repeat(np.arange(3), [len(part.px) for part in parts]))
+    with pytest.raises(CalibrationError, match=r"found 'a' and 'b' .* cm apart, as of one video under two names"):
+        calibrate_rig(rig.board, seen, ["a", "b", "c"], [c.size for c in cameras], [False] * 3)
 
 
 @pytest.mark.parametrize("bad", [np.inf, *(pytest.param(v, marks=pytest.mark.slow) for v in (np.nan, 1e200))])

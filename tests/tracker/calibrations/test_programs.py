@@ -155,6 +155,12 @@ def test_fisheyes_and_single_files_of_googles_rigs(tmp_path):
     assert_read(files, RIG)
 
 
+def test_a_camera_of_a_list_is_there_once(tmp_path):
+    path = changed(google(tmp_path, RIG), ('"cam1"', '"cam0"'))
+    with pytest.raises(CalibrationError, match="two cameras are named 'cam0'"):
+        read_cameras(path)
+
+
 def test_another_model_of_calib_io_is_refused(tmp_path):
     path = changed(calib_io(tmp_path, RIG), ("CameraModelOpenCV", "CameraModelDoubleSphere"))
     with pytest.raises(CalibrationError, match="found model = 'DoubleSphere'"):

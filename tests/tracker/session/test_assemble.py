@@ -190,6 +190,11 @@ def test_two_videos_for_a_camera(room):
     assert_refused(room, SessionError, "'left' has two videos", videos=videos)
 
 
+def test_one_video_for_two_cameras(room):
+    paths = {"front": room / "front.mp4", "left": room / ".." / room.name / "front.mp4"}
+    assert_refused(room, SessionError, "cameras 'front' and 'left' have one video", videos=[], camera_paths=paths)
+
+
 def test_missing_video(room):
     (room / "left.mp4").unlink()
     assert_refused(room, RecordingError, r"camera 'left'.*not found")
