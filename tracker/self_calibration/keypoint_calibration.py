@@ -16,6 +16,7 @@ from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservationSet
 from tracker.self_calibration.identification import Statures, first_cameras
 from tracker.self_calibration.joint_adjustment import UnknownLenses
+from tracker.self_calibration.mirrored_views import require_unmirrored
 from tracker.self_calibration.person_calibration import (
     PersonCalibration,
     adjusted_to,
@@ -86,6 +87,7 @@ def _calibrated(
     scale = metres_per_unit(joints, seen.names, statures)
     volume = volume_error(adjusted, scale)
     require_determined(volume, adjusted, seen, scale)
+    require_unmirrored(adjusted.cameras, adjusted.observed)
     require_one_solution(Solution(adjusted, gauge), first.rivals, seen, lenses)
     by_person = scale * joints.reshape(-1, len(seen.names), 3)
     world = upright(scaled_by(adjusted.cameras, scale), by_person, seen.names, float(np.nanmean(statures)))
