@@ -31,5 +31,5 @@ def test_a_mirrored_view_is_named(n):
     seen = observations(cameras, dancing(12, seed=n))
     px = seen.px.copy()
     px[seen.cameras == 1, 0] = SIZE[0] - 1 - px[seen.cameras == 1, 0]
-    with pytest.raises(CalibrationError, match="those of camera .*'cam1'.* agree better with the others if"):
+    with pytest.raises(CalibrationError, match=r"those of camera .*'cam1'.* agree better with the others if"):
         require_unmirrored(cameras, replace(seen, px=px))
