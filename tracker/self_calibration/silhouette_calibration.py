@@ -110,8 +110,26 @@ def _calibrated(
         scaled_by(adjusted.cameras, scale), scale * ends, scale * points.by_joint(adjusted.points_world)
     )
     notes = (*scale_notes(stature_m, sigma), *_lens_notes(adjusted, has_lenses), _up_note(world.lean_rad))
+    notes += under_floor_notes(world.joints_world)
     return PersonCalibration(
         world, adjusted, points, held_out, on_them.cameras, errors_px, volume, sigma, notes, "frontier points"
+    )
+
+
+def under_floor_notes(points_world: Array) -> tuple[str, ...]:
+    """Return a sentence on points of a person under the floor, as silhouettes of a mirrored view or another time give.
+
+    Args:
+        points_world: in a world with z up and its origin on the floor, (..., 3), metres; NaN where there are none.
+    """
+    z = points_world[..., 2][np.isfinite(points_world[..., 2])]
+    # One point in fifty may be wrong; a step or a wrong floor is not as deep.
+    lowest_m = float(np.quantile(z, 0.02)) if z.size else 0.0
+    if lowest_m > -0.25:
+        return ()
+    return (
+        f"points of the person lie {-lowest_m:.1f} m under the floor: check that all silhouettes are of one person and "
+        "one instant, and that no view is mirrored",
     )
 
 
