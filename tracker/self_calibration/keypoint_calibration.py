@@ -8,6 +8,7 @@ import numpy as np
 from tracker.boards.camera_graph import MIN_SHARED
 from tracker.boards.rig_fit import HELD_OUT_EVERY
 from tracker.boards.view_choice import MAX_FRAMES, MAX_LENS_VIEWS
+from tracker.calibration.solvable import check_apart
 from tracker.compute.progress import Report, stages, unreported
 from tracker.compute.sampling import spread_indices
 from tracker.errors import CalibrationError
@@ -91,6 +92,7 @@ def _calibrated(
     require_one_solution(Solution(adjusted, gauge), first.rivals, seen, lenses)
     by_person = scale * joints.reshape(-1, len(seen.names), 3)
     world = upright(scaled_by(adjusted.cameras, scale), by_person, seen.names, float(np.nanmean(statures)))
+    check_apart(world.cameras)
     scales = metres_by_person(joints, seen.names, statures)
     given = None if statures_m is None else float(np.nanmean(statures))
     sigma = scale_sigma(given, int(np.isfinite(scales).sum()))

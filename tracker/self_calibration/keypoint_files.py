@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from tracker.boards.footage_calibration import footage_paths
 from tracker.boards.lens_fit import blank_camera
-from tracker.calibration.solvable import check_apart, solvable
+from tracker.calibration.solvable import solvable
 from tracker.calibrations.reading import read_cameras
 from tracker.calibrations.usual_sizes import check_heights
 from tracker.compute.progress import Report, part_of
@@ -72,9 +72,7 @@ def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalib
         TrackerError: files cannot be read or do not fit together, or show too little of the people.
     """
     with solvable("give more of the footage, with people in many places and poses"):
-        found = _calibrate(filmed, report)
-    check_apart(found.cameras)
-    return found
+        return _calibrate(filmed, report)
 
 
 def _calibrate(filmed: FilmedPerson, report: Report) -> PersonCalibration:

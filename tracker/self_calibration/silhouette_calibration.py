@@ -10,6 +10,7 @@ from tracker.boards.camera_graph import MIN_SHARED
 from tracker.boards.rig_fit import HELD_OUT_EVERY
 from tracker.boards.view_choice import MAX_FRAMES
 from tracker.calibration.point_adjustment import triangulate_all
+from tracker.calibration.solvable import check_apart
 from tracker.compute.progress import Report, stages, unreported
 from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.compute.sampling import spread_indices
@@ -109,6 +110,7 @@ def _calibrated(
     world = upright_by_ends(
         scaled_by(adjusted.cameras, scale), scale * ends, scale * points.by_joint(adjusted.points_world)
     )
+    check_apart(world.cameras)
     notes = (*scale_notes(stature_m, sigma), *_lens_notes(adjusted, has_lenses), _up_note(world.lean_rad))
     notes += under_floor_notes(world.joints_world)
     return PersonCalibration(
