@@ -64,11 +64,13 @@ PHRASES = {
         "say --rescale if it does, and calibrate at the size of the footage if it does not",
         "tick Scale the calibration to the footage if it does, and calibrate at the size of the footage if it does not",
     ),
-    "give_unit": Phrases("say --units {units}", "choose {units} as Units"),
+    "give_unit": Phrases("say --units {units}, or --any-size if the distance is right", "choose {units} as Units"),
     "scale_calibration": Phrases(
-        "scale its translations to metres: no --units of {units} gives a studio",
+        "scale its translations to metres: no --units of {units} gives a studio; say --any-size if the distance is "
+        "right",
         "scale its translations to metres: no Units of {units} gives a studio",
     ),
+    "any_size": Phrases("say --any-size if it is right", "make the session by the command line if it is right"),
     "give_poses": Phrases(
         "say --poses {poses}, or rewrite them ({rewrite})", "choose {poses} as Poses, or rewrite them ({rewrite})"
     ),

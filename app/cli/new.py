@@ -66,6 +66,9 @@ class NewArguments:
     camera-to-world, row-vectors or camera-position, each also with -opengl at its end."""
     rescale: bool = False
     """scale a calibration at a whole multiple of the footage's size to it: the same field of view in fewer pixels."""
+    any_size: bool = False
+    """take cameras nearer than 0.5 m or farther than 60 m, people below 0.6 m or above 2.3 m, and focal lengths below
+    0.3 or above 5 times the longer side of the picture."""
 
 
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
@@ -92,6 +95,7 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         units=arguments.units,
         poses=arguments.poses,
         rescale=arguments.rescale,
+        any_size=arguments.any_size,
     )
     notes: list[str] = []
     made = assemble(request, note=notes.append)

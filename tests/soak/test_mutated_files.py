@@ -1,6 +1,7 @@
 """Mutated text files: each is read or refused by one sentence, quickly and in little memory."""
 
 import json
+import pickle
 import random
 import re
 import socket
@@ -8,12 +9,13 @@ import time
 import tomllib
 import traceback
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from calibration_files import WRITERS, easymocap, vicon
+from calibration_files import WRITERS, colmap, easymocap, rig_for, wildtrack
 from memory import memory_mb
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
 from rigs import cameras, looking
@@ -54,19 +56,20 @@ LOCK = {
 
 
 RIG = cameras([looking(place) for place in ([4.0, 0.3, 1.5], [0.2, 3.5, 2.0])], (-0.3, 0.1, 0.001, 0.0))
-PINHOLES = cameras([c.T_world_camera for c in RIG])
 
 
 def written(write):
     """Name and bytes of a file in which a program keeps cameras; EasyMocap's pair in one."""
     with TemporaryDirectory() as folder:
-        path = write(Path(folder), PINHOLES if write is vicon else RIG)
+        path = write(Path(folder), rig_for(write, RIG))
         files = sorted(path.iterdir()) if path.is_dir() else [path]
         data = files[0].read_bytes()
         if write is easymocap:
             own = re.sub(rb"names:\n( +-.*\n)+", b"", data.partition(b"---")[2])  # the other file has them
             data = (path.parent / "intri.yml").read_bytes() + own
-        return f"cameras{files[0].suffix}", [data]
+        elif write is colmap:  # one file of both
+            data += path.with_name("images.txt").read_bytes()
+        return f"{'extr_' if write is wildtrack else ''}cameras{files[0].suffix}", [data]
 
 
 def shown_camera(camera):
@@ -136,7 +139,7 @@ def sources(pattern, *folders):
 KINDS = {
     "session": ("session.toml", sources("*/session.toml", SAMPLES), read_session, 4000),
     "calibration": ("calibration.toml", sources("*/calibration.toml", SAMPLES), read_own_cameras, 4000),
-    **{f"calibration of {name}": (*written(write), read_foreign, 500) for name, write in WRITERS.items()},
+    **{f"calibration of {name}": (*written(write), read_foreign, 1000) for name, write in WRITERS.items()},
     "model": ("person.toml", sources("*.toml", MODELS, SAMPLES / "tango" / "models"), read_model, 4000),
     "TRC": ("truth.trc", sources("*/*.trc", SAMPLES), read_markers, 4000),
     "lock": ("lock.json", [json_bytes(LOCK)], read_lock, 4000),
@@ -165,6 +168,8 @@ def test_mutated_files_are_read_or_refused(kind, tmp_path, cases, report, monkey
     sample = SAMPLES / "elbow_rotation"
     others = [e for _, some, _, _ in KINDS.values() for e in some]
     (tmp_path / "models").mkdir()
+    (tmp_path / "camera_scale.pkl").write_bytes(pickle.dumps(1.5))  # beside cameras of MVHumanNet
+    wildtrack(tmp_path, [replace(RIG[0], name="cameras")])  # the other half of its lens
     for other in ("session.toml", "calibration.toml", "models/person.toml"):
         (tmp_path / other).write_bytes((sample / other).read_bytes())
     if kind == "session":  # that of the dancers names their models and cameras

@@ -1,10 +1,13 @@
 """Write the same cameras in the layout of each program, as the program does."""
 
 import json
+import pickle
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import tomli_w
+from scipy.spatial.transform import Rotation
 
 from tracker.calibrations.writing import anipose_section, anipose_text, caliscope_text
 from tracker.geometry import rigid
@@ -202,6 +205,155 @@ def opencv_words(folder, cameras):
     return to_json(folder / "cameras.json", words)
 
 
+def lines(path, rows):
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def words(array):
+    return " ".join(f"{value:.17g}" for value in np.ravel(array))
+
+
+def skeletool(folder, cameras):
+    rows = ["Skeletool Camera Calibration File V1.0"]
+    for c in cameras:
+        K, T = np.eye(4), c.T_camera_world.copy()
+        K[:3, :3] = c.K
+        T[:3, 3] *= 1000
+        rows += [f"name          {c.name}", "  sensor      10 10", f"  size        {c.width} {c.height}"]
+        rows += ["  animated    0", f"  intrinsic   {words(K)} ", f"  extrinsic   {words(T)} ", "  radial      0"]
+    return lines(folder / "camera.calibration", rows)
+
+
+def comma_rows(array):
+    return [",".join(f"{value:.17g}" for value in row) for row in np.atleast_2d(array)]
+
+
+def mayacam2(folder, cameras):
+    for c in cameras:
+        K, _, R, t = parts(c)
+        rows = ["image size", f"{c.width},{c.height}", "", "camera matrix", *comma_rows(K), "", "rotation"]
+        lines(folder / f"{c.name}.txt", [*rows, *comma_rows(R), "", "translation", *comma_rows(100 * t[:, None])])
+    return folder
+
+
+def mayacam1(folder, cameras):
+    """Place, angles about the camera's own axes, the film, and its point below the centre, counted from 1."""
+    for c in cameras:
+        R = c.T_world_camera[:3, :3] @ np.diag([1.0, -1.0, -1.0])
+        z, y, x = Rotation.from_matrix(R).as_euler("ZYX", degrees=True)
+        film = [c.K[0, 2] + 1, c.height - c.K[1, 2], -c.K[0, 0]]
+        table = [100 * c.center_world, [x, y, z], [0, 0, -1], film, [0.01, c.width, c.height]]
+        lines(folder / f"{c.name}.csv", comma_rows(table))
+    return folder
+
+
+def dlt(folder, cameras):
+    Ps = [c.K @ c.T_camera_world[:3] for c in cameras]
+    return lines(folder / "dltCoefs.csv", comma_rows(np.array([(P / P[2, 3]).ravel()[:11] for P in Ps]).T))
+
+
+def colmap(folder, cameras):
+    lenses, pictures = ["# Camera list with one line of data per camera:"], ["# Image list with two lines of data:"]
+    for i, c in enumerate(cameras):
+        K, distortion, R, t = parts(c)
+        lens = [K[0, 0], K[1, 1], K[0, 2] + 0.5, K[1, 2] + 0.5, *distortion[:4]]
+        lenses.append(f"{i + 1} OPENCV {c.width} {c.height} {words(lens)}")
+        q = rigid.quaternion_from_matrix(R)
+        pictures += [f"{i + 1} {words(q)} {words(t)} {i + 1} {c.name}.png", "12.5 13.5 -1 30.25 8 4"]
+    lines(folder / "cameras.txt", lenses)
+    return lines(folder / "images.txt", pictures).with_name("cameras.txt")
+
+
+def egoexo(folder, cameras):
+    header = "cam_uid,graph_uid,tx_world_cam,ty_world_cam,tz_world_cam,qx_world_cam,qy_world_cam,qz_world_cam,"
+    header += "qw_world_cam,image_width,image_height,intrinsics_type," + ",".join(f"intrinsics_{i}" for i in range(8))
+    rows = [header]
+    for c in cameras:
+        w, x, y, z = rigid.quaternion_from_matrix(c.T_world_camera[:3, :3])
+        lens = [c.K[0, 0], c.K[1, 1], c.K[0, 2], c.K[1, 2], *c.distortion]
+        numbers = [
+            *comma_rows([*c.center_world, x, y, z, w]),
+            f"{c.width},{c.height},KANNALABRANDTK3",
+            *comma_rows(lens),
+        ]
+        rows.append(",".join([c.name, "graph", *numbers]))
+    return lines(folder / "gopro_calibs.csv", rows)
+
+
+def xrmocap(folder, cameras, world2cam=True):
+    for c in cameras:
+        _, distortion, R, t = parts(c)
+        if not world2cam:
+            R, t = c.T_world_camera[:3, :3], c.center_world
+        padded = np.zeros((4, 4))
+        padded[:2, :3], padded[2, 3], padded[3, 2] = c.K[:2], 1, 1
+        lens = dict(zip(("k1", "k2", "p1", "p2"), distortion, strict=True)) | dict.fromkeys(
+            ("k3", "k4", "k5", "k6"), 0.0
+        )
+        values = {"class_name": "FisheyeCameraParameter", "convention": "opencv", "extrinsic_r": R, "extrinsic_t": t}
+        values |= {"height": c.height, "width": c.width, "intrinsic": padded, "name": c.name, "world2cam": world2cam}
+        to_json(folder / f"fisheye_param_{c.name}.json", values | lens)
+    return folder
+
+
+def voxelpose(folder, cameras):
+    rows = {}
+    for c in cameras:
+        K, distortion, R, _ = parts(c)
+        rows[c.name] = {"R": R, "T": 1000 * c.center_world[:, None], "fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2]}
+        k, p = [*distortion[:2], 0.0], distortion[2:4]
+        rows[c.name] |= {"cy": K[1, 2], "k": np.array(k)[:, None], "p": np.array(p)[:, None]}
+    return to_json(folder / "calibration_shelf.json", rows)
+
+
+def google(folder, cameras):
+    rows = [
+        {"name": c.name, "focal_length": c.K[0, 0], "principal_point": c.K[:2, 2], "pixel_aspect_ratio": 1.0,
+         "radial_distortion": [*c.distortion[:2], 0.0], "tangential_distortion": c.distortion[2:], "width": c.width,
+         "height": c.height, "projection_type": "perspective", "orientation": rigid.so3_log(parts(c)[2]),
+         "position": c.center_world}
+        for c in cameras
+    ]  # fmt: skip
+    return to_json(folder / "models.json", rows)
+
+
+def calib_io(folder, cameras):
+    rows = []
+    for i, c in enumerate(cameras):
+        K, distortion, R, t = parts(c)
+        lens = {"f": K[0, 0], "ar": 1.0, "cx": K[0, 2], "cy": K[1, 2]}
+        lens |= dict(zip(("k1", "k2", "p1", "p2"), distortion, strict=True))
+        lens |= dict.fromkeys(("k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tauX", "tauY"), 0.0)
+        size = {"CameraModelBase": {"imageSize": {"width": c.width, "height": c.height}}}
+        data = {"parameters": {key: {"val": value, "state": 2} for key, value in lens.items()}, "CameraModelCRT": size}
+        first = {"polymorphic_id": 2**31 + 1, "polymorphic_name": "libCalib::CameraModelOpenCV"}
+        model = (first if i == 0 else {"polymorphic_id": 1}) | {"ptr_wrapper": {"valid": 1, "data": data}}
+        turn = dict(zip(("rx", "ry", "rz"), rigid.so3_log(R), strict=True))
+        rows.append({"model": model, "transform": {"rotation": turn, "translation": dict(zip("xyz", t, strict=True))}})
+    return to_json(folder / "calib.json", {"Calibration": {"cameras": rows, "poses": []}})
+
+
+def mvhumannet(folder, cameras, scale=120 / 65):
+    (folder / "camera_scale.pkl").write_bytes(pickle.dumps(scale))
+    rows = {
+        f"1_{c.name}.png": {"rotation": parts(c)[2], "translation": 1000 * parts(c)[3] / scale,
+                            "focal_length": np.diag(c.K)[:2], "image_center": [*c.K[:2, 2], *c.size]}
+        for c in cameras
+    }  # fmt: skip
+    return to_json(folder / "camera_extrinsics.json", rows)
+
+
+def wildtrack(folder, cameras):
+    for c in cameras:
+        K, distortion, R, t = parts(c)
+        to_storage(folder / f"intr_{c.name}.xml", {"camera_matrix": K, "distortion_coefficients": distortion[:, None]})
+        turn, shift = words(rigid.so3_log(R)), words(100 * t)
+        rows = ['<?xml version="1.0"?>', "<opencv_storage>", f"<rvec>{turn}</rvec>", f"<tvec>{shift}</tvec>"]
+        lines(folder / f"extr_{c.name}.xml", [*rows, "</opencv_storage>"])
+    return folder
+
+
 WRITERS = {
     "Kalibr (`camchain.yaml`)": kalibr,
     "MC-Calib": mc_calib,
@@ -218,6 +370,27 @@ WRITERS = {
     "AIST++ and other lists of anipose's cameras": aist,
     "Qualisys (`.qca.txt`)": qualisys,
     "Vicon (`.xcp`)": vicon,
+    "Skeletool: MPI-INF-3DHP, DynaCap, Captury (`camera.calibration`)": skeletool,
+    "MayaCam 2 of XMALab and Autoscoper (one file for each camera)": mayacam2,
+    "MayaCam 1 (one file for each camera)": mayacam1,
+    "DLT coefficients of DLTdv, Argus and easyWand (`dltCoefs.csv`)": dlt,
+    "COLMAP (`cameras.txt` and `images.txt`)": colmap,
+    "Ego-Exo4D (`gopro_calibs.csv`)": egoexo,
+    "XRMoCap, XRPrimer (one file for each camera)": xrmocap,
+    "VoxelPose: Shelf, Campus": voxelpose,
+    "Google's light fields (`models.json`), Nerfies": google,
+    "calib.io": calib_io,
+    "MVHumanNet (`camera_extrinsics.json`, with `camera_scale.pkl` beside it)": mvhumannet,
+    "Wildtrack (`intr_NAME.xml` and `extr_NAME.xml`)": wildtrack,
     "OpenCV's words in JSON, YAML or XML": opencv_words,
 }
 """Writers by the names of the layouts."""
+WITHOUT_LENS = (vicon, skeletool, mayacam2, mayacam1, dlt, mvhumannet)
+"""Writers of layouts whose lenses have no distortion that is read."""
+
+
+def rig_for(write, rig):
+    """Return a rig as a layout can hold it: without distortion, or with fisheye lenses."""
+    if write in WITHOUT_LENS:
+        return [replace(c, distortion=np.zeros(0)) for c in rig]
+    return [replace(c, fisheye=True) for c in rig] if write is egoexo else rig

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
+from tracker.calibrations.usual_sizes import check_usual
 from tracker.errors import CalibrationError
 from tracker.formats.camera_section import METRES
 from tracker.geometry.arrays import Array
@@ -162,8 +163,12 @@ class _PlainBoard(msgspec.Struct, forbid_unknown_fields=True):
         )  # fmt: skip
 
 
-def read_board(path: str | Path) -> Board:
+def read_board(path: str | Path, any_size: bool = False) -> Board:
     """Read the description of a board.
+
+    Args:
+        path: its file.
+        any_size: whether to take squares of an unusual size.
 
     Raises:
         CalibrationError: the file is missing or malformed, or the orientation of the board is ambiguous.
@@ -171,6 +176,10 @@ def read_board(path: str | Path) -> Board:
     data, where = read_toml(Path(path), KIND), f"board {path}"
     declared, section = _form_of(data)
     found: Board = check(section, declared, where, CalibrationError).board()
+    if not any_size:
+        unit, metres = ("centimetres", 0.01) if declared is _CaliscopeBoard else ("millimetres", 1e-3)
+        side = float(f"{found.square_m / metres:.6g}")
+        check_usual(side, "square", f"{where}: expected the side of a square", unit, CalibrationError)
     if found.kind == "checkerboard" and (found.columns + found.rows) % 2 == 0:
         raise CalibrationError(
             f"{where}: expected a checkerboard with an odd and an even number of squares, found {found.columns} x "

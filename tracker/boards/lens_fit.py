@@ -32,7 +32,7 @@ _CHOICES = 2
 """Times that the poses of the board are chosen with the lens of before."""
 TOLD_FOCAL = 0.01
 """Standard deviation of a focal length, as a share of it, from which on the user is warned: 1% too long moves the
-points of one camera by 3 cm at 3 m along its axis."""
+points of one camera by 3 cm at 3 m along its axis. Ten times as much is refused: 30 cm are no measure of a person."""
 
 
 class LensFit(NamedTuple):

@@ -14,6 +14,7 @@ from tracker.calibration.lens_priors import UNKNOWN_LENS, prior_sigmas
 from tracker.calibration.reprojection import FINAL, Prior, Rig, RigFit, fit_rig
 from tracker.compute.sampling import spread_indices
 from tracker.fitting.bundle import solve_bundle
+from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 
@@ -33,6 +34,18 @@ class RigCalibration(NamedTuple):
     volume: VolumeError
     points_world: Array
     """Corners of the board on those frames, the volume in which the error is expected, (P, 3), metres."""
+
+    def scaled(self, scale: float) -> "RigCalibration":
+        """Return the cameras of a world that is larger by a factor; their covariance is that of before."""
+        own = self.fit.rig.own.copy()
+        own[:, :3, 3] *= scale
+        cameras = tuple(
+            replace(c, T_world_camera=rigid.transform(c.T_world_camera[:3, :3], scale * c.center_world))
+            for c in self.cameras
+        )
+        volume = VolumeError(*(scale * error for error in self.volume))
+        fit = self.fit._replace(rig=Rig(cameras, own))
+        return RigCalibration(cameras, fit, self.frames, volume, scale * self.points_world)
 
 
 def adjust_rig(

@@ -17,5 +17,6 @@ __all__ = [
     "residual_pieces",
     "rig_problem",
     "single_frames",
+    "solvable",
     "viewed_frames",
 ]

@@ -345,6 +345,8 @@ def _result(problem: ReprojectionProblem, rig: Rig) -> RigFit:
     share = problem.common_share(rig)
     information = _information(squares, weights, problem.left) / share
     precision = information * data + prior
+    if not np.isfinite(precision).all():
+        raise np.linalg.LinAlgError("numbers that are not finite")
     covariance = inverse(precision)
     at = np.concatenate([start + c for start, c in zip(column_ends(rig.cameras), problem.columns, strict=False)])
     whole = np.zeros(2 * (column_ends(rig.cameras)[-1],))

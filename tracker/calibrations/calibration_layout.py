@@ -1,6 +1,6 @@
 """One way in which programs write calibrated cameras."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from tracker.calibrations.camera_words import Section
@@ -30,6 +30,10 @@ class CalibrationLayout:
     """Whether programs alone write it, so that its convention is beyond doubt where it fits."""
     note: str = ""
     """Sentence for users on what its files leave open; usually empty."""
+    join: Callable[[Sequence[Document]], Sequence[Document]] = tuple
+    """Joins the files of cameras whose lens and pose lie in two."""
+    halves: tuple[str, str] | None = None
+    """Beginnings of the names of two such files, by which the one is found beside the other."""
 
     @property
     def has_opencv_poses(self) -> bool:

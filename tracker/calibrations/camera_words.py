@@ -31,6 +31,7 @@ from tracker.calibrations.lens_words import (
     names_lens,
     spelled,
 )
+from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.validation import quoted
@@ -78,10 +79,6 @@ _OTHER_POSES = (
 _FORMS = {3: "rodrigues", 4: "quaternion"}
 """Meanings of a rotation by the count of its numbers, where that is not 9: EasyMocap has both a vector R and a matrix
 Rot, which are equal."""
-_MIN_FOCAL = 0.25
-"""Smallest focal length as a share of the principal point, which lies near the middle: half of a view of 152 degrees.
-Wider lenses are fisheyes, whose focal lengths are longer at the same view. Halved: no change in
-tests/tracker/calibrations; doubled, pictures that are cut at a side are refused (test_camera_forms.py)."""
 _SHORTER = {14: 12, 12: 8, 8: 5}
 """Counts of OpenCV's coefficients, and to how many they are cut where the others are 0."""
 _UNIT = re.compile(r"^(length|translation|world|distance)?units?$|^units?(of)?(length|translation)s?$")
@@ -182,6 +179,26 @@ def _flat(group: Mapping[str, Any], depth: int = 0) -> Iterator[tuple[str, Any]]
                 yield key, FISHEYE
             yield from found
     yield from ((str(k), v) for k, v in group.items() if k not in inner)
+
+
+def unusable(name: str, reason: str = "") -> Section:
+    """Return a camera that has nothing, or that cannot be used for a reason, a sentence without its end."""
+    keys = ("size", "matrix", "distortions", "rotation", "translation")
+    return {"name": name, "fisheye": False} | dict.fromkeys(keys) | ({"refusal": reason} if reason else {})
+
+
+def once(document: Document, cameras: Iterable[tuple[str, Section]]) -> dict[str, Section]:
+    """Return cameras by name.
+
+    Raises:
+        CalibrationError: a name is there twice.
+    """
+    found: dict[str, Section] = {}
+    for name, section in cameras:
+        if name in found:
+            raise CalibrationError(f"{document.where}: two cameras are named {quoted(name)}; give each its own name")
+        found[name] = section
+    return found
 
 
 def plain_text(value: Any) -> str:
@@ -306,7 +323,8 @@ def _check_focal(matrix: Any, camera: str, document: Document) -> None:
         CalibrationError: no lens has so short a one.
     """
     K = plain_array(matrix)
-    if K.shape == (3, 3) and 0 < K[0, 0] < _MIN_FOCAL * K[0, 2]:
+    # The principal point lies near the middle; of pictures that are cut at a side it is up to twice as far.
+    if K.shape == (3, 3) and 0 < K[0, 0] < USUAL_SIZES["focal length"].low * K[0, 2]:
         raise refuse(
             document, camera, "a focal length in pixels",
             f"{K[0, 0]:.4g} of pictures that are some {2 * K[0, 2]:.0f} pixels wide, as in millimetres",

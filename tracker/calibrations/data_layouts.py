@@ -4,18 +4,17 @@ The direction of a pose other than `X_camera = R X_world + t` is that of the too
 `export_json` of multical, `Calibration::saveCamerasParams` of MC-Calib, and the camchain of Kalibr's manual.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from tracker.calibrations.camera_matrices import homogeneous, is_transposed, plain_array
-from tracker.calibrations.camera_words import Section, camera_groups, known_values, plain_text, section_of
+from tracker.calibrations.camera_words import Section, camera_groups, known_values, once, plain_text, section_of
 from tracker.calibrations.document import Document, refuse
-from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.validation import quoted
 
 _ANIPOSE_KEYS = {"name", "size", "matrix", "rotation", "translation", "distortions"}
 
@@ -27,16 +26,15 @@ def has_cameras(document: Document) -> bool:
 
 def read_words(document: Document) -> dict[str, Section]:
     """Read cameras under OpenCV's words."""
-    sections: dict[str, Section] = {}
-    for key, group in camera_groups(document.data).items():
-        if known_values(group).get("ignore") is True:
-            continue
-        section = section_of(group, key or document.stem, document)
-        name = key if section["name"] is None else plain_text(section["name"])
-        if name in sections:
-            raise CalibrationError(f"{document.where}: two cameras are named {quoted(name)}; give each its own name")
-        sections[name] = section | ({"name": name} if name else {})
-    return sections
+
+    def cameras() -> Iterator[tuple[str, Section]]:
+        for key, group in camera_groups(document.data).items():
+            if known_values(group).get("ignore") is not True:
+                section = section_of(group, key or document.stem, document)
+                name = key if section["name"] is None else plain_text(section["name"])
+                yield name, section | ({"name": name} if name else {})
+
+    return once(document, cameras())
 
 
 def is_panoptic(document: Document) -> bool:
@@ -55,15 +53,22 @@ def is_aniposelib(document: Document) -> bool:
 
 def is_easymocap(document: Document) -> bool:
     """Return whether keys such as `K_01`, or `R_01` and `T_01`, are at the top."""
-    return has_intrinsics(document) or has_extrinsics(document)
+    return _has_intrinsics(document) or _has_extrinsics(document)
 
 
-def has_intrinsics(document: Document) -> bool:
+def join_easymocap(documents: Sequence[Document]) -> Sequence[Document]:
+    """Join a file of lenses and one of poses; others stay apart."""
+    if len(documents) == 1 or not (any(map(_has_intrinsics, documents)) and any(map(_has_extrinsics, documents))):
+        return documents
+    return [replace(documents[0], data={key: value for d in documents for key, value in d.data.items()})]
+
+
+def _has_intrinsics(document: Document) -> bool:
     """Return whether EasyMocap's matrices are there."""
     return isinstance(document.data, dict) and any(key.startswith("K_") for key in document.data)
 
 
-def has_extrinsics(document: Document) -> bool:
+def _has_extrinsics(document: Document) -> bool:
     """Return whether EasyMocap's poses are there."""
     keys = document.data.keys() if isinstance(document.data, dict) else ()
     return any(k.startswith(("R_", "Rot_")) for k in keys) and any(k.startswith("T_") for k in keys)

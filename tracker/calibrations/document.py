@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from tracker.calibrations.foreign import name_binary, named
+from tracker.calibrations.foreign import name_binary
 from tracker.errors import CalibrationError
 from tracker.formats.anipose import KIND
 from tracker.formats.plain_data import parse_json, parse_xml, parse_yaml, storage_data
@@ -23,9 +23,9 @@ class Document:
 
     path: Path
     syntax: str
-    """toml, json, yaml or xml."""
+    """toml, json, yaml, xml or text."""
     data: Any
-    """Dicts, lists, numbers and text; of XML that OpenCV has not written, its root element."""
+    """Dicts, lists, numbers and text; of XML that OpenCV has not written, its root element; of plain text the text."""
 
     @property
     def where(self) -> str:
@@ -53,7 +53,7 @@ def read_document(path: Path) -> Document:
     """
     name_binary(path)
     text = read_text(path, KIND)
-    syntax = _syntax(text)
+    syntax = _syntax(text) or "text"
     if syntax == "toml":
         data: Any = parse_toml(text, str(path), KIND)
     elif syntax == "json":
@@ -64,7 +64,7 @@ def read_document(path: Path) -> Document:
         data = parse_xml(text, str(path), KIND)
         data = storage_data(data) if data.tag == "opencv_storage" else data
     else:
-        raise named(path, "another kind of file" if text.strip() else "an empty file", "export the calibration again")
+        data = text
     return Document(path, syntax, data)
 
 

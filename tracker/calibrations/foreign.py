@@ -13,6 +13,11 @@ _MATLAB = ("a MATLAB file", f"{_TO_JSON} with jsonencode")
 _ARCHIVE = ("a NumPy archive or ZIP file", _TO_JSON)
 _ARRAY = ("a NumPy array", _TO_JSON)
 _PICKLE = ("a Python pickle, as OpenCap writes", f"{_POSE2SIM}, with convert_from = 'opencap'")
+_STEREO = (
+    "the pairs of cameras of DeepLabCut 3D",
+    "write both cameras to one JSON file: cameraMatrix1, distCoeffs1, R = I and t = 0 as K, distortion, R and t of the "
+    "first, and cameraMatrix2, distCoeffs2, R and T of the second",
+)
 _BEGINNINGS = (
     (b"MATLAB", *_MATLAB),
     (b"\x89HDF", "a MATLAB or HDF5 file", f"{_TO_JSON} with jsonencode"),
@@ -29,6 +34,7 @@ _SUFFIXES = {
     ".npy": _ARRAY,
     ".mcal": ("a calibration of OptiTrack Motive", _POSE2SIM),
     ".cal": ("a calibration of OptiTrack or a project of another program", _POSE2SIM),
+    ".bin": ("a binary model of COLMAP", "export it as text and give its cameras.txt"),
     ".c3d": ("a file of markers", "export the calibration of the cameras"),
 }
 """The same for files that are known by their suffix alone."""
@@ -49,14 +55,39 @@ def name_binary(path: Path) -> None:
         return
     try:
         with path.open("rb") as file:
-            begin = file.read(8)
+            begin = file.read(1000)
     except OSError:
         return
+    if begin[0:1] == b"\x80" and b"cameraMatrix1" in begin:
+        raise named(path, *_STEREO)
     for first, found, advice in _BEGINNINGS:
         if begin.startswith(first):
             raise named(path, found, advice)
     if path.suffix.lower() in _SUFFIXES:
         raise named(path, *_SUFFIXES[path.suffix.lower()])
+
+
+def refuse_program(path: Path, data: Any) -> None:
+    """Refuse data of programs that have words of cameras, and whose cameras cannot be read.
+
+    Raises:
+        CalibrationError: they are of one.
+    """
+    if not isinstance(data, dict):
+        return
+    if {"camera_matrix", "distortion_model", "projection_matrix"} <= data.keys():
+        raise named(
+            path, "the lens of one camera as ROS writes it (camera_info), without its pose",
+            "calibrate the cameras together, by a board or by people",
+        )  # fmt: skip
+    first = next(iter(data.values()), None)
+    if isinstance(first, dict) and {"T_imu_cam", "intrinsics"} <= first.keys():
+        raise named(path, "the cameras of Basalt, whose poses are those within one moving rig", _TO_JSON)
+    if isinstance(first, dict) and {"input", "world"} <= first.keys():
+        raise named(
+            path, "the poses of ZED cameras without their lenses",
+            f"{_TO_JSON}, with the lenses of each camera's own file (SN*.conf)",
+        )  # fmt: skip
 
 
 def foreign(path: Path, data: Any) -> CalibrationError:
@@ -81,4 +112,7 @@ def foreign(path: Path, data: Any) -> CalibrationError:
             return named(
                 path, "the settings of a Caliscope project without cameras", "give the camera_array.toml beside it"
             )
+    if isinstance(data, str):
+        found = "another kind of file" if data.strip() else "an empty file"
+        return named(path, found, "export the calibration again")
     return named(path, "no camera", "export it in one of these layouts")

@@ -3,7 +3,9 @@
 from functools import cache
 
 from tracker.calibrations import data_layouts as data
+from tracker.calibrations import dataset_layouts as sets
 from tracker.calibrations import motion_capture as mocap
+from tracker.calibrations import text_layouts as text
 from tracker.calibrations import toml_layouts as toml
 from tracker.calibrations.calibration_layout import OPENCV_POSES, CalibrationLayout
 from tracker.calibrations.document import Document
@@ -67,6 +69,8 @@ _OWN: tuple[CalibrationLayout, ...] = (
         data.is_easymocap,
         data.read_words,
         by_program=False,
+        join=data.join_easymocap,
+        halves=("intri.", "extri."),
     ),
     CalibrationLayout(
         "Caliscope (`camera_array.toml`)",
@@ -120,6 +124,110 @@ _OWN: tuple[CalibrationLayout, ...] = (
         "mm",
         mocap.is_vicon,
         mocap.read_vicon,
+    ),
+    CalibrationLayout(
+        "Skeletool: MPI-INF-3DHP, DynaCap, Captury (`camera.calibration`)",
+        "the first line `Skeletool Camera Calibration File`",
+        OPENCV_POSES,
+        "mm",
+        text.is_skeletool,
+        text.read_skeletool,
+    ),
+    CalibrationLayout(
+        "MayaCam 2 of XMALab and Autoscoper (one file for each camera)",
+        "lines `image size`, `camera matrix`, `rotation` and `translation`",
+        OPENCV_POSES,
+        "cm",
+        text.is_mayacam2,
+        text.read_mayacam2,
+        note="MayaCam files state no unit: they are read in centimetres, as Maya counts.",
+    ),
+    CalibrationLayout(
+        "MayaCam 1 (one file for each camera)",
+        "five lines of three numbers",
+        "place and angles about x, y and z, y up and z backwards",
+        "cm",
+        text.is_mayacam1,
+        text.read_mayacam1,
+        note="MayaCam files state no unit: they are read in centimetres, as Maya counts.",
+    ),
+    CalibrationLayout(
+        "DLT coefficients of DLTdv, Argus and easyWand (`dltCoefs.csv`)",
+        "eleven lines with a number for each camera",
+        "a projection, which is split into K, R and t; without lens distortion",
+        None,
+        text.is_dlt,
+        text.read_dlt,
+        note="DLT coefficients describe no lens distortion: footage of a lens that bends lines is undistorted first.",
+    ),
+    CalibrationLayout(
+        "COLMAP (`cameras.txt` and `images.txt`)",
+        "lines with a model of a lens, or with a quaternion, a place and a picture",
+        OPENCV_POSES,
+        None,
+        text.is_colmap,
+        text.read_colmap,
+        note="COLMAP finds no scale by itself: check that its model was scaled.",
+        halves=("cameras.", "images."),
+        join=text.join_colmap,
+    ),
+    CalibrationLayout(
+        "Ego-Exo4D (`gopro_calibs.csv`)",
+        "a table with `cam_uid` and `tx_world_cam`",
+        "X_world = R X_camera + t",
+        "m",
+        text.is_egoexo,
+        text.read_egoexo,
+    ),
+    CalibrationLayout(
+        "XRMoCap, XRPrimer (one file for each camera)",
+        "`extrinsic_r`, `extrinsic_t` and `world2cam`",
+        "by `world2cam`, in OpenCV's axes",
+        "m",
+        sets.is_xrmocap,
+        sets.read_xrmocap,
+    ),
+    CalibrationLayout(
+        "VoxelPose: Shelf, Campus",
+        "`R`, `T`, `fx`, ... with the lens as `k` and `p`",
+        "X_camera = R (X_world - T)",
+        "mm",
+        sets.is_voxelpose,
+        sets.read_voxelpose,
+    ),
+    CalibrationLayout(
+        "Google's light fields (`models.json`), Nerfies",
+        "`orientation` and `position` with `focal_length`",
+        "X_camera = R (X_world - position)",
+        None,
+        sets.is_google,
+        sets.read_google,
+    ),
+    CalibrationLayout(
+        "calib.io",
+        "`Calibration` with `cameras` and their `model`",
+        OPENCV_POSES,
+        None,
+        sets.is_calib_io,
+        sets.read_calib_io,
+    ),
+    CalibrationLayout(
+        "MVHumanNet (`camera_extrinsics.json`, with `camera_scale.pkl` beside it)",
+        "`rotation`, `translation`, `focal_length` and `image_center`",
+        OPENCV_POSES,
+        "mm",
+        sets.is_mvhumannet,
+        sets.read_mvhumannet,
+    ),
+    CalibrationLayout(
+        "Wildtrack (`intr_NAME.xml` and `extr_NAME.xml`)",
+        "XML with a lens alone, or with `rvec` and `tvec` alone",
+        OPENCV_POSES,
+        "cm",
+        sets.is_wildtrack,
+        data.read_words,
+        join=sets.join_wildtrack,
+        halves=("intr_", "extr_"),
     ),
     CalibrationLayout(
         "OpenCV's words in JSON, YAML or XML",

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from tracker.calibrations.camera_matrices import rotation_of_quaternion
-from tracker.calibrations.camera_words import Section
+from tracker.calibrations.camera_words import Section, unusable
 from tracker.calibrations.document import Document, refuse
 from tracker.calibrations.pose_conventions import OPENGL
 
@@ -41,13 +41,14 @@ def read_qualisys(document: Document) -> dict[str, Section]:
             continue
         attributes = {tag: _attributes(camera, tag) for tag in ("transform", "intrinsic")}
         if None in attributes.values():
-            found[name] = _empty(name)
+            found[name] = unusable(name)
             continue
         if camera.get("viewrotation") not in (None, "", "0", "none"):
-            found[name] = _empty(name) | {
-                "refusal": f"camera '{name}' is turned by {camera.get('viewrotation')} degrees in QTM, which says "
-                "nothing of its video; convert the calibration with Pose2Sim"
-            }
+            found[name] = unusable(
+                name,
+                f"camera '{name}' is turned by {camera.get('viewrotation')} degrees in QTM, which says "
+                "nothing of its video; convert the calibration with Pose2Sim",
+            )
             continue
         transform, intrinsic = (_Numbers(document, name, attributes[tag]) for tag in ("transform", "intrinsic"))
         view = _Numbers(document, name, _attributes(camera, "fov_video") or _attributes(camera, "fov_marker"))
@@ -105,14 +106,15 @@ def read_vicon(document: Document) -> dict[str, Section]:
         name = camera.get("DEVICEID") or f"camera {i + 1}"
         frame = camera.find("KeyFrames/KeyFrame")
         if frame is None or frame.get("ORIENTATION") is None:
-            found[name] = _empty(name)
+            found[name] = unusable(name)
             continue
         lens = _words(frame.get("VICON_RADIAL2"))[2:] + _words(frame.get("VICON_RADIAL"))
         if np.any(lens):
-            found[name] = _empty(name) | {
-                "refusal": f"camera '{name}' has Vicon's lens model, whose coefficients are not those of OpenCV; "
-                "undistort the footage, or convert the calibration with Pose2Sim (convert_from = 'vicon')"
-            }
+            found[name] = unusable(
+                name,
+                f"camera '{name}' has Vicon's lens model, whose coefficients are not those of OpenCV; "
+                "undistort the footage, or convert the calibration with Pose2Sim (convert_from = 'vicon')",
+            )
             continue
         values = _Numbers(document, name, {**camera.attrib, **frame.attrib})
         quaternion = np.roll(values.row("ORIENTATION", 4), 1)
@@ -131,11 +133,6 @@ def read_vicon(document: Document) -> dict[str, Section]:
             "fisheye": False,
         }
     return found
-
-
-def _empty(name: str) -> Section:
-    keys = ("size", "matrix", "distortions", "rotation", "translation")
-    return {"name": name, "fisheye": False} | dict.fromkeys(keys)
 
 
 def _attributes(element: ElementTree.Element, tag: str) -> Mapping[str, str] | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,13 @@ from tracker.calibrations.calibration_layout import CalibrationLayout
 from tracker.calibrations.camera_matrices import is_transposed
 from tracker.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
-from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics
 from tracker.calibrations.document import Document, read_document, refuse
-from tracker.calibrations.foreign import foreign, named
+from tracker.calibrations.foreign import foreign, named, refuse_program
 from tracker.calibrations.layouts import find_layout
 from tracker.calibrations.pose_conventions import check_convention, odd_camera, read_pose
 from tracker.calibrations.rotation_forms import check_turned, refuse_angles, with_quaternions
 from tracker.calibrations.toml_layouts import board_square
-from tracker.calibrations.units import check_units
+from tracker.calibrations.units import check_focal_lengths, check_units
 from tracker.errors import CalibrationError, Remedy
 from tracker.files import paths_in
 from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
@@ -26,7 +26,7 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.validation import quoted, same_form
 
-_SUFFIXES = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt")
+_SUFFIXES = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".csv", ".calibration")
 """Files of a folder that may hold a calibration; the others are not opened."""
 _MAX_FILES = 1000
 """Most files of a folder that are looked at, which bounds time."""
@@ -49,6 +49,7 @@ def read_cameras(
     units: Units | None = None,
     poses: PoseConvention | None = None,
     footage: Collection[str] = (),
+    any_size: bool = False,
 ) -> CalibratedCameras:
     """Read the cameras of a calibration.
 
@@ -57,6 +58,7 @@ def read_cameras(
         units: unit of the translations; by default the one that the layout fixes, else metres.
         poses: convention of the poses; by default that of the layout, if the cameras do not contradict it.
         footage: names of cameras that have footage, by which the names of files with one camera are told.
+        any_size: whether to take unusual distances and focal lengths.
 
     Raises:
         CalibrationError: a file is missing or malformed, of an unknown layout, or describes impossible cameras.
@@ -84,7 +86,9 @@ def read_cameras(
     check_names(entries, where)
     notes += [*pose_notes, *_alike([entry.name for entry in entries])]
     square = next((s for d, _ in documents if (s := board_square(d)) is not None), None)
-    notes += check_units(entries, where, used, square)
+    notes += check_units(entries, where, used, square, any_size)
+    if not any_size:
+        check_focal_lengths(entries, where)
     return CalibratedCameras(entries, left_out, tuple(notes))
 
 
@@ -101,14 +105,24 @@ def _documents(paths: Sequence[Path]) -> list[tuple[Document, CalibrationLayout]
         return _in_folder(paths[0])
     found = []
     for path in paths:
-        document = read_document(path)
-        layout = find_layout(document)
+        document, layout = _read(path)
         if layout is None:
             raise foreign(path, document.data)
         found.append((document, layout))
     if len(paths) == 1:
         return _with_other_half(found[0])
     return found
+
+
+def _read(path: Path) -> tuple[Document, CalibrationLayout | None]:
+    """Read a file and find its layout.
+
+    Raises:
+        CalibrationError: it is no text, malformed, or of a program whose files are not read.
+    """
+    document = read_document(path)
+    refuse_program(path, document.data)
+    return document, find_layout(document)
 
 
 def _in_folder(folder: Path) -> list[tuple[Document, CalibrationLayout]]:
@@ -118,11 +132,11 @@ def _in_folder(folder: Path) -> list[tuple[Document, CalibrationLayout]]:
     failure: CalibrationError | None = None
     for path in files[:_MAX_FILES]:
         try:
-            document = read_document(path)
+            document, layout = _read(path)
         except CalibrationError as error:
             failure = error
             continue
-        if (layout := find_layout(document)) is not None:
+        if layout is not None:
             found.append((document, layout))
     if not found:
         if failure is not None:
@@ -135,13 +149,14 @@ def _in_folder(folder: Path) -> list[tuple[Document, CalibrationLayout]]:
 
 
 def _with_other_half(found: tuple[Document, CalibrationLayout]) -> list[tuple[Document, CalibrationLayout]]:
-    """Add the other half of EasyMocap's pair of files, which lies beside it."""
-    document, layout = found
-    other = {"intri": "extri", "extri": "intri"}.get(document.path.stem)
-    pair = document.path.with_name(f"{other}{document.path.suffix}")
-    if other is None or not pair.exists():
-        return [found]
-    return [found, (read_document(pair), layout)]
+    """Add the other half of a pair of files, which lies beside it."""
+    path, layout = found[0].path, found[1]
+    for begin, other in permutations(layout.halves) if layout.halves else ():
+        pair = path.with_name(other + path.name.removeprefix(begin))
+        if path.name.startswith(begin) and pair.is_file():
+            document, its_layout = _read(pair)
+            return [found, (document, its_layout)] if its_layout is layout else [found]
+    return [found]
 
 
 def _sections(
@@ -151,13 +166,10 @@ def _sections(
     first, layout = documents[0]
     if other := next((d for d, its_layout in documents if its_layout.name != layout.name), None):
         raise refuse(first, None, "files of one layout", f"another one in {other.path.name}", "give one calibration")
-    whole = [d for d, _ in documents if isinstance(d.data, dict)]
-    if len(whole) > 1 and any(map(has_intrinsics, whole)) and any(map(has_extrinsics, whole)):
-        merged = {key: value for d in whole for key, value in d.data.items()}
-        documents = [(replace(first, data=merged), layout)]
-    stems = _camera_names([d.stem for d, _ in documents], footage)
+    joined = layout.join([document for document, _ in documents])
+    stems = _camera_names([document.stem for document in joined], footage)
     found: dict[str, Section] = {}
-    for (document, _), stem in zip(documents, stems, strict=True):
+    for document, stem in zip(joined, stems, strict=True):
         for name, section in layout.read(document).items():
             name = name or stem
             if name in found:

@@ -4,20 +4,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import METRES, CameraEntry, Units
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import MIN_APART_M, axes_point
+from tracker.validation import quoted
 
-MAX_STUDIO_M = 100.0
-"""Distance from the point at which cameras look, or from the origin, at which none shows a person:
-1.7 m are 15 px high there in a picture of 1,000 px and 60 degrees."""
-MIN_STUDIO_M = 0.5
-"""Distance nearer than which cameras show no person: at it, a lens of 60 degrees sees 58 cm."""
+_DISTANCE, _FOCAL = USUAL_SIZES["distance"], USUAL_SIZES["focal length"]
 _WORDS = {"m": "metres", "cm": "centimetres", "mm": "millimetres"}
 
 
-def check_units(entries: Sequence[CameraEntry], where: str, units: Units, square: float | None) -> list[str]:
+def check_units(
+    entries: Sequence[CameraEntry], where: str, units: Units, square: float | None, any_size: bool = False
+) -> list[str]:
     """Check the unit of cameras that were read with it.
 
     Args:
@@ -25,6 +25,7 @@ def check_units(entries: Sequence[CameraEntry], where: str, units: Units, square
         where: names the file in messages.
         units: the unit as which their translations were read.
         square: side of a square of the board in the file's unit, if it states one.
+        any_size: whether unusual distances are noted only.
 
     Returns:
         Notes: evidence for another unit.
@@ -35,11 +36,12 @@ def check_units(entries: Sequence[CameraEntry], where: str, units: Units, square
     distance_m, place, sees_point = _distance(entries)
     in_units = distance_m / METRES[units]
     squares = "multiply the translations by the side of a square of the board in metres"
-    least = MIN_STUDIO_M if sees_point else MIN_APART_M
-    # Metres are the default of a file that may show a table or a head; another unit was chosen.
+    least = _DISTANCE.low if sees_point else MIN_APART_M
     found = f"{in_units:.3g}" if in_units < 1000 else f"{in_units:.0f}"
-    limit = f"within {MAX_STUDIO_M:g} m" if distance_m > MAX_STUDIO_M else f"at least {least:g} m"
-    if distance_m > MAX_STUDIO_M or (units != "m" and 0 < distance_m < least):
+    is_far = distance_m > _DISTANCE.high
+    limit = f"within {_DISTANCE.high:g} m" if is_far else f"at least {least:g} m"
+    counts_squares = square == 1 and units == "m"  # which is noted
+    if not (any_size or counts_squares) and (is_far or 0 < distance_m < least):
         raise CalibrationError(
             f"{where}: expected cameras {limit} {place}, found {found} {_WORDS[units]}, so that the unit is another"
             + (f"; {squares}" if square == 1 else ""),
@@ -51,9 +53,27 @@ def check_units(entries: Sequence[CameraEntry], where: str, units: Units, square
             f"The cameras stand {distance_m:.3g} m {place}, and the file says that a square of its board is 1 wide: if "
             f"its lengths count squares, {squares}."
         )
-    elif distance_m < (least if units == "m" else MIN_STUDIO_M):
-        notes.append(f"All cameras stand within {distance_m:.2g} m {place}: check that the unit is {_WORDS[units]}.")
+    elif not _DISTANCE.has(distance_m):
+        within = "" if is_far else "within "
+        notes.append(f"All cameras stand {within}{distance_m:.2g} m {place}: check that the unit is {_WORDS[units]}.")
     return notes
+
+
+def check_focal_lengths(entries: Sequence[CameraEntry], where: str) -> None:
+    """Check that focal lengths are those of lenses by which people are filmed.
+
+    Raises:
+        CalibrationError: one is not.
+    """
+    for entry in entries:
+        side = max(entry.size or 2 * entry.K[:2, 2] + 1)
+        share = float(entry.K[0, 0]) / side
+        if share > _FOCAL.high or (share < _FOCAL.low and not entry.fisheye):
+            raise CalibrationError(
+                f"{where}, camera {quoted(entry.name)}: expected a focal length of {_FOCAL.low:g} to {_FOCAL.high:g} "
+                f"times the longer side of the picture, found {share:.2g} times ({entry.K[0, 0]:.5g} px of {side:.0f})",
+                Remedy("any_size"),
+            )
 
 
 def _distance(entries: Sequence[CameraEntry]) -> tuple[float, str, bool]:
@@ -71,8 +91,7 @@ def _distance(entries: Sequence[CameraEntry]) -> tuple[float, str, bool]:
 
 def _remedy(distance: float, units: Units) -> Remedy:
     """Name the units by which the distance is that of a studio, first the one nearest to the middle of these."""
-    fitting = [u for u in METRES if u != units and MIN_STUDIO_M <= distance * METRES[u] <= MAX_STUDIO_M]
-    fitting.sort(key=lambda u: abs(np.log((distance * METRES[u]) ** 2 / (MIN_STUDIO_M * MAX_STUDIO_M))))
+    fitting = _DISTANCE.units_of(distance, {unit: metres for unit, metres in METRES.items() if unit != units})
     if not fitting:
         return Remedy("scale_calibration", units=", ".join(METRES))
     return Remedy("give_unit", units=" or ".join(f"{u} ({distance * METRES[u]:.2g} m)" for u in fitting))

@@ -121,7 +121,8 @@ class Camera:
         angles = np.arctan2(np.linalg.norm(directions[:, :2], axis=-1), directions[:, 2])
         widest = min(MAX_PINHOLE_ANGLE, fisheye_limit(self.distortion))
         slopes = np.tan(np.where(angles < widest, angles, widest))  # NaN is beyond the lens
-        border_px = self._slopes_to_px(xy / np.linalg.norm(xy, axis=-1, keepdims=True) * slopes[:, None])
+        lengths = np.maximum(np.linalg.norm(xy, axis=-1, keepdims=True), 1e-12)  # 0 at the principal point
+        border_px = self._slopes_to_px(xy / lengths * slopes[:, None])
         low, high = np.floor(border_px.min(axis=0)), np.ceil(border_px.max(axis=0))
         width, height = (int(n) + 1 for n in high - low)
         K = self.K.copy()

@@ -8,6 +8,7 @@ import numpy as np
 from tracker.boards.camera_graph import MIN_SHARED
 from tracker.boards.rig_fit import HELD_OUT_EVERY
 from tracker.boards.view_choice import MAX_FRAMES, MAX_LENS_VIEWS
+from tracker.calibration.solvable import check_apart
 from tracker.compute.progress import Report, stages, unreported
 from tracker.compute.sampling import spread_indices
 from tracker.errors import CalibrationError
@@ -16,6 +17,7 @@ from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservationSet
 from tracker.self_calibration.identification import Statures, first_cameras
 from tracker.self_calibration.joint_adjustment import UnknownLenses
+from tracker.self_calibration.mirrored_views import require_unmirrored
 from tracker.self_calibration.person_calibration import (
     PersonCalibration,
     adjusted_to,
@@ -86,9 +88,11 @@ def _calibrated(
     scale = metres_per_unit(joints, seen.names, statures)
     volume = volume_error(adjusted, scale)
     require_determined(volume, adjusted, seen, scale)
+    require_unmirrored(adjusted.cameras, adjusted.observed)
     require_one_solution(Solution(adjusted, gauge), first.rivals, seen, lenses)
     by_person = scale * joints.reshape(-1, len(seen.names), 3)
     world = upright(scaled_by(adjusted.cameras, scale), by_person, seen.names, float(np.nanmean(statures)))
+    check_apart(world.cameras)
     scales = metres_by_person(joints, seen.names, statures)
     given = None if statures_m is None else float(np.nanmean(statures))
     sigma = scale_sigma(given, int(np.isfinite(scales).sum()))

@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 from tracker.boards.footage_calibration import footage_paths
 from tracker.boards.lens_fit import blank_camera
+from tracker.calibration.solvable import solvable
 from tracker.calibrations.reading import read_cameras
+from tracker.calibrations.usual_sizes import check_heights
 from tracker.compute.progress import Report, part_of
 from tracker.errors import CalibrationError
 from tracker.footage.camera_source import CameraSource
@@ -47,6 +49,8 @@ class FilmedPerson:
     """Height of the person or of all, or of people by name, metres; None if unknown."""
     lenses: Path | None = None
     """Calibration of which the lenses are taken; None if they are unknown."""
+    any_size: bool = False
+    """Whether people and lenses of unusual sizes are taken."""
 
 
 class KeyPoints(NamedTuple):
@@ -67,10 +71,17 @@ def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalib
     Raises:
         TrackerError: files cannot be read or do not fit together, or show too little of the people.
     """
+    with solvable("give more of the footage, with people in many places and poses"):
+        return _calibrate(filmed, report)
+
+
+def _calibrate(filmed: FilmedPerson, report: Report) -> PersonCalibration:
+    if not filmed.any_size:
+        check_heights(filmed.stature_m, CalibrationError)
     paths = footage_paths(filmed.videos, filmed.camera_paths, filmed.offsets)
     session = _session_of(filmed.keypoints, paths, filmed.offsets, filmed.common_frames)
     blanks = tuple(c.camera for c in session.cameras)
-    cameras = blanks if filmed.lenses is None else _with_lenses(blanks, filmed.lenses)
+    cameras = blanks if filmed.lenses is None else _with_lenses(blanks, filmed.lenses, filmed.any_size)
     has_lenses = filmed.lenses is not None
     plan = None if filmed.keypoints is None else _plan(session, filmed.keypoints)
     if plan is not None and not isinstance(plan, MaskPlan):
@@ -88,13 +99,13 @@ def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalib
     return calibrate_by_silhouettes(silhouettes, cameras, filmed.stature_m, has_lenses, calibrating)
 
 
-def _with_lenses(blanks: Sequence[Camera], path: Path) -> tuple[Camera, ...]:
+def _with_lenses(blanks: Sequence[Camera], path: Path, any_size: bool) -> tuple[Camera, ...]:
     """Return cameras with the lenses of a calibration.
 
     Raises:
         CalibrationError: it cannot be read, lacks a camera, or is of pictures of another size.
     """
-    entries = {e.name: e for e in read_cameras(path, footage=[b.name for b in blanks]).entries}
+    entries = {e.name: e for e in read_cameras(path, footage=[b.name for b in blanks], any_size=any_size).entries}
     out = []
     for blank in blanks:
         if blank.name not in entries:

@@ -10,6 +10,7 @@ from tracker.boards.camera_graph import MIN_SHARED
 from tracker.boards.rig_fit import HELD_OUT_EVERY
 from tracker.boards.view_choice import MAX_FRAMES
 from tracker.calibration.point_adjustment import triangulate_all
+from tracker.calibration.solvable import check_apart
 from tracker.compute.progress import Report, stages, unreported
 from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.compute.sampling import spread_indices
@@ -109,9 +110,28 @@ def _calibrated(
     world = upright_by_ends(
         scaled_by(adjusted.cameras, scale), scale * ends, scale * points.by_joint(adjusted.points_world)
     )
+    check_apart(world.cameras)
     notes = (*scale_notes(stature_m, sigma), *_lens_notes(adjusted, has_lenses), _up_note(world.lean_rad))
+    notes += under_floor_notes(world.joints_world)
     return PersonCalibration(
         world, adjusted, points, held_out, on_them.cameras, errors_px, volume, sigma, notes, "frontier points"
+    )
+
+
+def under_floor_notes(points_world: Array) -> tuple[str, ...]:
+    """Return a sentence on points of a person under the floor, as silhouettes of a mirrored view or another time give.
+
+    Args:
+        points_world: in a world with z up and its origin on the floor, (..., 3), metres; NaN where there are none.
+    """
+    z = points_world[..., 2][np.isfinite(points_world[..., 2])]
+    # One point in fifty may be wrong; a step or a wrong floor is not as deep.
+    lowest_m = float(np.quantile(z, 0.02)) if z.size else 0.0
+    if lowest_m > -0.25:
+        return ()
+    return (
+        f"points of the person lie {-lowest_m:.1f} m under the floor: check that all silhouettes are of one person and "
+        "one instant, and that no view is mirrored",
     )
 
 

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import CalibratedCameras, read_cameras
+from tracker.calibrations.usual_sizes import check_heights
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
@@ -87,6 +88,8 @@ class NewSession:
     """Convention of the calibration's poses; by default that of its layout, unless the cameras contradict it."""
     rescale: bool = False
     """Whether a calibration at a whole multiple of the footage's size is scaled to it."""
+    any_size: bool = False
+    """Whether rooms, people and focal lengths of unusual sizes are taken."""
 
 
 @dataclass(frozen=True)
@@ -211,6 +214,8 @@ def check_parts(
             f.close()
     for source in sources:
         check_side_files(source)
+    if not request.any_size:
+        check_heights(request.heights, SessionError)
     people = _make_people(request.people, request.models, request.heights)
     report("The body models fit: " + ", ".join(f"{p.name} {p.model.height_m:.2f} m" for p in people) + ".")
     if request.up in UP_ROTATIONS:
@@ -241,7 +246,7 @@ def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = Non
 
 
 def _read_calibration(request: NewSession) -> CalibratedCameras:
-    return read_cameras(request.calibration, request.units, request.poses, _filmed(request))
+    return read_cameras(request.calibration, request.units, request.poses, _filmed(request), request.any_size)
 
 
 def _filmed(request: NewSession) -> set[str]:

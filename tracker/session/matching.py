@@ -27,7 +27,7 @@ def match_footage(
         unused: calibrated cameras that the session leaves out; their footage in `videos` is left out too.
 
     Raises:
-        SessionError: footage without a camera, or a camera without footage or with two.
+        SessionError: footage without a camera or for two, or a camera without footage or with two.
     """
     check_names(camera_paths, names, "camera", "the footage by camera")
     paths = dict(camera_paths)
@@ -46,6 +46,10 @@ def match_footage(
     missing = [n for n in names if n not in paths]
     if missing:
         raise SessionError(f"no video for camera {', '.join(missing)}", Remedy("give_footage", camera=missing[0]))
+    by_file: dict[Path, str] = {}
+    for name, path in paths.items():
+        if (other := by_file.setdefault(path.resolve(), name)) != name:
+            raise SessionError(f"cameras '{other}' and '{name}' have one video, {path}; give each camera its own")
     return paths
 
 

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from tracker.calibrations.pose_conventions import FITS_DEG
-from tracker.calibrations.units import MIN_STUDIO_M
+from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.formats.camera_section import MAX_OFFSET
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
@@ -107,7 +107,7 @@ def _floor_doubts(names: Sequence[str], centers_world: Array, heights_m: Array, 
 def _place_doubts(names: Sequence[str], centers_world: Array) -> list[str]:
     """Doubt cameras that stand at one place, as copied poses do."""
     apart = np.linalg.norm(centers_world[:, None] - centers_world, axis=-1)
-    if apart.max() < MIN_STUDIO_M:  # another unit, which is noted, or a stereo pair
+    if apart.max() < USUAL_SIZES["distance"].low:  # another unit, which is noted, or a stereo pair
         return []
     return [
         f"Cameras '{names[i]}' and '{names[j]}' stand {100 * apart[i, j]:.2g} cm apart: check that the pose of one is "

@@ -70,6 +70,8 @@ class CalibrateArguments:
     with y down."""
     layout: Literal["quadrille", "anipose", "pose2sim", "caliscope", "opencv"] = "quadrille"
     """layout of the file; quadrille is that of a session's calibration.toml."""
+    any_size: bool = False
+    """take squares of a board below 5 or above 300 mm, people below 0.6 or above 2.3 m, and unusual focal lengths."""
     overwrite: bool = False
     """replace a file that exists."""
     json: bool = False
@@ -95,7 +97,7 @@ def _by_board(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
 
     assert arguments.board is not None
     filmed = FilmedBoard(
-        read_board(arguments.board),
+        read_board(arguments.board, arguments.any_size),
         arguments.videos,
         parse_pairs(arguments.camera, "--camera", Path),
         arguments.fisheye,
@@ -121,6 +123,7 @@ def _by_person(arguments: CalibrateArguments, report: "Report") -> "_Calibrated"
         arguments.common_frames,
         parse_common_or_pairs(arguments.height, "--height", finite),
         arguments.lenses,
+        arguments.any_size,
     )
     found = calibrate_filmed_person(filmed, report)
     record = {"out": str(arguments.out), "layout": arguments.layout, **record_of(found)}

@@ -131,7 +131,10 @@ def test_wrong_words_are_refused(run, footage, tmp_path):
         run("calibrate", "--board", "b.toml", "--height", "1.7", "--out", out),
         ["expected --height together with --people"],
     )
-    assert_refused(run(*words(footage, out, "--height", "175")), ["a height of 0.3 to 3 metres", "175"])
+    assert_refused(
+        run(*words(footage, out, "--height", "175")),
+        ["of 0.6 to 2.3 metres, found 175; is it in centimetres? say 1.75"],
+    )
     shutil.copytree(footage / "cam0", tmp_path / "other")
     assert_refused(run(*words(footage, out, "--camera", f"other={tmp_path / 'other'}")), ["none of other", "leave out"])
     (tmp_path / "one.toml").write_text((footage / "lenses.toml").read_text().replace("cam1", "cam9"))

@@ -1,5 +1,7 @@
 """Descriptions of boards: Caliscope's, anipose's and the project's own, and wrong ones."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,30 @@ def read(tmp_path, text):
     path = tmp_path / "board.toml"
     path.write_text(text)
     return read_board(path)
+
+
+SIZES = [
+    ("board_square_side_length = 0.06\nboard_marker_length = 0.045", "found 0.06; is it in metres? say 60"),
+    ("board_square_side_length = 1\nboard_marker_length = 0.75", "is it in inches or centimetres? say 25.4 or 10"),
+    ("board_square_side_length = 2000\nboard_marker_length = 10", "of 5 to 300 millimetres, found 2000"),
+]
+
+
+@pytest.mark.parametrize(("lengths", "expected"), SIZES)
+def test_squares_in_another_unit_are_refused(tmp_path, lengths, expected):
+    path = tmp_path / "config.toml"
+    path.write_text(f'[calibration]\nboard_type = "charuco"\nboard_size = [7, 5]\n{lengths}\n')
+    with pytest.raises(CalibrationError, match=re.escape(expected)) as caught:
+        read_board(path)
+    assert caught.value.remedy.code == "any_size"
+    assert read_board(path, any_size=True).columns == 7
+
+
+def test_the_unit_of_caliscope_is_centimetres(tmp_path):
+    path = tmp_path / "charuco.toml"
+    path.write_text('columns = 5\nrows = 7\ndictionary = "DICT_4X4_50"\nsquare_size_override_cm = 54\n')
+    with pytest.raises(CalibrationError, match=r"of 0\.5 to 30 centimetres, found 54; is it in millimetres\? say 5\.4"):
+        read_board(path)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from board_rigs import (
 
 from tracker.boards import pose_choice
 from tracker.boards.board_calibration import MIN_LENS_VIEWS, calibrate_rig
+from tracker.boards.board_problem import SeenCorners
 from tracker.boards.camera_graph import link_cameras
 from tracker.boards.expected_error import expected_error
 from tracker.boards.lens_fit import blank_camera, fit_lens
@@ -141,9 +142,8 @@ def test_too_few_views_of_a_camera_are_refused():
         calibrated(rig._replace(seen=few))
 
 
-@pytest.mark.slow
-def test_a_board_at_one_distance_tells_no_focal_length():
-    """The board faces one camera at one distance: focal length and distance are alike, and that is said."""
+def at_one_distance(tilt):
+    """A board that faces one camera at nearly one distance, so that focal length and distance are alike."""
     random = np.random.default_rng(4)
     cameras = true_cameras(random, 2)
     cameras[1] = replace(
@@ -153,14 +153,76 @@ def test_a_board_at_one_distance_tells_no_focal_length():
     Ts = []
     for _ in range(15):
         x, y = random.uniform(-0.4, 0.4, 2)
-        turn = rigid.so3_exp(np.array([0.0, 0.0, random.uniform(0, 6)])) @ rigid.so3_exp(0.01 * random.normal(size=3))
-        Ts.append(T @ rigid.transform(turn, np.array([x, y, 2.0])))
+        turn = rigid.so3_exp(np.array([0.0, 0.0, random.uniform(0, 6)])) @ rigid.so3_exp(tilt * random.normal(size=3))
+        Ts.append(T @ rigid.transform(turn, np.array([x, y, 2.0 + random.uniform(-0.15, 0.15)])))
     board = BOARDS[2]
     seen = filmed(random, board, cameras, np.stack(Ts), [0.3, 0.3], gross=0)
-    found = calibrate_rig(board, seen, ["a", "b"], [c.size for c in cameras], [False, False])
+    return board, seen, ["a", "b"], [c.size for c in cameras], [False, False]
+
+
+@pytest.mark.slow
+def test_a_board_at_one_distance_tells_no_focal_length():
+    found = calibrate_rig(*at_one_distance(0.08))
     assert len(found.notes) == 2
     assert "does not tell its focal length better than to" in found.notes[0]
     assert "film the board nearer, farther and tilted" in found.notes[0]
+
+
+def test_a_focal_length_that_is_as_good_as_unknown_is_refused():
+    with pytest.raises(CalibrationError, match=r"focal length of camera 'a' to 10% at least, found .* of 20%"):
+        calibrate_rig(*at_one_distance(0.01))
+
+
+def still_rig(turn=0.0, slide=0.0):
+    """A board in front of two cameras that stands, or is moved and turned in its plane."""
+    random = np.random.default_rng(3)
+    cameras = true_cameras(random, 2)
+    T = cameras[0].T_world_camera
+    cameras[1] = replace(cameras[1], T_world_camera=T @ rigid.transform(None, np.array([0.3, 0, 0])))
+    tilted = T @ rigid.transform(rigid.so3_exp(np.array([0.3, 0.4, 0.0])), np.array([0.0, 0.0, 2.0]))
+    Ts = [
+        tilted @ rigid.transform(rigid.so3_exp(np.array([0, 0, turn * k])), slide * np.append(random.normal(size=2), 0))
+        for k in range(8)
+    ]
+    seen = filmed(random, BOARDS[1], cameras, np.stack(Ts), [0.3, 0.3], gross=0, covered=0)
+    return BOARDS[1], seen, ["a", "b"], [c.size for c in cameras], [False, False]
+
+
+@pytest.mark.parametrize(("turn", "slide"), [(0.0, 0.0), pytest.param(0.5, 0.1, marks=pytest.mark.slow)])
+def test_a_board_that_stands_or_stays_in_its_plane_is_refused(turn, slide):
+    with pytest.raises(CalibrationError, match=r"found all its corners within .* cm of one plane, of a board 35 cm"):
+        calibrate_rig(*still_rig(turn, slide))
+
+
+@pytest.mark.slow
+def test_cameras_of_a_tiny_board_are_those_of_a_large_one(rig, found):
+    """A board of another unit is calibrated as one of a usual size, without numbers that vanish."""
+    tiny = calibrated(rig._replace(board=replace(rig.board, square_m=rig.board.square_m / 1000)))
+    for small, large in zip(tiny.rig.cameras, found.rig.cameras, strict=True):
+        np.testing.assert_allclose(1000 * small.center_world, large.center_world, atol=1e-3)
+        np.testing.assert_allclose(small.K, large.K, rtol=1e-3)
+    assert 1000 * tiny.rig.volume.expected_m == pytest.approx(found.rig.volume.expected_m, rel=0.05)
+    assert "check the unit of its squares" in tiny.notes[0]
+    assert not any("squares" in note for note in found.notes)
+
+
+@pytest.mark.slow
+def test_one_video_under_two_names_is_refused(rig):
+    cameras = [rig.cameras[0], rig.cameras[0], rig.cameras[1]]
+    parts = [rig.seen.of_camera(i) for i in (0, 0, 1)]
+    seen = SeenCorners(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    seen = seen._replace(cameras=np.repeat(np.arange(3), [len(part.px) for part in parts]))
+    with pytest.raises(CalibrationError, match=r"found 'a' and 'b' .* cm apart, as of one video under two names"):
+        calibrate_rig(rig.board, seen, ["a", "b", "c"], [c.size for c in cameras], [False] * 3)
+
+
+@pytest.mark.parametrize("bad", [np.inf, *(pytest.param(v, marks=pytest.mark.slow) for v in (np.nan, 1e200))])
+def test_corners_that_are_no_numbers_are_refused(bad):
+    board, seen, *others = still_rig()
+    px = seen.px.copy()
+    px[::3] = bad
+    with pytest.raises(CalibrationError):
+        calibrate_rig(board, seen._replace(px=px), *others)
 
 
 @pytest.mark.slow

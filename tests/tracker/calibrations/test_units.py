@@ -1,10 +1,12 @@
 """Units of translations: named by the distance to the point at which the cameras look."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from calibration_files import anipose, opencv_words
+from calibration_files import anipose, egoexo, opencv_words
+from rigs import K as RIG_K
 from rigs import cameras, looking, ring
 
 from tracker.calibrations.reading import read_cameras
@@ -64,7 +66,7 @@ def test_parallel_cameras_have_no_point_but_an_extent(tmp_path):
     row = [looking([x, 0, 0], [x, 4.0, 0]) for x in (0.0, 0.065)]
     path = opencv_words(tmp_path, in_units(1000, row))
     assert "within 0.065 m" in read_cameras(path, "mm").notes[-1]
-    with pytest.raises(CalibrationError, match="within 100 m from the origin"):
+    with pytest.raises(CalibrationError, match="within 60 m from the origin"):
         read_cameras(opencv_words(tmp_path, in_units(10_000, row)))
 
 
@@ -97,6 +99,30 @@ def test_a_stated_unit_that_is_not_known_is_refused(tmp_path):
         read_cameras(path)
 
 
-def test_metres_that_show_no_person_are_noted(tmp_path):
-    (note,) = read_cameras(opencv_words(tmp_path, in_units(0.001))).notes
+@pytest.mark.parametrize(("factor", "limit"), [(0.001, "at least 0.5"), (0.1, "at least 0.5"), (16, "within 60")])
+def test_rooms_of_unusual_size_need_a_word(tmp_path, factor, limit):
+    path = opencv_words(tmp_path, in_units(factor))
+    with pytest.raises(CalibrationError, match=f"expected cameras {limit} m from the point"):
+        read_cameras(path)
+    (note,) = read_cameras(path, any_size=True).notes
     assert "check that the unit is metres" in note
+
+
+@pytest.mark.parametrize(("factor", "fisheye"), [(0.25, False), (6.0, False), (6.0, True)])
+def test_unusual_focal_lengths_need_a_word(tmp_path, factor, fisheye):
+    K = np.diag([factor * 1.28, factor * 1.28, 1.0]) @ RIG_K  # 500 px of 640 are 0.78
+    K[:2, 2] = RIG_K[:2, 2]
+    path = opencv_words(tmp_path, [replace(c, K=K) for c in cameras(ring(4))])
+    rows = json.loads(path.read_text())
+    path.write_text(json.dumps({name: row | {"fisheye": fisheye} for name, row in rows.items()}))
+    with pytest.raises(CalibrationError, match=r"focal length of 0\.3 to 5 times the longer side .* found") as caught:
+        read_cameras(path)
+    assert caught.value.remedy.code == "any_size"
+    assert len(read_cameras(path, any_size=True).entries) == 4
+
+
+def test_short_fisheyes_are_usual(tmp_path):
+    K = RIG_K.copy()
+    K[0, 0] = K[1, 1] = 170.0
+    rig = [replace(c, K=K, fisheye=True, distortion=np.zeros(4)) for c in cameras(ring(4))]
+    assert len(read_cameras(egoexo(tmp_path, rig)).entries) == 4

@@ -171,3 +171,9 @@ def test_scaled_and_cropped_fisheyes_see_the_same(scale):
 def test_odd_numbers_of_coefficients(count):
     with pytest.raises(CalibrationError, match=f"expected 0 or 4 fisheye distortion coefficients, found {count}"):
         fisheye(distortion=np.zeros(count))
+
+
+def test_the_principal_point_on_the_border_has_a_pinhole():
+    K = np.array([[500.0, 0.0, -0.5], [0.0, 500.0, -0.5], [0.0, 0.0, 1.0]])
+    pinhole = fisheye(K=K, distortion=np.zeros(4)).pinhole
+    assert np.isfinite(pinhole.K).all()

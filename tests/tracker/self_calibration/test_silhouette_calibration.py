@@ -7,7 +7,7 @@ from person_outlines import outlined
 
 from tracker.errors import CalibrationError
 from tracker.self_calibration.person_silhouettes import Flaw, PersonSilhouette
-from tracker.self_calibration.silhouette_calibration import calibrate_by_silhouettes
+from tracker.self_calibration.silhouette_calibration import calibrate_by_silhouettes, under_floor_notes
 
 CAMERAS = rig(3)
 STATURE_M = 1.70
@@ -68,3 +68,14 @@ def test_a_person_who_stands_still_is_refused():
     rows, _ = outlined(CAMERAS, 1)
     with pytest.raises(CalibrationError, match="let the person walk through the volume"):
         calibrate_by_silhouettes(8 * rows, blanks(CAMERAS), STATURE_M, False)
+
+
+@pytest.mark.parametrize(("share", "notes"), [(0.0, 0), (0.01, 0), (0.05, 1), (1.0, 1)])
+def test_points_under_the_floor_are_noted(share, notes):
+    points = np.random.default_rng(0).uniform((-1, -1, 0), (1, 1, 1.8), (100, 10, 3))
+    points[:, 0] = np.nan
+    points[: round(100 * share), 1:, 2] -= 2.5
+    found = under_floor_notes(points)
+    assert len(found) == notes
+    assert all("m under the floor: check that all silhouettes are of one person" in note for note in found)
+    assert under_floor_notes(np.full((2, 3), np.nan)) == ()

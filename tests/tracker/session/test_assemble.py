@@ -152,6 +152,11 @@ def test_two_videos_for_a_camera(room):
     assert_refused(room, SessionError, "'left' has two videos", videos=videos)
 
 
+def test_one_video_for_two_cameras(room):
+    paths = {"front": room / "front.mp4", "left": room / ".." / room.name / "front.mp4"}
+    assert_refused(room, SessionError, "cameras 'front' and 'left' have one video", videos=[], camera_paths=paths)
+
+
 def test_missing_video(room):
     (room / "left.mp4").unlink()
     assert_refused(room, RecordingError, r"camera 'left'.*not found")
@@ -398,7 +403,7 @@ def test_a_camera_without_a_pose_is_left_out_unless_it_is_asked_for(room):
         ({"offsets": {"left": 9}}, RecordingError, "below its 9 frames, found 9; check the footage and the offsets"),
         ({"models": {"bob": "gavrila22"}}, SessionError, "unknown person 'bob' among the body models"),
         ({"heights": {"bob": 1.7}}, SessionError, "unknown person 'bob' among the heights"),
-        ({"heights": 17.5}, ModelError, "0.3 to 3 metres"),
+        ({"heights": 17.5}, SessionError, "height of a person of 0.6 to 2.3 metres, found 17.5"),
         ({"models": "gavrila23"}, ModelError, "gavrila22"),
         ({"units": "mm"}, CalibrationError, "found 1.41 millimetres, so that the unit is another"),
         ({"up": "q"}, SessionError, "axis that points up"),
