@@ -1,7 +1,7 @@
 """The log likelihood that points in space are the joints of a person, by bones and posture.
 
 Each term compares a person with points of anything, in nats for one posture, averaged over frames. A share of joints is
-grossly wrong (`GROSS`), so that no single one decides.
+grossly wrong (`PeoplePriors.gross`), so that no single one decides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,33 +13,53 @@ from scipy.stats import norm
 from tracker.acquisition.segment_lengths import SEGMENTS
 from tracker.acquisition.size_parameters import SizePriors
 from tracker.acquisition.typical_body import typical_body
+from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
 
-GROSS = 0.1
-"""Share of joints that are grossly wrong: between those of a network of a slow person (3%) and of a fast one (25%)."""
-ERROR = 0.02
-"""Standard deviation of a joint of another program from that of a body, share of its height: 3 cm of a network."""
-_RANGE = float(np.log(100.0))
-"""Range of the logarithm of a length between points of anything: from 2 cm to 2 m."""
-_LEAN_RAD = 0.3
-"""Standard deviation of the lean of a person who stands, walks or sits, rad."""
-_STATURES_M = (0.6, 2.3)
-"""Statures of people, metres: of a baby who sits, and of the tallest adults."""
-_IMPOSSIBLE = -10.0
-"""Log likelihood ratio of a stature that nobody has, nats: far below those of people."""
-_BODY = "gavrila38"
-_SEGMENTS = SEGMENTS | {
-    name: [([f"{side}_ankle"], [f"{side}_{end}"]) for side in ("left", "right")]
-    for name, end in (("foot", "toe"), ("heel", "heel"))
+
+class PeoplePriors(NamedTuple):
+    """Numbers that are usual of people, and of points by which programs find them."""
+
+    gross: float = 0.1
+    """Share of joints that are grossly wrong: between those of a network of a slow person (3%) and of a fast one
+    (25%)."""
+    error: float = 0.02
+    """Standard deviation of a joint of another program from that of a body, share of its height: 3 cm of a network."""
+    log_range: float = 4.6
+    """Range of the logarithm of a length between points of anything: from 2 cm to 2 m."""
+    lean_rad: float = 0.3
+    """Standard deviation of the lean of a person who stands, walks or sits, rad."""
+    impossible: float = -10.0
+    """Log likelihood ratio of a stature that nobody has, nats: far below those of people."""
+    height_sigmas: float = 3.0
+    """Standard deviations by which heights differ at most from those that a session states, usually."""
+    posture_s: float = 0.5
+    """Time after which a posture is another one, seconds: that of a step."""
+    postures: float = 10.0
+    """Number of postures from which on their common offsets count more than their number."""
+    parts: int = 4
+    """Parts that tell something each in each view: forearms and calves."""
+    stretch_s: float = 2.0
+    """Shortest stretch of a motion that is looked at, seconds: two steps of each leg."""
+    most_off: float = 0.5
+    """Share of the limbs, by truncated squares of distances, from which people are not those of the recording."""
+
+
+PRIORS = PeoplePriors()
+_BODY, _PERSON = "gavrila38", USUAL_SIZES["person"]
+_SEGMENTS = {
+    **SEGMENTS,
+    "foot": [(["left_ankle"], ["left_toe"]), (["right_ankle"], ["right_toe"])],
+    "heel": [(["left_ankle"], ["left_heel"]), (["right_ankle"], ["right_heel"])],
 }
-_FORWARD = {
-    "knee": ("hip", "knee", "ankle", 1.0, GROSS),
-    "elbow": ("shoulder", "elbow", "wrist", -1.0, 3 * GROSS),
-    "toe": ("ankle", "toe", "ankle", 1.0, GROSS),
-}
-"""Joints before, at and after each joint that lies before (1) or behind (-1) the line of the others, and the share of
-frames in which it seems not to: an arm may be turned. Toes lie before the ankle."""
+_DIRECTIONS = (
+    ("hip", "knee", "ankle", True, True),
+    ("shoulder", "elbow", "wrist", False, False),
+    ("ankle", "toe", "ankle", True, True),
+)
+"""Joints before, at and after each joint, whether it lies ahead of the line of the others or behind it, and whether
+that is sure: an arm may be turned. Toes lie ahead of the ankle."""
 
 Places = Mapping[str, Array]
 """Positions of points of the body by name, (F, 3) each; NaN where unknown."""
@@ -78,18 +98,18 @@ def bones(places: Places) -> Bones:
     logs = np.log(np.maximum([*known.values()], 1e-9))
     stature = usual = np.ones(1)
     for _ in range(2):  # a child has other proportions
-        body = typical_body(load_model(_BODY, float(np.clip(stature, *_STATURES_M).item())))
+        body = typical_body(load_model(_BODY, float(np.clip(stature, *_PERSON).item())))
         own = body.named_points_world(body.neutral())
         lengths = {n: np.linalg.norm(_middle(own, a) - _middle(own, b)) for n, ((a, b), *_) in _SEGMENTS.items()}
         usual = np.log([lengths[name] / body.height_m for name, _ in known])[:, None]
         stature = np.exp(np.nanmedian(logs - usual))
     priors = SizePriors()
-    of_joints = np.sqrt(2) * np.hypot(priors.joint, ERROR) / np.exp(usual)
-    ratios = _RANGE * norm.pdf(logs, usual + np.log(stature), np.hypot(priors.length, of_joints))
-    nats = np.nanmean(np.log((1 - GROSS) * ratios + GROSS), axis=1)
+    of_joints = np.sqrt(2) * np.hypot(priors.joint, PRIORS.error) / np.exp(usual)
+    ratios = PRIORS.log_range * norm.pdf(logs, usual + np.log(stature), np.hypot(priors.length, of_joints))
+    nats = np.nanmean(np.log((1 - PRIORS.gross) * ratios + PRIORS.gross), axis=1)
     oddest = int(nats.argmin())
     low, high = np.nanquantile(np.exp(logs[oddest]), (0.1, 0.9))
-    is_of_person = bool(nats[oddest] > 0.5 * np.log(GROSS))
+    is_of_person = bool(nats[oddest] > 0.5 * np.log(PRIORS.gross))
     return Bones(float(nats.sum()), float(stature), [*known][oddest][0], (float(low), float(high)), is_of_person)
 
 
@@ -103,13 +123,9 @@ def stature_nats(stature_m: float, expected_m: float) -> float:
     if np.isnan(stature_m):
         return 0.0
     near = norm.pdf(np.log(stature_m), np.log(expected_m), SizePriors().height)
-    anyone = is_stature(stature_m) / np.log(_STATURES_M[1] / _STATURES_M[0])
-    return float(np.log(max(_RANGE * ((1 - GROSS) * near + GROSS * anyone), np.exp(_IMPOSSIBLE))))
-
-
-def is_stature(stature_m: float) -> bool:
-    """Return whether people have a stature; NaN counts as unknown."""
-    return not (stature_m < _STATURES_M[0] or stature_m > _STATURES_M[1])
+    anyone = _PERSON.has(stature_m) / np.log(_PERSON.high / _PERSON.low)
+    density = (1 - PRIORS.gross) * near + PRIORS.gross * anyone
+    return float(np.log(max(PRIORS.log_range * density, np.exp(PRIORS.impossible))))
 
 
 def upright_nats(places: Places, up: Array) -> float:
@@ -126,8 +142,8 @@ def upright_nats(places: Places, up: Array) -> float:
     with np.errstate(invalid="ignore", divide="ignore"):
         lean = np.arccos(np.clip(spine @ up / np.linalg.norm(spine, axis=-1), -1.0, 1.0))
     # On the sphere, normal in the lean: its density against that of any direction, 1 / (4 pi).
-    ratios = 2.0 / _LEAN_RAD**2 * np.exp(-0.5 * (lean / _LEAN_RAD) ** 2)
-    return _mean(np.log((1 - GROSS) * ratios + GROSS))
+    ratios = 2.0 / PRIORS.lean_rad**2 * np.exp(-0.5 * (lean / PRIORS.lean_rad) ** 2)
+    return _mean(np.log((1 - PRIORS.gross) * ratios + PRIORS.gross))
 
 
 def bend_nats(places: Places) -> float:
@@ -141,7 +157,7 @@ def bend_nats(places: Places) -> float:
         forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
     height, total = np.linalg.norm(up, axis=-1), 0.0
     for side in ("left", "right"):
-        for before, at, after, sign, wrong in _FORWARD.values():
+        for before, at, after, is_ahead, is_sure in _DIRECTIONS:
             names = [f"{side}_{j}" for j in (before, at, after)]
             if not places.keys() >= set(names):
                 continue
@@ -151,8 +167,9 @@ def bend_nats(places: Places) -> float:
                 along = np.sum((b - a) * line, axis=-1) / np.sum(line * line, axis=-1)
             foot = a + np.nan_to_num(along)[:, None] * line
             # The trunk is 30% of the height.
-            ahead = sign * np.sum((b - foot) * forward, axis=-1) / (ERROR * height / 0.3)
-            total += _mean(np.log(2 * (1 - wrong) * norm.cdf(ahead) + wrong))
+            ahead = np.sum((b - foot) * forward, axis=-1) / (PRIORS.error * height / 0.3)
+            wrong = PRIORS.gross if is_sure else 3 * PRIORS.gross
+            total += _mean(np.log(2 * (1 - wrong) * norm.cdf(ahead if is_ahead else -ahead) + wrong))
     return total
 
 

@@ -5,11 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.errors import FormatError, Remedy
 from tracker.formats.file_axes import axes_matrix, is_mirrored
 from tracker.formats.joint_maps import JointMap, joint_maps_of_size
+from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import floor_plane
 from tracker.observations.importing import plan_import
 from tracker.observations.joints import triangulate_observations
@@ -17,17 +20,10 @@ from tracker.observations.observed import ObservationSet
 from tracker.observations.plans import ImportPlan, MaskPlan
 from tracker.observations.request import ImportRequest
 from tracker.observations.shifts import SAMPLES
-from tracker.plausibility.body_likelihood import is_stature
+from tracker.plausibility.body_likelihood import PRIORS
 from tracker.plausibility.filmed_people import film_people
 from tracker.plausibility.readings import Reading, ReadPoints
 from tracker.session.session import Session
-
-_WINDOW_S = 2.0
-"""Shortest time over which a motion is looked at, seconds: two steps."""
-_AROUND = SAMPLES // 8
-"""Frames on each side of a single one by which it is judged: a fourth of a stretch together."""
-_MOST_OFF = 0.5
-"""Share of the limbs, by truncated squares of distances, from which people are not those who were filmed."""
 
 
 def plan_examined_import(session: Session, request: ImportRequest) -> ImportPlan | MaskPlan:
@@ -72,13 +68,30 @@ def examine_joints(session: Session, person: int, joints: MarkerTable, axes: str
         axes: these axes.
         around: the frame.
     """
-    near = np.arange(max(0, around - _AROUND), min(session.n_frames, around + _AROUND + 1))
+    reach = SAMPLES // 8  # a quarter of a stretch in all
+    near = np.arange(max(0, around - reach), min(session.n_frames, around + reach + 1))
     rows = np.isin(joints.frames, near)
     points = np.full((len(near), 1, len(joints.names), 3), np.nan)
     points[joints.frames[rows] - near[0], 0] = joints.points[rows] @ axes_matrix(axes)
     own = JointMap("the file", {name: name for name in joints.names})
     read = _with_film(session, near, joints.names, points, (session.people[person].model.height_m,))
     return contradictions(read, Reading(own, axes), [own], int(joints.frames[0]), in_space=True)
+
+
+def examine_keypoints(observations: ObservationSet, cameras: Sequence[Camera], fps: float) -> list[FormatError]:
+    """Return what speaks against the names of key points, by the bones of the people whom they calibrated.
+
+    Args:
+        observations: key points in pictures.
+        cameras: calibrated by them, in a world with z up.
+        fps: frames per second.
+    """
+    frames, names, points = _triangulated(observations, cameras, fps)
+    statures = (DEFAULT_HEIGHT_M,) * points.shape[1]
+    read = ReadPoints(names, points, frames, statures, floor_plane("z", None).normal, fps, None)
+    given = Reading(observations.joint_map)
+    maps = [given.joint_map] if names else _known_maps(given.joint_map)
+    return contradictions(read, given, maps, 0, in_space=False)
 
 
 def _read_points(session: Session, observations: ObservationSet, axes: str) -> ReadPoints:
@@ -89,17 +102,25 @@ def _read_points(session: Session, observations: ObservationSet, axes: str) -> R
         points = observations.joints.joints_world @ axes_matrix(axes)
         chosen = _window(points, session.fps)
         return _with_film(session, chosen, observations.joints.names, points[chosen], statures)
+    cameras = [c.camera for c in session.cameras]
+    chosen, names, points = _triangulated(observations, cameras, session.fps)
+    return _with_film(session, chosen, names, points, statures)
+
+
+def _triangulated(
+    observations: ObservationSet, cameras: Sequence[Camera], fps: float
+) -> tuple[IntArray, tuple[str, ...], Array]:
+    """Return the frames of the liveliest stretch of key points, their names if the file has some, and their places."""
     key_points = observations.points
     assert key_points is not None
     flat = np.where(key_points.is_known[..., None], key_points.points_px, np.nan)
-    chosen = _window(flat.reshape(key_points.n_frames, -1, *flat.shape[-2:]), session.fps)
+    chosen = _window(flat.reshape(key_points.n_frames, -1, *flat.shape[-2:]), fps)
     few = replace(
         key_points, points_px=key_points.points_px[chosen], confidence=key_points.confidence[chosen], tracks=None
     )
-    some = replace(observations, points=few)
-    found = triangulate_observations(some, [c.camera for c in session.cameras], mend_sides=False)
+    found = triangulate_observations(replace(observations, points=few), cameras, mend_sides=False)
     names = () if key_points.names == observations.joint_map.points else key_points.names
-    return _with_film(session, chosen, names, found.joints.joints_world, statures)
+    return chosen, names, found.joints.joints_world
 
 
 def _with_film(
@@ -112,9 +133,9 @@ def _with_film(
 def _window(points: Array, fps: float) -> IntArray:
     """Return frames of the stretch in which points, (F, n_people, n_points, d), are known and move most.
 
-    There are at most `SAMPLES`, over `_WINDOW_S` or more.
+    There are at most `SAMPLES`, over `PeoplePriors.stretch_s` or more.
     """
-    step = max(1, round(fps * _WINDOW_S / SAMPLES))
+    step = max(1, round(fps * PRIORS.stretch_s / SAMPLES))
     n = min(len(points), step * SAMPLES)
     speeds = np.zeros(len(points))
     known = np.isfinite(points).all(axis=-1)
@@ -212,11 +233,11 @@ def _impossible(read: ReadPoints, reading: Reading) -> list[FormatError]:
         if not bones.is_of_person:
             text = f"expected points of a person, found that the {bones.oddest} measures {low:.2f} to {high:.2f} m"
             found.append(FormatError(text, Remedy("check_points")))
-        elif not is_stature(bones.stature):
+        elif not USUAL_SIZES["person"].has(bones.stature):
             text = f"expected a person of a usual height, found one {bones.stature:.3g} m tall"
             found.append(FormatError(text, Remedy("check_points")))
     cost = read.misplaced(reading)
-    if not found and cost > _MOST_OFF:
+    if not found and cost > PRIORS.most_off:
         places = np.concatenate([[*p.values()] for p in read.places(reading)], axis=1).reshape(-1, 3)
         middle = ", ".join(f"{x:.2f}" for x in np.nanmedian(places, axis=0))
         is_filmed = read.witness is not None and read.witness.knows_frames

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from tracker.acquisition.size_parameters import SizePriors
+from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.formats.file_axes import axes_matrix, axis_conventions
 from tracker.formats.joint_maps import JointMap
@@ -17,12 +18,11 @@ from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.observations.shifts import vertex
 from tracker.observations.triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import (
-    ERROR,
+    PRIORS,
     Bones,
     Places,
     bend_nats,
     bones,
-    is_stature,
     stature_nats,
     upright_nats,
 )
@@ -46,18 +46,6 @@ class Witness(Protocol):
             places: of the person on the frames, metres.
             shift: frames by which the evidence is later.
         """
-
-
-_SCALES = tuple(sorted({round(a / b, 9) for a in METRES_BY_WORD.values() for b in METRES_BY_WORD.values()}))
-"""Factors between the units of lengths."""
-_POSTURE_S = 0.5
-"""Time after which a posture is another one, seconds: that of a step."""
-_MOST_POSTURES = 10.0
-"""Number of postures from which on their common offsets count more than their number."""
-_USUAL_SIGMAS = 3.0
-"""Standard deviations by which heights of people differ usually from those that a session states."""
-_LIMBS = 4
-"""Parts that tell something each in each view: forearms and calves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +106,7 @@ class ReadPoints:
     def n_postures(self) -> float:
         """Number of postures that are another one each."""
         known = np.isfinite(self.points).all(axis=-1).reshape(len(self.points), -1).any(axis=1)
-        return float(np.clip(known.sum() * self.step / self.fps / _POSTURE_S, 1.0, _MOST_POSTURES))
+        return float(np.clip(known.sum() * self.step / self.fps / PRIORS.posture_s, 1.0, PRIORS.postures))
 
     def places(self, reading: Reading) -> list[Places]:
         """Return the points of the body of each person under a reading, metres."""
@@ -188,11 +176,13 @@ class ReadPoints:
         statures = statures[np.isfinite(statures)]
 
         def is_near(scale: float) -> Mask:
-            return np.abs(np.log(scale * statures / expected)) <= _USUAL_SIGMAS * SizePriors().height
+            return np.abs(np.log(scale * statures / expected)) <= PRIORS.height_sigmas * SizePriors().height
 
         if is_near(given.scale).all():
             return [given.scale]
-        usual = [s for s in _SCALES if is_near(s).any() or any(map(is_stature, s * statures))]
+        units = {*METRES_BY_WORD.values()}
+        scales = sorted({round(a / b, 9) for a in units for b in units})
+        usual = [s for s in scales if is_near(s).any() or any(map(USUAL_SIZES["person"].has, s * statures))]
         return sorted({given.scale, *usual})
 
     def best_shift(self, reading: Reading) -> float:
@@ -225,8 +215,8 @@ class ReadPoints:
         """
         if self.witness is None:
             return 0.0
-        sigma_m = ERROR * float(np.mean(self.statures_m))
-        return -0.5 * (INLIER_M / sigma_m) ** 2 * _LIMBS * self.witness.n_views * self.n_postures
+        sigma_m = PRIORS.error * float(np.mean(self.statures_m))
+        return -0.5 * (INLIER_M / sigma_m) ** 2 * PRIORS.parts * self.witness.n_views * self.n_postures
 
     def _costs(self, reading: Reading) -> Array:
         """Return how far each person is from those of the recording, (n_people * F,), 0 to 1; NaN if unknown."""

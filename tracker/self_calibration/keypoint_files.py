@@ -20,6 +20,7 @@ from tracker.observations.importing import plan_import
 from tracker.observations.observed import ObservationSet
 from tracker.observations.plans import ImportPlan, MaskPlan
 from tracker.observations.request import ImportRequest
+from tracker.plausibility.examine import examine_keypoints
 from tracker.self_calibration.identification import Statures
 from tracker.self_calibration.keypoint_calibration import calibrate_by_person
 from tracker.self_calibration.person_calibration import PersonCalibration
@@ -49,6 +50,8 @@ class FilmedPerson:
     """Height of the person or of all, or of people by name, metres; None if unknown."""
     lenses: Path | None = None
     """Calibration of which the lenses are taken; None if they are unknown."""
+    skeleton: Path | None = None
+    """Joint map of the points, a file or the name of a known one; guessed by default."""
     any_size: bool = False
     """Whether people and lenses of unusual sizes are taken."""
 
@@ -83,10 +86,13 @@ def _calibrate(filmed: FilmedPerson, report: Report) -> PersonCalibration:
     blanks = tuple(c.camera for c in session.cameras)
     cameras = blanks if filmed.lenses is None else _with_lenses(blanks, filmed.lenses, filmed.any_size)
     has_lenses = filmed.lenses is not None
-    plan = None if filmed.keypoints is None else _plan(session, filmed.keypoints)
+    plan = None if filmed.keypoints is None else _plan(session, filmed.keypoints, filmed.skeleton)
     if plan is not None and not isinstance(plan, MaskPlan):
         found = _keypoints(plan, filmed.keypoints, blanks)
-        return calibrate_by_person(found.observations, cameras, filmed.stature_m, has_lenses, report)
+        result = calibrate_by_person(found.observations, cameras, filmed.stature_m, has_lenses, report)
+        if doubts := examine_keypoints(found.observations, result.world.cameras, session.fps):
+            raise doubts[0]
+        return result
     if isinstance(filmed.stature_m, Mapping):
         raise CalibrationError(
             "expected one height for silhouettes, which have no names, found several; give one height"
@@ -158,8 +164,8 @@ def _session_of(
     return Session(place.parent, place.name, max(rates, default=1.0), n_frames, sources, ())
 
 
-def _plan(session: Session, files: Path) -> ImportPlan | MaskPlan:
-    plan = plan_import(session, ImportRequest(_PERSON, (files,), (_PERSON,)), calibrated=False)
+def _plan(session: Session, files: Path, skeleton: Path | None = None) -> ImportPlan | MaskPlan:
+    plan = plan_import(session, ImportRequest(_PERSON, (files,), (_PERSON,), skeleton), calibrated=False)
     if plan.problems:
         kind = "masks" if isinstance(plan, MaskPlan) else "key points"
         raise CalibrationError(f"{plan.problems[0]}; correct the files of {kind}")

@@ -139,6 +139,29 @@ def assemble(
     return check_parts(request, report, note).make()
 
 
+def _check_choice(request: NewSession, calibration: CalibratedCameras) -> None:
+    """Check that the cameras that are asked for are calibrated, each once.
+
+    Raises:
+        SessionError: one is not, or is named twice.
+    """
+    for name in (*request.cameras, *request.camera_paths):
+        if name in calibration.left_out:
+            raise SessionError(
+                f"camera '{name}' is asked for, but {calibration.left_out[name]}; calibrate it with the others, or "
+                "leave it out"
+            )
+    calibrated = [c.name for c in calibration.entries]
+    if len(calibrated) == 1 and len(request.videos) > 1 and not request.cameras:
+        raise SessionError(
+            f"the calibration has the camera '{calibrated[0]}' alone, and there are {len(request.videos)} "
+            "videos; give the files of all cameras or their folder, or one calibration of all"
+        )
+    check_names(request.cameras, calibrated, "camera", "the cameras to use")
+    if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
+        raise SessionError(f"expected each camera to use once, found '{twice[0]}' twice; leave one out")
+
+
 def check_parts(
     request: NewSession,
     report: Callable[[str], None] = lambda _: None,
@@ -163,20 +186,7 @@ def check_parts(
     calibrated = {c.name: c for c in calibration.entries}
     for sentence in calibration.notes:
         note(sentence)
-    for name in (*request.cameras, *request.camera_paths):
-        if name in calibration.left_out:
-            raise SessionError(
-                f"camera '{name}' is asked for, but {calibration.left_out[name]}; calibrate it with the others, or "
-                "leave it out"
-            )
-    if len(calibrated) == 1 and len(request.videos) > 1 and not request.cameras:
-        raise SessionError(
-            f"the calibration has the camera '{next(iter(calibrated))}' alone, and there are {len(request.videos)} "
-            "videos; give the files of all cameras or their folder, or one calibration of all"
-        )
-    check_names(request.cameras, list(calibrated), "camera", "the cameras to use")
-    if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
-        raise SessionError(f"expected each camera to use once, found '{twice[0]}' twice; leave one out")
+    _check_choice(request, calibration)
     without = [] if request.cameras else unfilmed_cameras(request, list(calibrated))
     names = list(request.cameras) or [n for n in calibrated if n not in without]
     report(f"The calibration has {len(calibrated)} cameras: {', '.join(calibrated)}.")

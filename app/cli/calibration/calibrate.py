@@ -50,6 +50,9 @@ class CalibrateArguments:
     height: CommonOrNamed = ()
     """with --people or --silhouettes: height of the person or of all people, metres, or NAME=METRES of those whom the
     files name, which is the scale of the world."""
+    joint_map: OptionalPath = None
+    """with --people: TOML file with the names of the points, or the name of a known skeleton such as BODY_25B; guessed
+    by default."""
     lenses: OptionalPath = None
     """with --people or --silhouettes: a calibration of which the lenses are taken; by default focal lengths are
     estimated."""
@@ -123,6 +126,7 @@ def _by_person(arguments: CalibrateArguments, report: "Report") -> "_Calibrated"
         arguments.common_frames,
         parse_common_or_pairs(arguments.height, "--height", finite),
         arguments.lenses,
+        arguments.joint_map,
         arguments.any_size,
     )
     found = calibrate_filmed_person(filmed, report)
@@ -140,7 +144,11 @@ def _check(arguments: CalibrateArguments) -> None:
             "docs/calibration.md shows how to describe a board, and how to calibrate without one"
         )
     of_board = {"--fisheye": arguments.fisheye, "--every": arguments.every, "--floor-frame": arguments.floor_frame}
-    of_people = {"--height": arguments.height, "--lenses": arguments.lenses}
+    of_people = {
+        "--height": arguments.height,
+        "--joint-map": arguments.joint_map,
+        "--lenses": arguments.lenses,
+    }
     source, unused = ("--board", of_board) if arguments.board is None else ("--people or --silhouettes", of_people)
     for option, value in unused.items():
         if value not in (None, ()):
