@@ -44,7 +44,7 @@ HOUSE = {
         ["exports", "agreement"],
         ["simulate", "evaluation", "self_calibration"],
         ["boards", "posing"],
-        ["calibration"],
+        ["calibration", "plausibility"],
         ["acquisition", "initialization"],
         ["tracking/chamfer, tracking/contour, tracking/voxel"],
         ["tracking/estimation"],

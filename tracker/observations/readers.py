@@ -248,7 +248,13 @@ _OF_UNREAD = (".mat", ".pkl", ".pickle", ".pt", ".pth", ".xlsx", ".xls", ".fbx",
 _UNREAD: Sequence[ObservationLayout[Any]] = [
     ObservationLayout(program, files or "`.json`", keys or _END, recognizes, instead=instead)
     for program, files, keys, recognizes, instead in (
-        ("AlphaPose's formats of OpenPose", "", "`bodies`", _has("bodies"), "its results without --format"),
+        (
+            "AlphaPose's formats of OpenPose",
+            "",
+            "`bodies`",
+            _has("bodies"),
+            "its results in its own format, which is the default",
+        ),
         ("LabelMe", "", "`shapes` and `imagePath`", _has("shapes", "imagePath"), "COCO"),
         ("VGG Image Annotator", "", "`_via_img_metadata`", _has("_via_img_metadata"), "COCO"),
         ("Datumaro", "", "`items` and `categories`", _has("items", "categories"), "COCO or CVAT's XML"),

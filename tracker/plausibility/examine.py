@@ -236,11 +236,12 @@ def _impossible(read: ReadPoints, reading: Reading) -> list[FormatError]:
         elif not USUAL_SIZES["person"].has(bones.stature):
             text = f"expected a person of a usual height, found one {bones.stature:.3g} m tall"
             found.append(FormatError(text, Remedy("check_points")))
-    cost = read.misplaced(reading)
+    witness = None if read.witness is None else read.witness.certain
+    cost = replace(read, witness=witness).misplaced(reading)
     if not found and cost > PRIORS.most_off:
         places = np.concatenate([[*p.values()] for p in read.places(reading)], axis=1).reshape(-1, 3)
         middle = ", ".join(f"{x:.2f}" for x in np.nanmedian(places, axis=0))
-        is_filmed = read.witness is not None and read.witness.knows_frames
+        is_filmed = witness is not None and witness.knows_frames
         wanted, where = ("people", "their silhouettes") if is_filmed else ("points", "pictures")
         text = f"expected {wanted} that two cameras show, found {1 - cost:.0%} in {where}, around {middle} m"
         found.append(FormatError(text, Remedy("check_world_of_file")))

@@ -33,6 +33,13 @@ class FilmedPeople:
     """Whether a view shows anybody, (F, n_views)."""
     is_filmed: bool = True
     """Whether they are those of footage; else people may be anywhere in the pictures."""
+    is_whole: bool = True
+    """Whether silhouettes show people whole: against the median of a recording, only what moves is seen."""
+
+    @property
+    def certain(self) -> "FilmedPeople":
+        """Places where people must be: silhouettes that are whole, else anywhere in the pictures."""
+        return self if self.is_whole else _anywhere(self.cameras, len(self.shows_people))
 
     @property
     def n_views(self) -> int:
@@ -93,12 +100,16 @@ def film_people(session: Session, frames: IntArray) -> FilmedPeople:
     """
     found = _silhouettes(session, frames)
     if found is None:
-        cameras = tuple(c.camera for c in session.cameras)
-        anywhere = tuple(np.broadcast_to(np.uint8(0), (len(frames), c.height, c.width)) for c in cameras)
-        return FilmedPeople(cameras, anywhere, np.ones((len(frames), len(cameras)), dtype=bool), is_filmed=False)
+        return _anywhere(tuple(c.camera for c in session.cameras), len(frames))
     distances = tuple(np.stack([_distances(s.mask) for s in of_view]) for of_view in zip(*found, strict=True))
     shows = np.array([[not s.is_empty for s in views] for views in found])
-    return FilmedPeople(tuple(s.camera for s in found[0]), distances, shows)
+    is_whole = all(s.source != "recording" for views in found for s in views)
+    return FilmedPeople(tuple(s.camera for s in found[0]), distances, shows, is_whole=is_whole)
+
+
+def _anywhere(cameras: tuple[Camera, ...], n_frames: int) -> FilmedPeople:
+    distances = tuple(np.broadcast_to(np.uint8(0), (n_frames, c.height, c.width)) for c in cameras)
+    return FilmedPeople(cameras, distances, np.ones((n_frames, len(cameras)), dtype=bool), is_filmed=False)
 
 
 def _silhouettes(session: Session, frames: IntArray) -> list[tuple[ViewSilhouette, ...]] | None:

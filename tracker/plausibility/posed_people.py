@@ -20,6 +20,11 @@ class PosedPerson:
     knows_frames: bool = True
     """Whether they differ from frame to frame."""
 
+    @property
+    def certain(self) -> "PosedPerson":
+        """All of it."""
+        return self
+
     def costs(self, places: Places, shift: int = 0) -> Array:
         """Return how far joints lie from the known ones, (F,); see `readings.Witness`."""
         names = [name for name in places if name in self.places]

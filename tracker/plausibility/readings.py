@@ -39,6 +39,10 @@ class Witness(Protocol):
     def knows_frames(self) -> bool:
         """Whether it differs from frame to frame."""
 
+    @property
+    def certain(self) -> "Witness":
+        """The part of it that also tells by itself that people are elsewhere."""
+
     def costs(self, places: Places, shift: int = 0) -> Array:
         """Return how far a person is from it, (F,): mean truncated squares, 0 to 1; NaN where unknown.
 

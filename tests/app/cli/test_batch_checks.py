@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from clips import SIZE, encode
 from command_line import assert_refused
@@ -17,7 +18,10 @@ from tracker.formats.anipose import write_calibration
 @pytest.fixture
 def lab(tmp_path):
     """A calibration of two cameras, and their videos in a folder."""
-    cameras = [replace(c, name=name) for name, c in zip(("FRONT", "LEFT"), cameras_around(2, size=SIZE), strict=True)]
+    lens = np.array([[64.0, 0.0, 31.5], [0.0, 64.0, 23.5], [0.0, 0.0, 1.0]])
+    cameras = [
+        replace(c, name=name, K=lens) for name, c in zip(("FRONT", "LEFT"), cameras_around(2, size=SIZE), strict=True)
+    ]
     write_calibration(tmp_path / "Calib.toml", cameras)
     (tmp_path / "foot").mkdir()
     for camera in cameras:

@@ -31,7 +31,7 @@ def test_lines_of_progress(capsys):
 
 @pytest.mark.parametrize("option", [(), ("--json",)])
 def test_what_commands_print(run, monkeypatch, option):
-    monkeypatch.setattr("app.cli.info.summarize", lambda _: {"name": ODD, "cameras": []})
+    monkeypatch.setattr("app.cli.info.summarize", lambda *_: {"name": ODD, "cameras": []})
     monkeypatch.setattr("app.cli.info._format", lambda found: found["name"])
     status, out, _ = run("info", SAMPLE, "--no-check", *option)
     assert (status, out.count(PLAIN)) == (0, 1)
@@ -40,7 +40,7 @@ def test_what_commands_print(run, monkeypatch, option):
 
 
 def test_errors(run, monkeypatch):
-    def failing(_):
+    def failing(*_):
         raise TrackerError(f"expected a name, found {ODD}")
 
     monkeypatch.setattr("app.cli.info.summarize", failing)

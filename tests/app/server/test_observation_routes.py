@@ -71,7 +71,7 @@ def form(controller, tmp_path):
     session = controller.session
     points = seen(session, [walking(session.n_frames, step=(0.002, 0.0, 0.0))])
     folder = write_openpose(tmp_path / "found", session.camera_names, points)
-    return {"paths": str(folder), "name": "net", "people": [session.people[0].name]}
+    return {"paths": str(folder), "name": "net", "people": [session.people[0].name], "unusual": True}
 
 
 async def test_files_are_described_and_then_stored(controller, serve, form):
@@ -118,7 +118,7 @@ async def test_views_without_points_have_no_confidence(controller, serve, form, 
         ({"people": []}, "People"),
         ({"picture_size": [0, 480]}, "Picture size"),
         ({"confidence": 2}, "Confidence"),
-        ({"first_frame": -1}, "First frame"),
+        ({"first_frame": -10_000_001}, "First frame"),
         ({"format": "pickle"}, "format"),
     ],
 )

@@ -32,7 +32,7 @@ def request_of(controller, tmp_path):
     session = controller.session
     motion = walking(session.n_frames, step=(0.002, 0.0, 0.0))
     files = write_openpose(tmp_path / "found", session.camera_names, seen(session, [motion]))
-    return ImportRequest("openpose", (files,), tuple(p.name for p in session.people))
+    return ImportRequest("openpose", (files,), tuple(p.name for p in session.people), unusual=True)
 
 
 @pytest.fixture
