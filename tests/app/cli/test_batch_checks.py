@@ -59,7 +59,7 @@ def test_a_table_of_a_spreadsheet_program_is_read(lab, text, encoding):
 WRONG = {
     "gone,Calib.toml,foot/X.avi;foot/LEFT.avi,1.8": "gone: expected files and folders that exist, found none at {}",
     "cal,foot,foot/*.avi,1.8": "cal: ",
-    "tall,Calib.toml,foot/*.avi,180": "expected the height of a person of 0.6 to 2.3 metres, found 180; is it in centimetres? say 1.8",
+    "tall,Calib.toml,foot/*.avi,180": "person of 0.6 to 2.3 metres, found 180; is it in centimetres? say 1.8",
     "num,Calib.toml,foot/*.avi,tall": "line 5: expected a number as 'height', found 'tall'",
     "no,Calib.toml,foot/*.mov,1.8": "line 6: expected videos at 'foot/*.mov', found none",
     f"{'l' * 300},Calib.toml,foot/*.avi,1.8": "line 7: the name of a folder: expected a name of 1 to 100 characters",
