@@ -246,7 +246,7 @@ def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, po
             name, f"camera '{name}' has COLMAP's lens {lens[1]}, which OpenCV does not know; undistort the pictures"
         )
     numbers = dict(zip(words, _row(document, name, lens[1], " ".join(lens[4:]), len(words)), strict=True))
-    quaternion, translation = np.array(pose[:4], dtype=float), np.array(pose[4:], dtype=float)
+    *quaternion, x, y, z = _row(document, name, "pose", " ".join(pose), 7)
     if (R := rotation_of_quaternion(quaternion)) is None:
         found = f"a norm of {np.linalg.norm(quaternion):.3g}"
         raise refuse(document, name, "a unit quaternion", found, "export the file again")
@@ -257,7 +257,7 @@ def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, po
     order = _FISHEYE_ORDER if fisheye else _ORDER[: 8 if "k3" in numbers else 4]
     size = _row(document, name, "size", " ".join(lens[2:4]), 2)
     lens_of = [numbers.get(key, 0.0) for key in order]
-    found = _section(name, size, K, lens_of, rigid.transform(R, translation))
+    found = _section(name, size, K, lens_of, rigid.transform(R, np.array([x, y, z])))
     return found | {"fisheye": fisheye}
 
 

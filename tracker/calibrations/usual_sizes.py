@@ -75,4 +75,7 @@ def check_usual(number: float, kind: str, where: str, unit: str, error: type[Tra
         said = " or ".join(f"{number * _UNITS[word] / metres:.3g}" for word in others)
         asked = f"; is it in {' or '.join(others)}? say {said}"
     low, high = (f"{bound / metres:g}" for bound in usual)
-    raise error(f"{where} of {low} to {high} {unit}, found {number:g}{asked}", Remedy("any_size"))
+    remedy = Remedy("any_size")
+    if not np.isfinite(number):
+        asked, remedy = "; give a number", None
+    raise error(f"{where} of {low} to {high} {unit}, found {number:g}{asked}", remedy)

@@ -128,8 +128,9 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
         (["--camera", "left=missing.mp4"], ["'left'", "missing.mp4"]),
         (["--offset", "left=one"], ["--offset as NAME=VALUE", "'left=one'"]),
         (["--height", "tall"], ["--height", "'tall'"]),
-        (["--height", "17.5"], ["0.3 to 3 metres"]),
-        (["--height", "nan"], ["0.3 to 3 metres", "nan"]),
+        (["--height", "17.5"], ["0.6 to 2.3 metres", "--any-size"]),
+        (["--height", "nan"], ["0.6 to 2.3 metres", "found nan"]),
+        (["--height", "nan", "--any-size"], ["0.3 to 3 metres", "nan"]),
         (
             ["--offset", "left=" + "9" * 30],
             ["'left'", "an offset below its 6 frames", "check the footage"],
