@@ -36,6 +36,7 @@ from tracker.session.matching import (
     common_rate,
     footage_notes,
     match_footage,
+    shared_footage,
 )
 from tracker.session.rig_summary import summarize_rig
 from tracker.session.session import PALETTE, Person, Session, check_content, create_session
@@ -217,7 +218,9 @@ def check_parts(
             _source(request, cameras[name], footage[name], fps, n_frames).with_lost_in_footage(lost.get(name, ()))
             for name in names
         )
-        for sentence in (*chapters, *sentences, *_left_out(sources, n_frames), *footage_notes(footage, fps, whole)):
+        left_out = _left_out(sources, n_frames)
+        shared = shared_footage(paths)
+        for sentence in (*shared, *chapters, *sentences, *left_out, *footage_notes(footage, fps, whole)):
             note(sentence)
     finally:
         for f in footage.values():

@@ -46,11 +46,18 @@ def match_footage(
     missing = [n for n in names if n not in paths]
     if missing:
         raise SessionError(f"no video for camera {', '.join(missing)}", Remedy("give_footage", camera=missing[0]))
-    by_file: dict[Path, str] = {}
-    for name, path in paths.items():
-        if (other := by_file.setdefault(path.resolve(), name)) != name:
-            raise SessionError(f"cameras '{other}' and '{name}' have one video, {path}; give each camera its own")
     return paths
+
+
+def shared_footage(paths: Mapping[str, Path]) -> list[str]:
+    """Return a sentence for each camera that has the footage of another one, by the paths of all."""
+    first: dict[Path, str] = {}
+    pairs = [(first.setdefault(path.resolve(), name), name) for name, path in paths.items()]
+    return [
+        f"Cameras '{other}' and '{name}' have one video: check that each has its own."
+        for other, name in pairs
+        if other != name
+    ]
 
 
 def camera_name(video: Path) -> str:
