@@ -116,7 +116,7 @@ def _wrong_lengths(tables: Mapping[str, PictureTable], session: Session, base: i
     for name, table in tables.items():
         first, last = (int(table.numbers[0]), int(table.numbers[-1])) if len(table.numbers) else (0, -1)
         end = base + lengths[name] - 1
-        if (first, last) == (base, end) or (table.is_by_hand and base <= first <= last <= end):
+        if (first, last) == (base, end) or ((table.is_by_hand or table.is_of_video) and base <= first <= last <= end):
             continue
         problems.append(
             FormatError(

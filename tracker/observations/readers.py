@@ -258,6 +258,13 @@ _UNREAD: Sequence[ObservationLayout[Any]] = [
         ("LabelMe", "", "`shapes` and `imagePath`", _has("shapes", "imagePath"), "COCO"),
         ("VGG Image Annotator", "", "`_via_img_metadata`", _has("_via_img_metadata"), "COCO"),
         ("Datumaro", "", "`items` and `categories`", _has("items", "categories"), "COCO or CVAT's XML"),
+        (
+            "a plain array in JSON",
+            "",
+            "lists of numbers alone",
+            _is_text(".json", lambda head: "".join(head).replace(" ", "").startswith("[[[")),
+            "the joints in space by numpy.save, as an array (frames, joints, 3)",
+        ),
         ("PyTorch", "`.pt`, `.pth`", "", _ends(".pt", ".pth"), "CSV or JSON"),
         ("a video", "`.mp4`, `.avi`, `.mov`", "", _ends(".mp4", ".avi", ".mov"), "a detector's key points"),
     )
@@ -297,7 +304,10 @@ def find_files(paths: Sequence[Path], masks: bool = False) -> tuple[str, list[Fo
     (name, files), *others = found.items()
     if others:
         listed = " and ".join(f"{some[0][0].name} ({FORMATS[n].program})" for n, some in ((name, files), *others[:1]))
-        raise FormatError(f"expected files of one format, found {listed}; import them one after the other")
+        raise FormatError(
+            f"expected files of one format, found {listed}; import them one after the other, or leave out those that "
+            "hold no points"
+        )
     if masks and name not in MASK_FORMATS:
         raise FormatError(
             f"expected masks among the files, found {FORMATS[name].program}; export PNG files or COCO segmentations"

@@ -125,7 +125,10 @@ def _assembled(tables: Sequence[MarkerTable], n_frames: int, source: str) -> tup
     """Return the names of the points, those that are numbers in their order, and the points of all people by frame."""
     names = [*dict.fromkeys(name for table in tables for name in table.names)]
     if all(re.fullmatch("0|[1-9][0-9]{0,2}", name) for name in names):
-        names = [*map(str, range(1 + max(map(int, names))))]
+        numbers = sorted(map(int, names))
+        # Caliscope numbers hands and faces from 100, 200 and so on; other points that are missing are filled in.
+        body = numbers if 99 in numbers else [n for n in numbers if n < 100] or numbers
+        names = [*map(str, [*range(1 + body[-1]), *numbers[len(body) :]])]
     check_size((n_frames, len(tables), len(names), 3), source)
     joints_world = np.full((n_frames, len(tables), len(names), 3), np.nan)
     for k, table in enumerate(tables):
@@ -141,10 +144,22 @@ def _skeleton(names: tuple[str, ...], given: JointMap | None, source: str) -> tu
     Raises:
         FormatError: no convention is known.
     """
-    if names != tuple(map(str, range(len(names)))):
+    if names[0] != "0" or not all(map(str.isdecimal, names)):
         return names, given or guess_joint_map(names, source)
-    found = given if given is not None and given.points else joint_map_of_size(len(names), source)
-    return (found.points if len(found.points) == len(names) else names), given or found
+    n_body = next((k for k, name in enumerate(names) if name != str(k)), len(names))
+    if n_body in (75, 543, 553):  # MediaPipe's body, before hands and perhaps a face of 468 or 478 points
+        n_body = 33
+    try:
+        found = given if given is not None and given.points else joint_map_of_size(n_body, source)
+    except FormatError as error:
+        if not source.startswith("xyz_"):
+            raise
+        named = f"{Path(source).stem}_labelled.csv"
+        raise FormatError(
+            f"{error} (import {named} if there is one, in which Caliscope names them)", error.remedy
+        ) from error
+    n_named = len(found.points)
+    return (found.points + names[n_named:] if n_named in (n_body, len(names)) else names), given or found
 
 
 def _outside(placed: MarkerTable, where: str, n_frames: int, is_chosen: bool) -> tuple[list[FormatError], list[str]]:

@@ -9,6 +9,7 @@ from joint_files import write_joints
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.errors import FormatError, SessionError
+from tracker.formats.joint_maps import read_joint_map
 from tracker.formats.motion_csv import MotionRow, write_motion_csv
 from tracker.formats.trc import write_trc
 from tracker.observations.importing import plan_import, store_import
@@ -319,7 +320,32 @@ def test_numbered_points_that_appear_late_or_never(session, tmp_path):
     assert np.nanmax(np.abs(found.observations.joints.joints_world[:, 0] - points)) < 1e-5
 
 
+@pytest.mark.parametrize("kind", ["caliscope", "npy"])
+def test_hands_after_a_body_without_names(session, tmp_path, kind):
+    body = read_joint_map("BlazePose_33")
+    points = np.full((N, 543 if kind == "npy" else 121, 3), np.nan)
+    points[:, [*range(33), *range(100, 121)]] = np.arange(54 * 3).reshape(54, 3) / 100
+    for joint, marker in body.markers.items():
+        if joint in BODY_25.markers:
+            points[:, body.points.index(marker)] = TRUTH[:, BODY_25.points.index(BODY_25.markers[joint])]
+    found = planned(session, write_joints(kind, tmp_path, range(points.shape[1]), points[None]), unit_m=1.0)
+    assert not found.problems
+    assert found.observations.point_names[:33] == body.points
+    assert "120" in found.observations.point_names
+    wrist = found.observations.point_names.index("left_wrist")
+    assert np.nanmax(np.abs(found.observations.joints.joints_world[:, 0, wrist] - points[:, 15])) < 1e-5
+
+
+def test_numbers_of_no_skeleton_in_a_table_of_caliscope(session, tmp_path):
+    path = write_joints("caliscope", tmp_path, range(14), TRUTH[None, :, :14]).rename(tmp_path / "xyz_HOLISTIC.csv")
+    found = problems(planned(session, path, unit_m=1.0))
+    assert "found 14 (import xyz_HOLISTIC_labelled.csv if there is one, in which Caliscope names them)" in found
+
+
 def test_files_of_other_programs_are_named(session, tmp_path):
+    (tmp_path / "joints.json").write_text(json.dumps(TRUTH.tolist()))
+    with pytest.raises(FormatError, match=r"is of a plain array in JSON, which is not read; export .* numpy\.save"):
+        planned(session, tmp_path / "joints.json")
     (tmp_path / "walk.fbx").write_bytes(b"Kaydara FBX Binary")
     with pytest.raises(FormatError, match=r"is of FBX, which is not read; export BVH"):
         planned(session, tmp_path / "walk.fbx")

@@ -61,6 +61,27 @@ def test_programs(session, tmp_path, program):
     assert np.allclose(found.points.confidence[found.points.is_known], expected)
 
 
+def test_sleaps_table_lists_pictures_with_somebody(session, tmp_path):
+    write_sleap_csv(tmp_path / "f", session.camera_names, list(POINTS), seen(session, [TRUTH]))
+    for path in (tmp_path / "f").iterdir():
+        head, *rows = path.read_text().splitlines()
+        path.write_text("\n".join([head, *rows[2:]]))
+    found = imported(session, tmp_path / "f")
+    assert np.isnan(in_space(session, found)[:2]).all()
+    assert np.abs(in_space(session, found)[2:] - TRUTH[2:]).max() < 1e-3
+
+
+def test_tables_of_deeplabcut_from_a_spreadsheet_and_beside_metrics(session, tmp_path):
+    write_eks(tmp_path / "f", session.camera_names, list(POINTS), seen(session, [TRUTH]))
+    path = tmp_path / "f" / f"multicam_{session.camera_names[0]}_results.csv"
+    (tmp_path / "f" / "metrics.csv").write_text(",left_wrist\n0,1\n")
+    with pytest.raises(FormatError, match="or leave out those that hold no points"):
+        planned(session, tmp_path / "f")
+    path.write_text(path.read_text().replace(",", ";"))
+    with pytest.raises(FormatError, match="found semicolons between cells; export it again, with commas"):
+        planned(session, path)
+
+
 @pytest.mark.parametrize("program", [name for name in WRITERS if name not in ("eks", "hand labels")])
 def test_two_people(session, tmp_path, program):
     others = walking(N, start=(0.6, 0.8, 0.0))

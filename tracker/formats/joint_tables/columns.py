@@ -20,7 +20,8 @@ Triple: TypeAlias = tuple[int, int, int]
 Points: TypeAlias = Mapping[tuple[str, str], Triple]
 """Columns of points by person and name; either is empty where a column has it."""
 COORDINATE = re.compile(
-    r"(?:(?P<name>.+?)[ _.:-])?(?P<axis>[xyz])(?:_coord)?(?:[ _(\[]+(?P<unit>mm|cm|m|in|ft)[)\]]?)?", re.I | re.S
+    r"(?:(?:body_)?(?P<name>.+?)[ _.:-])?(?P<axis>[xyz])(?:_coord)?(?:[ _(\[]+(?P<unit>mm|cm|m|in|ft)[)\]]?)?",
+    re.I | re.S,
 )
 _FRAMES = ("frame", "frames", "frame#", "frame_number", "frame_index", "sync_index", "fnum", "index", "")
 """Columns of frames, the surest first: an index without a name is only that of the table."""

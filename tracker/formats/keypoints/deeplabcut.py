@@ -40,7 +40,7 @@ class _Column(NamedTuple):
 
 def is_deeplabcut(head: Sequence[str]) -> bool:
     """Return whether the first lines of a CSV are those of DeepLabCut's key points in pictures."""
-    words = [[cell.strip().strip('"').lower() for cell in line.split(",")] for line in head]
+    words = [[cell.strip().strip('"').lower() for cell in re.split("[,;]", line)] for line in head]
     return bool(words) and words[0][0] == "scorer" and not any(row[0] == "coords" and "z" in row for row in words)
 
 
@@ -139,9 +139,10 @@ def _read_head(lines: Iterator[tuple[int, str]], where: str) -> tuple[list[_Colu
         head[row[1][0].strip().lower()] = [cell.strip() for cell in row[1]]
         row = _next_row(lines, where)
     if not {"bodyparts", "coords"} <= head.keys() or len({len(cells) for cells in head.values()}) != 1:
+        instead = "semicolons between cells" if row is not None and ";" in row[1][0] else "none"
         raise FormatError(
             f"{where}: expected the rows scorer, bodyparts and coords of equal length at its start, found "
-            f"{', '.join(head) or 'none'}; export it again"
+            f"{', '.join(head) or instead}; export it again, with commas between cells"
         )
     n_index = 1
     while n_index < len(head["coords"]) and not head["coords"][n_index]:

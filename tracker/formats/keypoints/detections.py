@@ -168,7 +168,7 @@ def read_sleap_csv(path: Path) -> PictureTable:
         people.setdefault(int(picture), []).append(PicturePerson(points, cells[head.index("track")][:200]))
     if not people:
         raise FormatError(f"{where} has no rows of numbers; export it again")
-    return table_of_people(people, where, names)
+    return table_of_people(people, where, names, is_of_video=True)
 
 
 def is_sleap_csv(head: Sequence[str]) -> bool:

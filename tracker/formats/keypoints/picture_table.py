@@ -36,6 +36,8 @@ class PictureTable:
     None if it names nobody."""
     is_by_hand: bool = False
     """Whether a person set the points: they are certain, and only some pictures have any."""
+    is_of_video: bool = False
+    """Whether numbers are those of the frames of a video, from 0, of which those with somebody are listed."""
 
     @property
     def is_found(self) -> Mask:

@@ -146,6 +146,22 @@ def test_bones_and_markers_of_motive(tmp_path):
     assert np.allclose(table.points, [[[0.04, 0.05, 0.06], [0.1, 0.11, 0.12]]])
 
 
+def test_a_body_of_freemocap_loses_its_prefix(tmp_path):
+    points = "body_nose_x,body_nose_y,body_nose_z,right_hand_wrist_x,right_hand_wrist_y,right_hand_wrist_z"
+    (tmp_path / "walk_by_trajectory.csv").write_text(
+        f'timestamp,timestamp_by_camera,{points}\n0.0,"{{0: 0.0, 1: 0.1}}",1,2,3,4,5,6\n0.1,"{{0: 0.1}}",1,2,3,4,5,6\n'
+    )
+    ((_, table),) = read(tmp_path / "walk_by_trajectory.csv", 1.0)
+    assert table.names == ("nose", "right_hand_wrist")
+    assert table.points[1].tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_panoptics_older_joints_are_named(tmp_path):
+    (tmp_path / "body3DScene_00000140.json").write_text('{"bodies": [{"id": 0, "joints15": [1, 2, 3, 0.5]}]}')
+    with pytest.raises(FormatError, match="expected 19 joints of CMU Panoptic, found none; take the folder"):
+        read(tmp_path)
+
+
 def test_a_name_of_two_groups(tmp_path):
     (tmp_path / "a.csv").write_text("frame,model,keypoint,x_m,y_m,z_m\n0,left,a,1,2,3\n0,right,a,7,2,3\n")
     ((_, table),) = read(tmp_path / "a.csv")
