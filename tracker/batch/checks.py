@@ -17,7 +17,7 @@ from tracker.session.session import Session
 
 
 def problems(plan: BatchPlan, ended: Collection[str] = (), tick: Callable[[], None] = lambda: None) -> list[Problem]:
-    """Return a problem for each recording that cannot be tracked, and for each row of the table that cannot be read.
+    """Return all problems: of the plan, of the rows of its table, and of each recording.
 
     Args:
         plan: of the batch.
@@ -26,39 +26,58 @@ def problems(plan: BatchPlan, ended: Collection[str] = (), tick: Callable[[], No
     """
     found = [*plan.problems]
     for recording in plan.recordings:
-        try:
-            if recording.name not in ended:
-                _check(recording)
-        except TrackerError as error:
-            found.append(Problem(recording.name, error))
+        if recording.name not in ended:
+            found += (Problem(recording.name, error) for error in _faults(recording))
         tick()
     return found
 
 
-def _check(recording: PlannedRecording) -> None:
-    """Check a recording with its settings.
-
-    Raises:
-        TrackerError: its session cannot be opened or made, its footage is missing, or a setting does not fit.
-    """
-    settings = recording.settings
+def _faults(recording: PlannedRecording) -> list[TrackerError]:
+    """Return all reasons why a recording cannot be tracked with its settings."""
+    settings, found = recording.settings, list[TrackerError]()
     for name in settings.export or ():
         if name not in FORMATS:
-            raise TrackerError(f"expected formats among {', '.join(FORMATS)}, found '{name}'; correct 'export'")
+            found.append(TrackerError(f"expected formats among {', '.join(FORMATS)}, found '{name}'; correct 'export'"))
+    try:
+        session = _session(recording)
+    except TrackerError as error:
+        return [*found, error]
+    everyone, stride = people_of(session, None), settings.stride or 1
+    for check in (
+        lambda: people_of(session, settings.people),
+        lambda: frames_of(session, frames_to_track(settings, session)),
+        lambda: track_plan(
+            everyone, range(0, session.n_frames, stride), settings.method or "chamfer", settings.options, None
+        ),
+        lambda: _check_keypoints(settings.keypoints, session),
+    ):
+        try:
+            check()
+        except TrackerError as error:
+            found.append(error)
+    return found
+
+
+def _session(recording: PlannedRecording) -> Session:
+    """Return the session of a recording, or the one that its footage makes.
+
+    Raises:
+        TrackerError: it cannot be opened or made, or its footage is missing.
+    """
     if recording.footage is None or Path(recording.session).is_dir():
         session = open_session(recording.session)
         require_files(session)
-    else:
-        _require_files(recording.footage)
-        session = check_parts(recording.footage.request(recording.session)).session
-    people = people_of(session, settings.people)
-    frames = frames_of(session, frames_to_track(settings, session))[:: settings.stride or 1]
-    track_plan(people, frames, settings.method or "chamfer", settings.options, settings.keypoints)
+        return session
+    _require_files(recording.footage)
+    return check_parts(recording.footage.request(recording.session)).session
+
+
+def _check_keypoints(name: str | None, session: Session) -> None:
     known = list_observations(session)
-    if settings.keypoints is not None and settings.keypoints not in known:
+    if name is not None and name not in known:
         raise TrackerError(
             f"expected the name of imported observations as 'keypoints', among {', '.join(known) or 'none'}, found "
-            f"'{settings.keypoints}'; import them, or correct it"
+            f"'{name}'; import them, or correct it"
         )
 
 

@@ -106,7 +106,7 @@ class BatchPlan:
     n_frames: Mapping[str, int] = field(default_factory=dict)
     """Number of frames to track of each recording, as far as it is known."""
     problems: tuple[Problem, ...] = ()
-    """Of the rows of the table that cannot be used."""
+    """Of patterns, of settings and of rows of the table."""
     unread: tuple[str, ...] = ()
     """Names of the columns of the table that are not read."""
 
@@ -119,7 +119,7 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
         out: folder of the batch, where sessions of the table are made.
 
     Raises:
-        TrackerError: a file is malformed, no recording is found, or a path has control characters: scripts have it.
+        TrackerError: the plan is malformed or names no recording, or its path has control characters: scripts have it.
     """
     path = path.resolve()
     for name, place in (("the plan", path), ("the folder of the batch", out)):
@@ -128,46 +128,54 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
     table = Table({}, (), ()) if row.table is None else read_table(path.parent / row.table)
     folders = dict(zip(table.footage, file_stems([*table.footage]), strict=True))
     of_table = {name: (out / "sessions" / folders[name], footage) for name, footage in table.footage.items()}
-    by_pattern = _by_pattern(row, path)
-    if twice := sorted(by_pattern.keys() & of_table.keys()):
-        raise TrackerError(f"plan {path}: expected another name in the table than the session '{twice[0]}'; change it")
+    by_pattern, problems = _by_pattern(row, path)
+    problems += table.problems
+    for name in sorted(by_pattern.keys() & of_table.keys()):
+        error = TrackerError("expected another name in the table than that of a session; change it")
+        problems.append(Problem(f"plan {path}, '{name}'", error))
     found = {**by_pattern, **of_table}
-    unknown = sorted(row.recordings.keys() - found.keys())
-    if unknown and not table.problems:  # which hide the names of their rows
-        raise TrackerError(
-            f"plan {path}: expected settings of recordings among {', '.join(sorted(found))[:300] or 'none'}, found "
-            f"'{unknown[0]}'; correct the name"
-        )
-    if not found and not table.problems:
+    if not found and not problems:
         raise TrackerError(
             f"plan {path}: expected sessions or a table with recordings, found none; 'sessions' takes paths such as "
             f"lab/*/session, of folders with {SESSION_FILE}"
         )
+    if not problems:  # which hide names
+        known = ", ".join(sorted(found))[:300]
+        for name in sorted(row.recordings.keys() - found.keys()):
+            error = TrackerError(f"expected settings of recordings among {known}, found '{name}'; correct the name")
+            problems.append(Problem(f"plan {path}", error))
     chosen = []
     for name, (session, footage) in sorted(found.items()):
-        inherited = _inherited(path.parent, session, row.settings)
-        settings = row.recordings.get(name, Settings()).over(inherited)
+        own = row.recordings.get(name, Settings())
+        try:
+            settings = own.over(_inherited(path.parent, session, row.settings))
+        except TrackerError as error:
+            settings = own.over(row.settings)
+            if not settings.skip:
+                problems.append(Problem(name, error))
         if not settings.skip:
             chosen.append(PlannedRecording(name, str(session), settings, footage))
     sessions = {r.name: _session_of(r) for r in chosen}
     people = {r.name: names for r in chosen if (names := _people_of(r, sessions[r.name]))}
     n_frames = {r.name: _n_frames(r, s) for r in chosen if (s := sessions[r.name]) is not None}
-    return BatchPlan(path, tuple(chosen), row.freeze_bodies, people, n_frames, table.problems, table.unread)
+    return BatchPlan(path, tuple(chosen), row.freeze_bodies, people, n_frames, tuple(problems), table.unread)
 
 
-def _by_pattern(row: _PlanFile, path: Path) -> dict[str, tuple[Path, Footage | None]]:
-    """Return the session folders that the patterns of a plan name."""
-    found = dict[str, tuple[Path, Footage | None]]()
+def _by_pattern(row: _PlanFile, path: Path) -> tuple[dict[str, tuple[Path, Footage | None]], list[Problem]]:
+    """Return the session folders that the patterns of a plan name, and problems of patterns."""
+    found, problems = dict[str, tuple[Path, Footage | None]](), list[Problem]()
     for pattern in row.sessions:
-        folders = [p for p in matches(path.parent, pattern) if p.is_dir()]
-        if not folders:
-            raise TrackerError(f"plan {path}: expected session folders at '{pattern}', found none; correct the path")
-        for folder in folders:
-            whole = folder.resolve()
-            check(str(whole), FilePath, f"plan {path}", TrackerError)
-            inside = whole.is_relative_to(path.parent)
-            found[(whole.relative_to(path.parent) if inside else whole).as_posix()] = (whole, None)
-    return found
+        try:
+            folders = [p.resolve() for p in matches(path.parent, pattern) if p.is_dir()]
+            if not folders:
+                raise TrackerError(f"expected session folders at '{pattern}', found none; correct the path")
+            for whole in folders:
+                check(str(whole), FilePath, "a path", TrackerError)
+                inside = whole.is_relative_to(path.parent)
+                found[(whole.relative_to(path.parent) if inside else whole).as_posix()] = (whole, None)
+        except TrackerError as error:
+            problems.append(Problem(f"plan {path}", error))
+    return found, problems
 
 
 def _inherited(top: Path, session: Path, settings: Settings) -> Settings:

@@ -6,11 +6,14 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from fnmatch import fnmatch
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
 from tracker.errors import TrackerError
+from tracker.files import entries_below, paths_in
 from tracker.session.assemble import NewSession
 from tracker.text_files import DOCUMENT_BYTES, LOST, TextKind, read_text
 from tracker.validation import FilePath, FileStem, check
@@ -89,17 +92,23 @@ def read_table(path: Path) -> Table:
 
 
 def matches(base: Path, pattern: str) -> list[Path]:
-    """Return the files and folders that a pattern such as `foot/*.avi` names, in order.
+    """Return the files and folders that a pattern such as `foot/*.avi` names, in order; `**` is any folder below.
 
     Raises:
-        TrackerError: it is no pattern.
+        TrackerError: a folder cannot be read, or has too much in it.
     """
-    if Path(pattern).is_absolute():
-        base, pattern = Path(Path(pattern).anchor), str(Path(pattern).relative_to(Path(pattern).anchor))
-    try:
-        return sorted(base.glob(pattern))
-    except (ValueError, NotImplementedError) as error:
-        raise TrackerError(f"expected a path or a pattern such as lab/*/session, found '{pattern}': {error}") from error
+    found = {base}
+    for part in Path(pattern).parts:
+        folders = [path for path in found if os.path.isdir(path)]
+        if part == "**":
+            below = (e for f in folders for e in entries_below(f, TrackerError, passes_unreadable=True))
+            found = {*folders, *(Path(e.path) for e in below if e.is_dir(follow_symlinks=False))}
+        elif set("*?[") & {*part}:
+            accepts = partial(fnmatch, pat=part)
+            found = {path for folder in folders for path in paths_in(folder, TrackerError, accepts)}
+        else:
+            found = {path for folder in folders if os.path.exists(path := folder / part)}
+    return sorted(found)
 
 
 def _cells(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:

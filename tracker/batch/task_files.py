@@ -142,7 +142,9 @@ def read_file(path: Path, declaration: type[T]) -> T | None:
     except FileNotFoundError:
         return None
     except (OSError, msgspec.DecodeError, RecursionError) as error:
-        raise TrackerError(f"{path} is damaged: {error}", Remedy("do_again")) from error
+        raise TrackerError(
+            f"{path} is damaged: {getattr(error, 'strerror', None) or error}", Remedy("do_again")
+        ) from error
 
 
 def damaged(damage: str, remedy: Remedy | None) -> Result:

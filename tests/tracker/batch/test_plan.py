@@ -5,6 +5,8 @@ import pytest
 from bodies import MODELS
 from stored_motions import store_motion
 
+from tracker import files
+from tracker.batch.checks import problems
 from tracker.batch.manifest import Manifest
 from tracker.batch.plan import FOLDER_FILE, PlannedRecording, plain, read_plan
 from tracker.errors import TrackerError
@@ -62,11 +64,9 @@ def test_a_table_names_recordings_without_sessions(tmp_path):
     ("text", "words"),
     [
         ("", "found none; 'sessions' takes paths"),
-        ('sessions = ["x*"]', "session folders at 'x\\*', found none"),
         ('sessions = ["lab/a"]\nspeed = 3', "speed"),
         ('sessions = ["lab/a"]\nsettings = {stride = 0}', "stride"),
         ('sessions = ["lab/a"]\nsettings = {frames = "3"}', "frames as A:B"),
-        ('sessions = ["lab/a"]\nrecordings = {b = {stride = 2}}', "among lab/a, found 'b'"),
         ('table = "none.csv"', "none.csv not found"),
         ('table = "bad.csv"', "expected columns name"),
     ],
@@ -91,3 +91,41 @@ def test_another_plan_is_refused_in_the_folder_of_a_batch(lab):
         Manifest.create(read(lab, 'sessions = ["lab/a", "lab/b"]'), lab / "out")
     with pytest.raises(TrackerError, match="found no tasks"):
         Manifest.load(lab / "lab")
+
+
+def test_all_faults_of_a_plan_and_its_recordings_are_found_at_once(lab):
+    (lab / "lab" / "old" / FOLDER_FILE).write_text("[settings]\nspeed = 3\n")
+    plan = read(
+        lab,
+        """
+        sessions = ["lab/a", "x*", "y", "lab/old/c", "lab/b"]
+        settings.options = {speed = 3}
+        recordings."lab/a" = {people = ["nobody"], frames = "0:99", keypoints = "k", export = ["e"]}
+        recordings."lab/b" = {skip = true}
+    """,
+    )
+    found = [(p.name.removeprefix(f"plan {lab}/"), str(p.error)) for p in problems(plan)]
+    expected = {
+        "plan.toml": ["session folders at 'x*', found none", "session folders at 'y', found none"],
+        "lab/old/c": ["speed", "not found"],
+        "lab/a": ["formats among", "not found"],
+    }
+    for name, words in expected.items():
+        own = [error for place, error in found if place == name]
+        assert all(any(w in error for error in own) for w in words), (name, own)
+    assert {name for name, _ in found} == expected.keys()
+
+
+def test_settings_of_recordings_that_are_not_there_are_all_named(lab):
+    plan = read(lab, 'sessions = ["lab/a"]\nrecordings = {b = {stride = 2}, c = {skip = true}}')
+    assert [str(p.error)[-40:] for p in plan.problems] == [f"among lab/a, found '{n}'; correct the name" for n in "bc"]
+
+
+def test_patterns_look_through_folders_within_bounds(lab, monkeypatch):
+    (lab / "lab" / "old" / "loop").symlink_to(lab / "lab")
+    (lab / "file").touch()
+    assert [r.name for r in read(lab, 'sessions = ["lab/**/c", "**/b"]').recordings] == ["lab/b", "lab/old/c"]
+    assert read(lab, 'sessions = ["lab/old/../?"]').problems == ()
+    assert len(read(lab, 'sessions = ["file/*", "\\u0000"]').problems) == 2
+    monkeypatch.setattr(files, "LIMITS", files.WalkLimits(entries=5))
+    assert "expected at most 5 files and folders" in str(read(lab, 'sessions = ["**/c"]').problems[0].error)
