@@ -1,5 +1,6 @@
 """Make a session folder of a simulated recording, with the truth about it."""
 
+import hashlib
 import secrets
 import shutil
 from collections.abc import Callable, Sequence
@@ -108,7 +109,8 @@ def simulate(out: str | Path, simulation: Simulation = _DEFAULT, progress: Progr
         _shoot(sources, backdrops, figures, poses, simulation, progress)
         _write_truth(temporary, cast, models, poses, fps)
         people = [Person(r.name, m, color) for r, m, color in zip(cast, presets, cycle(PALETTE), strict=False)]
-        save_session(Session(temporary, out.name, float(fps), n_frames, tuple(sources), tuple(people)))
+        uid = hashlib.sha256(repr(simulation).encode()).hexdigest()[:32]  # the same arguments, the same recording
+        save_session(Session(temporary, out.name, float(fps), n_frames, tuple(sources), tuple(people), uid=uid))
         if out.exists():
             out.rmdir()
         temporary.rename(out)

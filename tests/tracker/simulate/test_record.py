@@ -110,6 +110,7 @@ def test_progress_counts_images(tmp_path):
 @pytest.mark.slow
 def test_two_people_have_truth_each_and_masks_by_person(tmp_path):
     session = simulate(tmp_path / "s", Simulation(**(ARGUMENTS | {"n_frames": 1}), scene="tango", masks=True))
+    assert session.uid, "copies can be merged"
     assert [p.name for p in session.people] == ["man", "woman"]
     assert len({p.color for p in session.people}) == 2
     for k, person in enumerate(session.people):
