@@ -19,7 +19,7 @@ from typing import Any
 import msgspec
 
 from tracker.errors import TrackerError
-from tracker.files import IrregularFileError, open_regular
+from tracker.files import open_regular
 
 MAX_NESTING = 32
 """Deepest nesting of brackets and longest dotted key of a TOML file."""
@@ -217,9 +217,9 @@ def _reading(path: Path, kind: TextKind) -> Generator[None, None, None]:
         yield
     except FileNotFoundError as error:
         raise kind.error(f"{kind.name} {path} not found; check the path") from error
-    except IrregularFileError as error:
-        raise kind.error(f"{kind.name} {path} cannot be read: {error.strerror}; {kind.remedy}") from error
-    except (OSError, ValueError) as error:  # wrong UTF-8 is a ValueError
+    except OSError as error:
+        raise kind.error(f"{kind.name} {path} cannot be read: {error.strerror or error}; {kind.remedy}") from error
+    except ValueError as error:  # wrong UTF-8, too
         raise kind.error(
             f"{kind.name} {path} cannot be read: expected UTF-8 text, found: {error}; {kind.remedy}"
         ) from error

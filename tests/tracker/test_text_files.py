@@ -104,7 +104,7 @@ def test_a_byte_order_mark_is_no_text(tmp_path):
             "latin",
             "odd file .*latin cannot be read: expected UTF-8 text, found: .*( position 3|bytes in line 1).*; mend it",
         ),
-        (".", "cannot be read: expected UTF-8 text, found: .*Is a directory"),
+        (".", "cannot be read: Is a directory; mend it"),
         ("x" * 400, "cannot be read: .*File name too long"),
         ("a\0b", "cannot be read: expected a path without null bytes, found one; check it"),
     ],
