@@ -5,6 +5,7 @@ are followed to the end.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 
@@ -96,9 +97,11 @@ def _resected(seen: SeenJoints, index: int, lens: Camera, joints: Array, sigma_p
         )
     rays = lens.rays(seen.px[:, index][at])
     slopes, threshold = rays[:, :2] / rays[:, 2:], OUTLIER_SIGMAS * sigma_px / float(lens.K[0, 0])
-    ok, rotation, shift, _ = cv2.solvePnPRansac(
-        joints[at], slopes, np.eye(3), None, reprojectionError=threshold, flags=cv2.SOLVEPNP_SQPNP
-    )
+    ok, rotation, shift = False, np.zeros(3), np.zeros(3)
+    with suppress(cv2.error):  # joints of one place, all others apart from their rays
+        ok, rotation, shift, _ = cv2.solvePnPRansac(
+            joints[at], slopes, np.eye(3), None, reprojectionError=threshold, flags=cv2.SOLVEPNP_SQPNP
+        )
     if not ok:
         raise CalibrationError(
             f"expected camera '{lens.name}' to agree with the others on where the person is, found that it does not; "

@@ -78,8 +78,8 @@ class AdjustedJoints:
 
     @property
     def sigma_px(self) -> float:
-        """Standard deviation of a joint along each axis of a picture, px."""
-        return float(np.median(self.fit.sigmas_px))
+        """Standard deviation of a joint along each axis of a picture, px; at least that of rounding to whole pixels."""
+        return max(float(np.median(self.fit.sigmas_px)), 12**-0.5)
 
     @property
     def focal_sigmas(self) -> Array:

@@ -113,3 +113,11 @@ def test_doubtful_joints_and_means_of_joints_do_not_count():
     assert seen.is_seen[:, 1, 2].all()
     assert np.all(np.isin([0, 1], seen.observations().cameras))
     assert 2 not in seen.observations().groups % seen.n_joints
+
+
+@pytest.mark.slow
+def test_exact_key_points_of_joints_that_stand_still_are_refused_in_a_sentence():
+    cameras, points = rig(), dancing(12)
+    points[:, ::2] = points[0, ::2]
+    with pytest.raises(CalibrationError, match="expected key points that fit one arrangement of the cameras"):
+        calibrate_by_person(observed(cameras, points, 0.0, 0.0), blanks(cameras), STATURE_M)
