@@ -92,8 +92,11 @@ def numbered_groups(files: Sequence[Found], cameras: Sequence[str]) -> list[File
                     f"expected the number of the picture in the file's name, as in CAMERA_000000000012_keypoints.json, "
                     f"found {path.name}; rename it or leave it out"
                 )
+            folder = path.parent
+            if _is_object(folder, cameras):
+                folder, name = folder.parent, PictureName(f"{folder.name} {name.label}".strip(), name.number)
             camera = _camera_of(_picture_labels([name], path, root, cameras), cameras)
-            group = groups.setdefault((path.parent, camera or name.label), {})
+            group = groups.setdefault((folder, camera or name.label), {})
             if name in group:
                 raise FormatError(
                     f"expected one file for each picture, found {group[name][0].name} and {path.name}; leave one out"
@@ -106,6 +109,12 @@ def numbered_groups(files: Sequence[Found], cameras: Sequence[str]) -> list[File
         labels = _picture_labels(pictures, first, root, cameras)
         out.append(FileGroup(tuple(group[p][0] for p in pictures), labels, root, pictures))
     return out
+
+
+def _is_object(folder: Path, cameras: Sequence[str]) -> bool:
+    """Return whether a folder in that of a camera is named after an object, as `001` or `obj_2` of SAM 2."""
+    is_numbered = re.fullmatch(r"(?:obj(?:ect)?(?:_?id)?[_-]?)?[0-9]+", folder.name, re.I) is not None
+    return is_numbered and not _camera_of((folder.name,), cameras) and bool(_camera_of((folder.parent.name,), cameras))
 
 
 def _picture_labels(pictures: Sequence[PictureName], path: Path, root: Path, cameras: Sequence[str]) -> tuple[str, ...]:

@@ -145,7 +145,8 @@ def test_two_files_of_one_picture_are_two_people(session, tmp_path):
     assert len(list((session.folder / "observations" / "mp" / "files").rglob("*.json"))) == 2 * 4 * N
 
 
-def test_masks_of_two_objects_are_two_values(tmp_path):
+@pytest.mark.parametrize("name", ["mask_{k:05d}_obj{value}.png", "00{value}/{k:05d}.png"])
+def test_masks_of_two_objects_are_two_values(tmp_path, name):
     session = make_session(tmp_path / "s", 3, people=("ann", "bob"), size=SIZE)
     masks = person_masks(3, 4, people=2)
     for v, camera in enumerate(session.camera_names):
@@ -153,11 +154,14 @@ def test_masks_of_two_objects_are_two_values(tmp_path):
         for k in range(3):
             for value in (1, 2) if k else (2,):  # the first object is not in the first picture
                 one = np.where(masks[k, v] == value, 255, 0).astype(np.uint8)
-                image_of(one).save(tmp_path / "m" / camera / f"mask_{k:05d}_obj{value}.png")
+                path = tmp_path / "m" / camera / name.format(k=k, value=value)
+                path.parent.mkdir(exist_ok=True)
+                image_of(one).save(path)
     plan = plan_import(session, ImportRequest("sam", (tmp_path / "m",), ("ann", "bob"), values={"ann": 1, "bob": 2}))
     assert not plan.problems
     assert plan.format == "masks"
-    assert any("mask_obj1 = 1, mask_obj2 = 2" in note for note in plan.notes)
+    objects = "mask_obj1 = 1, mask_obj2 = 2" if "obj" in name else "001 = 1, 002 = 2"
+    assert any(objects in note for note in plan.notes)
     assert np.array_equal(plan.mask("cam1", 2, SIZE), masks[2, 1])
     assert set(np.unique(plan.mask("cam1", 0, SIZE)).tolist()) == {0, 2}
 
