@@ -114,9 +114,10 @@ def judged(at: Path, reference: Path) -> Iterator[tuple[str, list[str]]]:
     yield f"{session.name}", cells([found], truth)
     points, random = found.imported, np.random.default_rng(0)
     rounds = [injected(points, random) for _ in range(ROUNDS)]
-    yield f"{session.name}, injected", cells([judge_person("person", p, found.tracked, None) for p in rounds], truth)
+    again = [judge_person("person", p, found.tracked, None, session.fps) for p in rounds]
+    yield f"{session.name}, injected", cells(again, truth)
     true = replace(points, joints_world=_true(points, truth.joints))
-    yield f"{session.name}, true joints", cells([judge_person("person", true, found.tracked, None)], truth)
+    yield f"{session.name}, true joints", cells([judge_person("person", true, found.tracked, None, session.fps)], truth)
 
 
 class _Silent:

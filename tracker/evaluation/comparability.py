@@ -1,7 +1,6 @@
 """Notice that an estimate and its reference are not of the same recording, axes, units or origin."""
 
 from collections.abc import Sequence
-from math import gcd
 
 import numpy as np
 
@@ -9,13 +8,11 @@ from tracker.errors import Remedy
 from tracker.evaluation.metrics import LOST_M, best_rigid, gather_joints
 from tracker.formats.file_axes import axes_matrix
 from tracker.formats.joint_maps import LIMB_JOINTS, JointMap
-from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.plausibility.body_likelihood import bones
-from tracker.plausibility.posed_people import PosedPerson
+from tracker.plausibility.posed_people import read_beside
 from tracker.plausibility.readings import Reading, ReadPoints
 
 APART_M = 1.0
@@ -52,13 +49,10 @@ def distance_note(
     apart = _median_m(estimate[both], truth[both])
     own = Reading(JointMap("the reference", {name: name for name in names}), axes)
     known = {name: estimate[:, i] for i, name in enumerate(names)}
-    in_file = (truth @ axes_matrix(axes))[:, None]  # the inverse of a rotation is its transpose
-    rate, step = estimated.rate, gcd(*np.diff(frames).tolist()) or 1
-    at = np.asarray(frames[0] if len(frames) else 0) + step * np.arange(len(frames))
-    vertical, stature = floor_plane(up, None).normal, bones(known).stature
-    stature = stature if np.isfinite(stature) else DEFAULT_HEIGHT_M
-    read = ReadPoints(names, in_file, at, (stature,), vertical, rate, PosedPerson(known))
-    if apart <= APART_M:
+    in_file = truth @ axes_matrix(axes)  # the inverse of a rotation is its transpose
+    vertical, is_near = floor_plane(up, None).normal, apart <= APART_M
+    read = read_beside(known, in_file, frames, vertical, estimated.rate, ignores_offsets=is_near)
+    if is_near:
         return _lag_note(read, own)
     why, remedy = _explanation(read, own, estimate[both], truth[both])
     return f"the reference lies {apart:.2f} m from the poses (median over the joints){why}", remedy

@@ -11,14 +11,17 @@ from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.formats.joint_maps import JointMap
 from tracker.geometry.arrays import Array
+from tracker.geometry.ground_plane import floor_plane
 from tracker.judging import reasons
 from tracker.judging.best_motion import best_motion
-from tracker.judging.lags import lag_frames
 from tracker.judging.verdicts import LIMBS, probability_beyond, with_doubt
 from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.chain import Sink
 from tracker.pipeline.keypoint_evidence import read_points
+from tracker.plausibility.posed_people import read_beside
+from tracker.plausibility.readings import Reading
 from tracker.session.session import Session
 from tracker.store.stored_poses import StoredPose
 from tracker.tracking.pose_errors import point_covariances
@@ -132,12 +135,12 @@ def judge(
             f"expected observations of somebody in the session, found none in '{name}'; import them again"
         )
     best = best_motion(session, observer, name, tuple(points), settings, sink)
-    return [judge_person(session.people[i].name, points[i], best[i], observer, report) for i in points]
+    return [judge_person(session.people[i].name, points[i], best[i], observer, session.fps, report) for i in points]
 
 
 def judge_person(
     person: str, imported: BodyPoints, tracked: Mapping[int, StoredPose], observer: Observer | None,
-    report: Report = unreported,
+    fps: float, report: Report = unreported,
 ) -> Judgement:  # fmt: skip
     """Judge the imported joints of a person by tracked poses.
 
@@ -146,6 +149,7 @@ def judge_person(
         imported: the joints.
         tracked: poses by frame, with the errors of their points.
         observer: shows where the person is, for the reasons; None for reasons without.
+        fps: frames per second.
         report: shows progress. An exception that it raises ends the work.
     """
     frames = [k for k in sorted(tracked) if k < len(imported.joints_world)]
@@ -171,8 +175,16 @@ def judge_person(
     offsets, spread = _constant(imported, tracked, frames, steps)
     points = [[tracked[k].body.model.point_names.index(n) for n in imported.names] for k in frames]
     places = np.array([tracked[k].body.joint_centers_world[p] for k, p in zip(frames, points, strict=True)])
-    lag = lag_frames(imported.joints_world, places, np.array(frames)) if frames else 0
+    lag = _lag_frames(imported, places, frames, fps) if frames else 0
     return Judgement(person, out, offsets, spread, imported, tracked, lag)
+
+
+def _lag_frames(imported: BodyPoints, places: Array, frames: Sequence[int], fps: float) -> int:
+    """Return by how many frames joints lag behind tracked ones, (F, N, 3); 0 if that is not clear."""
+    known = dict(zip(imported.names, np.moveaxis(places, 1, 0), strict=True))
+    up = floor_plane("z", None).normal  # no matter for lags
+    read = read_beside(known, imported.joints_world[frames], frames, up, fps, ignores_offsets=True)
+    return -round(read.best_shift(Reading(JointMap("the import", {n: n for n in known}))))
 
 
 def _steps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:

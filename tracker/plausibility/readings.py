@@ -15,7 +15,7 @@ from tracker.formats.file_axes import axes_matrix, axis_conventions
 from tracker.formats.joint_maps import JointMap
 from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.observations.shifts import vertex
+from tracker.observations.shifts import SAMPLES, vertex
 from tracker.observations.triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import (
     PRIORS,
@@ -174,7 +174,10 @@ class ReadPoints:
         return [r for nats, r in sorted(found, key=lambda f: -f[0]) if nats > best - CLEAR_NATS]
 
     def _scales(self, given: Reading) -> list[float]:
-        """Return the factors that give people usual heights; the given one alone if it does."""
+        """Return the factors that give people usual heights; the given one alone if it does, or if none does.
+
+        A height that nobody has competes with none: a person who is too small is within the silhouettes more easily.
+        """
         statures = np.array([b.stature for b in self.bones(given)]) / given.scale
         expected = np.array(self.statures_m)[np.isfinite(statures)]
         statures = statures[np.isfinite(statures)]
@@ -187,14 +190,14 @@ class ReadPoints:
         units = {*METRES_BY_WORD.values()}
         scales = sorted({round(a / b, 9) for a in units for b in units})
         usual = [s for s in scales if is_near(s).any() or any(map(USUAL_SIZES["person"].has, s * statures))]
-        return sorted({given.scale, *usual})
+        return usual or [given.scale]
 
     def best_shift(self, reading: Reading) -> float:
         """Return by how many frames of the session the recording is later than the points; 0 if that is not clear.
 
-        At most a quarter of the stretch is found. Between two frames a parabola tells.
+        It is at most a quarter of the stretch and `SAMPLES` steps. A parabola places it between two frames.
         """
-        most = len(self.points) // 4
+        most = min(len(self.points) // 4, SAMPLES)
         if self.witness is None or not self.witness.knows_frames or not most:
             return 0.0
         costs = np.array([self._costs(replace(reading, shift=s)) for s in range(-most, most + 1)])

@@ -51,3 +51,24 @@ def test_a_reference_that_fits():
     assert length_note(20, 20) is None
     assert length_note(20, None) is None
     assert "20 frames and the reference 25" in length_note(20, 25)
+
+
+def walk(frames, offset_m=0.0, lag=0):
+    """Joints that go on at 1.2 m/s at 25 Hz and swing, some frames late and a constant offset ahead."""
+    t = (np.asarray(frames) - lag) / 25
+    swing = 0.25 * np.sin(6 * t[:, None] + np.arange(12))[..., None] * [0.0, 1.0, 0.3]
+    places = np.random.default_rng(2).normal(0, 0.3, (12, 3)) + 1.2 * t[:, None, None] * [0.0, 1.0, 0.0]
+    return MarkerTable(LIMB_JOINTS, np.asarray(frames), t, places + swing + [0.0, offset_m, 0.0], 25.0)
+
+
+def test_a_constant_offset_is_no_lag():
+    """Joints of another convention lie some centimetres ahead of a person who walks, on every frame."""
+    assert distance_note(walk(range(60)), walk(range(60), offset_m=0.08), range(60)) is None
+
+
+@pytest.mark.parametrize("frames", [range(60), [k for k in range(90) if k not in (0, 3)]])
+def test_a_lag_of_a_reference_is_named(frames):
+    """Frames that are missing at the start move nothing: steps are counted in frames."""
+    note = distance_note(walk(frames), walk(frames, offset_m=0.05, lag=2), frames)
+    assert note is not None
+    assert "2 frames" in note[0]

@@ -46,7 +46,7 @@ def judged(joints, tracked):
     points = BodyPoints(
         NAMES, joints, np.empty((len(joints), 0, len(NAMES), 2)), np.empty((len(joints), 0, len(NAMES)))
     )
-    return judge_person("ann", points, tracked, None)
+    return judge_person("ann", points, tracked, None, 25.0)
 
 
 def doubts(judgement):
