@@ -8,7 +8,9 @@ from rigs import cameras, ring
 
 from tracker.formats.joint_maps import known_joint_maps
 from tracker.formats.model_toml import load_model
+from tracker.plausibility.examine import contradictions
 from tracker.plausibility.filmed_people import FilmedPeople
+from tracker.plausibility.readings import Reading, ReadPoints
 from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.population import POPULATION
@@ -17,6 +19,8 @@ from tracker.simulate.people.skeleton import altered_model
 FPS, N_FRAMES = 25.0, 50
 SKELETONS = {m.name: m for m in known_joint_maps() if m.points}
 UP = np.array([0.0, 0.0, 1.0])
+WRONG_M = 0.05
+"""Mean distance of the joints of limbs from which points that are stored are wrong: twice the error of a network."""
 _SCENES = ("exercise", "dance", "reach_and_cross")
 _PARTS = (("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("hip", "knee", 0.08), ("knee", "ankle", 0.05))
 _BONES = [(f"{side}_{a}", f"{side}_{b}", r) for side in ("left", "right") for a, b, r in _PARTS]
@@ -101,3 +105,25 @@ def filmed(person, seed, n_views=4):
             of_view[k] = np.minimum(np.round(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3)), 255)
         distances.append(of_view)
     return FilmedPeople(tuple(views), tuple(distances), np.ones((n_frames, n_views), dtype=bool))
+
+
+class Case:
+    """A person whose true points a file has, in the order of a skeleton."""
+
+    def __init__(self, seed):
+        self.person, self.height_m = simulated_person(seed)
+        self.film = filmed(self.person, seed)
+        self.skeleton = [*SKELETONS.values()][seed % len(SKELETONS)]
+        self.clean = skeleton_points(self.person, self.skeleton)
+        self.points = detected(self.clean, seed)
+        self.rng = np.random.default_rng((seed, 3))
+        self.stated_m = self.height_m * float(np.exp(0.05 * self.rng.normal()))
+
+    def found(self, points, skeleton=None, axes="x,y,z", in_space=True):
+        """What speaks against points that are read as a skeleton, by default their own."""
+        given = Reading(skeleton or self.skeleton, axes)
+        same_size = [m for m in SKELETONS.values() if len(m.points) == len(given.joint_map.points)]
+        maps = [given.joint_map, *(m for m in same_size if m.name != given.joint_map.name)]
+        frames = np.arange(len(points))
+        read = ReadPoints((), points[:, None], frames, (self.stated_m,), UP, FPS, self.film)
+        return contradictions(read, given, maps, 0, in_space)

@@ -2,38 +2,12 @@
 
 import numpy as np
 import pytest
-from simulated_joints import FPS, N_FRAMES, SKELETONS, UP, detected, filmed, simulated_person, skeleton_points
+from simulated_joints import N_FRAMES, SKELETONS, WRONG_M, Case, detected, skeleton_points
 
 from tracker.formats.file_axes import axes_matrix, axis_conventions, is_mirrored
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.plausibility.examine import contradictions
-from tracker.plausibility.readings import Reading, ReadPoints
 
-WRONG_M = 0.05
-"""Mean distance of the joints of limbs from which points that are stored are wrong: twice the error of a network."""
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 40))]
-
-
-class Case:
-    """A person whose true points a file has, in the order of a skeleton."""
-
-    def __init__(self, seed):
-        self.person, self.height_m = simulated_person(seed)
-        self.film = filmed(self.person, seed)
-        self.skeleton = [*SKELETONS.values()][seed % len(SKELETONS)]
-        self.clean = skeleton_points(self.person, self.skeleton)
-        self.points = detected(self.clean, seed)
-        self.rng = np.random.default_rng((seed, 3))
-        self.stated_m = self.height_m * float(np.exp(0.05 * self.rng.normal()))
-
-    def found(self, points, skeleton=None, axes="x,y,z", in_space=True):
-        """What speaks against points that are read as a skeleton, by default their own."""
-        given = Reading(skeleton or self.skeleton, axes)
-        same_size = [m for m in SKELETONS.values() if len(m.points) == len(given.joint_map.points)]
-        maps = [given.joint_map, *(m for m in same_size if m.name != given.joint_map.name)]
-        frames = np.arange(len(points))
-        read = ReadPoints((), points[:, None], frames, (self.stated_m,), UP, FPS, self.film)
-        return contradictions(read, given, maps, 0, in_space)
 
 
 @pytest.fixture(scope="module", params=SEEDS)
