@@ -198,8 +198,10 @@ def _others(read: ReadPoints, given: Reading, best: Sequence[Reading]) -> list[F
         text = "expected knees, elbows and feet that point forwards, found that they do with left for right"
         found.append(FormatError(text, Remedy("exchange_sides")))
     if first.scale != given.scale:
-        text = f"expected a person of a usual height, found one {bones.stature:.4g} m tall; times {first.scale:.4g} "
-        text += f"the points fit one of {bones.stature * first.scale:.2f} m"
+        stature = min(read.bones(first), key=lambda b: b.nats).stature  # a body of another size has other proportions
+        before, factor = stature * given.scale / first.scale, first.scale / given.scale
+        text = f"expected a person of a usual height, found one {before:.4g} m tall; times {factor:.4g} "
+        text += f"the points fit one of {stature:.2f} m"
         found.append(FormatError(text, Remedy("read_in_unit")))
     if first.axes != given.axes:
         found.append(_other_axes(read, given, best))
