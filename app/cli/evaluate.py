@@ -37,10 +37,10 @@ class EvaluateArguments:
     axes: str = "x,y,z"
     """the file's axes in the session's order, such as x,-z,y."""
     first_frame: OptionalWhole = None
-    """frame of the session, from 0, at which the first row of the TRC file lies; by default what the file says."""
+    """frame of the session, from 0, at which the first row of the joints lies; by default what the file says."""
     clock: OptionalClock = None
-    """frames: each Frame# of the TRC file is a frame of the session; time: rows lie at their Time. By default DataRate
-    and Time tell, and a contradiction is an error."""
+    """frames: each frame number of the joints is a frame of the session; time: rows lie at their Time. By default
+    DataRate and Time are compared, and a contradiction is an error."""
     align: Literal["none", "rigid-all"] = "none"
     """rigid-all moves the whole reference onto the estimate first."""
     json: bool = False
@@ -57,9 +57,9 @@ def command(arguments: Annotated[EvaluateArguments, tyro.conf.arg(name="")]) -> 
 
     at = load_target(arguments.session, arguments.person, several=False)
     path, known = arguments.reference, placement(at.session, arguments.first_frame, arguments.clock)
-    if path.suffix.lower() != ".trc" and (known.first_frame is not None or known.clock is not None):
-        raise TrackerError(f"expected --first-frame and --clock with a TRC file, found '{path}'; leave them out")
     reference = read_reference(path, at.session, at.people[0], arguments.joint_map, arguments.axes, known)
+    if reference.motion is not None and (known.first_frame is not None or known.clock is not None):
+        raise TrackerError(f"expected --first-frame and --clock with joints, found poses in '{path}'; leave them out")
     found = evaluate(at, reference, arguments.frames, arguments.align, arguments.axes, arguments.stride)
     print(format_json(found) if arguments.json else _format(found))
 

@@ -1,6 +1,7 @@
-"""References for an evaluation: joints of a TRC file, poses of a CSV table, or another session."""
+"""References for an evaluation: joints of any program, poses of a CSV table, or another session."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -12,10 +13,13 @@ from tracker.errors import FormatError, SessionError
 from tracker.evaluation.metrics import Motion, PoseDoubt, joints_of_poses
 from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import joints_of, read_joint_map
+from tracker.formats.joint_tables.subjects import by_subject
 from tracker.formats.model_toml import PRESETS, load_model
-from tracker.formats.pose_csv import PoseTable, read_pose_table
-from tracker.formats.trc import MarkerTable, read_trc
+from tracker.formats.pose_csv import PoseTable, is_pose_table, read_pose_table
+from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
+from tracker.observations.readers import FORMATS, SPACE_FORMATS, find_files
+from tracker.observations.space import name_points
 from tracker.session.clocks import Clock, Placement, place_rows
 from tracker.session.folder import SESSION_FILE
 from tracker.session.session import Session, load_session
@@ -39,21 +43,32 @@ class Reference(NamedTuple):
 def read_joints(
     path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z", known: Placement | None = None
 ) -> MarkerTable:
-    """Read the joints of a TRC file under the project's names, in a session's frames and axes, metres.
+    """Read the joints of one person under the project's names, in a session's frames and axes, metres.
 
     Args:
-        path: the file.
+        path: the file, of any layout of joints that `observations.readers` lists.
         fps: frame rate of the session, 1/s.
         joint_map: TOML file with its naming convention; guessed by default.
         axes: which of its axes are the session's x, y, z.
         known: facts of the session and choices of the user that place the rows; see `placement`.
 
     Raises:
-        FormatError: the file or the map is malformed, no convention fits, or rows may lie at several frames.
+        FormatError: the file or the map is malformed, no convention fits, the file has several people, or rows may lie
+            at several frames.
     """
-    mapping = read_joint_map(joint_map) if joint_map is not None else None
-    placed = place_rows(remap_axes(read_trc(path), axes), f"TRC file {path}", fps, known)
-    return joints_of(placed, str(path), mapping)
+    given = read_joint_map(joint_map) if joint_map is not None else None
+    layout, files = find_files([path])
+    where = f"{FORMATS[layout].program} file {path}"
+    if layout not in SPACE_FORMATS:
+        raise FormatError(f"expected joints in space, found the {where}; import it, or choose another file")
+    read = SPACE_FORMATS[layout].read([file for file, _ in files], None, fps)
+    asked = tuple(given.markers.values()) if given else ()
+    tables = [own for _, table in read for own in by_subject(table, asked)]
+    if len(tables) != 1:
+        raise FormatError(f"{where}: expected the joints of one person, found those of {len(tables)}; keep one in it")
+    placed = place_rows(remap_axes(tables[0], axes), where, fps, known)
+    names, mapping = name_points(placed.names, given, str(path))
+    return joints_of(replace(placed, names=names), str(path), mapping if names != placed.names else given)
 
 
 def placement(session: Session, first_frame: int | None = None, clock: Clock | None = None) -> Placement:
@@ -70,27 +85,27 @@ def read_reference(
     axes: str = "x,y,z",
     known: Placement | None = None,
 ) -> Reference:
-    """Read a reference of any kind: a TRC file, a pose table (CSV), or a session folder.
+    """Read a reference of any kind: joints of any program, a pose table (CSV), or a session folder.
 
     The poses of a table belong to the body model in `NAME_model.toml` beside `NAME.csv`, as `simulate` writes it.
     Without that file they belong to the preset that the table names, at its height. Otherwise the person's own model is
     used, and only the angles are reliable.
 
-    The rows of a TRC file are placed by `known`, by default with the session's facts alone.
+    The rows of joints are placed by `known`, by default with the session's facts alone.
 
     Raises:
-        FormatError: the file is malformed or of an unknown kind, the body of its poses is unknown, or the rows of a TRC
-            file may lie at several frames.
+        FormatError: the file is malformed or of an unknown kind, the body of its poses is unknown, or rows of joints
+            may lie at several frames.
         SessionError: the reference session has no such person.
     """
     model = session.people[person].model
     if path.is_dir() or path.name == SESSION_FILE:
         return _of_session(path if path.is_dir() else path.parent, session, person)
-    if path.suffix.lower() == ".csv":
+    if not path.exists():
+        raise FormatError(f"expected a reference as joints, a pose table or a session folder, found no file '{path}'")
+    if is_pose_table(path):
         motion = _of_table(read_pose_table(path), path, model)
         return Reference(joints_of_poses(*motion, session.fps), motion, max(motion.poses) + 1)
-    if path.suffix.lower() != ".trc":
-        raise FormatError(f"expected a reference as .trc, .csv or session folder, found '{path}'")
     joints = read_joints(path, session.fps, joint_map, axes, known or placement(session))
     begins_later = joints.frames[0] > 0 and joints.frames[-1] < session.n_frames
     return Reference(joints, None, None if begins_later else int(joints.frames[-1]) + 1)

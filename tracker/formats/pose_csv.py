@@ -95,6 +95,11 @@ def write_pose_table(
     write_text_atomic(Path(path), "\n".join(lines) + "\n")
 
 
+def is_pose_table(path: Path) -> bool:
+    """Return whether a file is a table of poses, which begins with comments; tables of joints have none."""
+    return path.suffix.lower() == ".csv" and next(read_lines(path, _KIND), "").startswith("#")
+
+
 def read_pose_table(path: str | Path) -> PoseTable:
     """Read a table of poses.
 

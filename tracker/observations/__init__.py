@@ -17,6 +17,7 @@ __all__ = [
     "request",
     "shifts",
     "sides",
+    "space",
     "stored",
     "stored_files",
     "stored_masks",

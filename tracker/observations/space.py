@@ -60,7 +60,7 @@ def read_space(
         notes += [f"{path.name}: {note}" for note in (*placed.notes, *gaps)]
     names, joints_world = _assembled(tables, session.n_frames, str(paths[0]))
     try:
-        names, joint_map = _skeleton(names, given, paths[0].name)
+        names, joint_map = name_points(names, given, paths[0].name)
     except FormatError as error:
         joint_map = JointMap("unknown", {})
         problems.append(error)
@@ -138,7 +138,7 @@ def _assembled(tables: Sequence[MarkerTable], n_frames: int, source: str) -> tup
     return tuple(names), joints_world
 
 
-def _skeleton(names: tuple[str, ...], given: JointMap | None, source: str) -> tuple[tuple[str, ...], JointMap]:
+def name_points(names: tuple[str, ...], given: JointMap | None, source: str) -> tuple[tuple[str, ...], JointMap]:
     """Return the names of the points and their convention; points that are numbered from 0 are known by their number.
 
     Raises:

@@ -185,3 +185,15 @@ def test_a_pose_keeps_the_body_it_was_made_with(copy):
     )
     np.testing.assert_allclose(joints.points[[0, 2], at], [before, before])
     np.testing.assert_allclose(joints.points[1, at], after)
+
+
+def test_joints_of_other_layouts_are_read(sample_folder, copy, tmp_path):
+    """Import and evaluation read the same files; a table of poses is known by its comments."""
+    table, path = read_trc(sample_folder / "truth.trc"), tmp_path / "joints.csv"
+    head = ["frame", *(f"{name}_{axis}_mm" for name in table.names for axis in "xyz")]
+    rows = [",".join(map(str, [k, *(1000 * p).ravel()])) for k, p in enumerate(table.points)]
+    path.write_text("\n".join([",".join(head), *rows]) + "\n")
+    expected = read_joints(sample_folder / "truth.trc", copy.fps)
+    found = read_reference(path, copy, 0).joints
+    assert found.names == expected.names
+    np.testing.assert_allclose(found.points, expected.points, atol=1e-5)
