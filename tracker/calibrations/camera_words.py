@@ -5,7 +5,7 @@ change the meaning and are not understood are refused by name, never left out.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -34,6 +34,7 @@ from tracker.calibrations.lens_words import (
 from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
 from tracker.validation import quoted
 
 Section: TypeAlias = dict[str, Any]
@@ -185,6 +186,29 @@ def unusable(name: str, reason: str = "") -> Section:
     """Return a camera that has nothing, or that cannot be used for a reason, a sentence without its end."""
     keys = ("size", "matrix", "distortions", "rotation", "translation")
     return {"name": name, "fisheye": False} | dict.fromkeys(keys) | ({"refusal": reason} if reason else {})
+
+
+def posed(T_camera_world: Array | None) -> Section:
+    """Return the pose of a camera, (4, 4), as plain data; None for none."""
+    if T_camera_world is None:
+        return {"rotation": None, "translation": None}
+    return {"rotation": T_camera_world[:3, :3].tolist(), "translation": T_camera_world[:3, 3].tolist()}
+
+
+def pinhole(name: str | None, size: Sequence[float] | None, K: Any, distortions: Sequence[float], T: Array) -> Section:
+    """Return a camera whose lens is no fisheye, with its pose from world to camera, (4, 4)."""
+    lens = {"matrix": np.asarray(K).tolist(), "distortions": list(distortions), "fisheye": False}
+    return {"name": name, "size": size} | lens | posed(T)
+
+
+def each(camera: Callable[[Document, str, Mapping[str, Any]], Section]) -> Callable[[Document], dict[str, Section]]:
+    """Return the reader of all cameras of a file, from that of one, whose name is that of the file if it has none."""
+
+    def read(document: Document) -> dict[str, Section]:
+        found = ((name, camera(document, name or document.stem, row)) for name, row in document.rows)
+        return once(document, ((name, section | {"name": name or None}) for name, section in found))
+
+    return read
 
 
 def once(document: Document, cameras: Iterable[tuple[str, Section]]) -> dict[str, Section]:

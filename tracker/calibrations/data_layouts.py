@@ -4,14 +4,22 @@ The direction of a pose other than `X_camera = R X_world + t` is that of the too
 `export_json` of multical, `Calibration::saveCamerasParams` of MC-Calib, and the camchain of Kalibr's manual.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import ChainMap
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from tracker.calibrations.camera_matrices import homogeneous, is_transposed, plain_array
-from tracker.calibrations.camera_words import Section, camera_groups, known_values, once, plain_text, section_of
+from tracker.calibrations.camera_words import (
+    Section,
+    camera_groups,
+    known_values,
+    once,
+    plain_text,
+    posed,
+    section_of,
+)  # fmt: skip
 from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -35,11 +43,6 @@ def read_words(document: Document) -> dict[str, Section]:
                 yield name, section | ({"name": name} if name else {})
 
     return once(document, cameras())
-
-
-def is_panoptic(document: Document) -> bool:
-    """Return whether the key of CMU Panoptic is there."""
-    return isinstance(document.data, dict) and "calibDataSource" in document.data
 
 
 def is_aniposelib(document: Document) -> bool:
@@ -77,40 +80,21 @@ def _has_extrinsics(document: Document) -> bool:
 # --- Kalibr ---------------------------------------------------------------------------------------------------------
 
 
-def is_kalibr(document: Document) -> bool:
-    """Return whether a group has the model and the intrinsics of a camera, as Kalibr names them."""
-    return any(map(_is_kalibr, document.groups.values()))
-
-
-def _is_kalibr(group: Mapping[str, Any]) -> bool:
-    return "camera_model" in group and "intrinsics" in group
-
-
 def read_kalibr(document: Document) -> dict[str, Section]:
     """Read a camchain: `T_cn_cnm1` maps from the camera before; the first camera defines the world."""
     found: dict[str, Section] = {}
     T_camera_world: Array | None = np.eye(4)
-    for i, (name, group) in enumerate((n, g) for n, g in document.groups.items() if _is_kalibr(g)):
+    cameras = {n: g for n, g in document.groups.items() if {"camera_model", "intrinsics"} <= g.keys()}
+    for i, (name, group) in enumerate(cameras.items()):
         step = homogeneous(group.get("T_cn_cnm1"))
         if i:
             T_camera_world = None if step is None or T_camera_world is None else step @ T_camera_world
         lens = {key: value for key, value in group.items() if not key.startswith("T_")}
-        found[name] = section_of(lens, name, document) | {"name": name} | _posed(T_camera_world)
+        found[name] = section_of(lens, name, document) | {"name": name} | posed(T_camera_world)
     return found
 
 
-def _posed(T_camera_world: Array | None) -> Section:
-    if T_camera_world is None:
-        return {"rotation": None, "translation": None}
-    return {"rotation": T_camera_world[:3, :3].tolist(), "translation": T_camera_world[:3, 3].tolist()}
-
-
 # --- multical -------------------------------------------------------------------------------------------------------
-
-
-def is_multical(document: Document) -> bool:
-    """Return whether the poses lie in a group of their own beside the cameras."""
-    return {"cameras", "camera_poses"} <= document.groups.keys()
 
 
 def read_multical(document: Document) -> dict[str, Section]:
@@ -119,19 +103,12 @@ def read_multical(document: Document) -> dict[str, Section]:
     poses |= document.groups["camera_poses"]
     found: dict[str, Section] = {}
     for name, lens in document.groups["cameras"].items():
-        group = {
-            key: value for half in (lens, poses.get(name)) if isinstance(half, dict) for key, value in half.items()
-        }
+        group = ChainMap(*(half for half in (poses.get(name), lens) if isinstance(half, dict)))
         found[name] = section_of(group, name, document) | {"name": name}
     return found
 
 
 # --- MC-Calib -------------------------------------------------------------------------------------------------------
-
-
-def is_mc_calib(document: Document) -> bool:
-    """Return whether a camera has MC-Calib's matrix of its pose."""
-    return any("camera_pose_matrix" in group for group in document.groups.values())
 
 
 def read_mc_calib(document: Document) -> dict[str, Section]:
@@ -152,27 +129,11 @@ def read_mc_calib(document: Document) -> dict[str, Section]:
         T_world_camera = homogeneous(group.get("camera_pose_matrix"))
         lens = {key: value for key, value in group.items() if key != "camera_pose_matrix"}
         pose = None if T_world_camera is None else rigid.inverse(T_world_camera)
-        found[name] = section_of(lens, name, document) | {"name": name} | _posed(pose)
+        found[name] = section_of(lens, name, document) | {"name": name} | posed(pose)
     return found
 
 
 # --- JARVIS and DANNCE: row vectors ---------------------------------------------------------------------------------
-
-
-def is_jarvis(document: Document) -> bool:
-    """Return whether cameras have JARVIS's words."""
-    return any({"intrinsicMatrix", "R", "T"} <= group.keys() for group in _row_groups(document).values())
-
-
-def is_dannce(document: Document) -> bool:
-    """Return whether cameras have DANNCE's words."""
-    return any({"K", "RDistort", "r", "t"} <= group.keys() for group in _row_groups(document).values())
-
-
-def _row_groups(document: Document) -> dict[str, Mapping[str, Any]]:
-    if isinstance(document.data, list):  # `params` of MATLAB
-        return {f"camera{i + 1}": row for i, row in enumerate(document.data) if isinstance(row, dict)}
-    return dict(document.groups) or ({"": document.data} if isinstance(document.data, dict) else {})
 
 
 def read_row_vectors(document: Document) -> dict[str, Section]:
@@ -180,8 +141,10 @@ def read_row_vectors(document: Document) -> dict[str, Section]:
 
     A camera whose matrix stands upright was rewritten by a person; it is read as it is.
     """
-    found = {}
-    for name, group in _row_groups(document).items():
+    rows, found = document.rows, dict[str, Section]()
+    if isinstance(document.data, list):  # `params` of MATLAB
+        rows = [(f"camera{i + 1}", row) for i, (_, row) in enumerate(rows)]
+    for name, group in rows:
         section = section_of(group, name or document.stem, document)
         if is_transposed(section["matrix"]):
             section["matrix"] = plain_array(section["matrix"]).T.tolist()
@@ -193,11 +156,6 @@ def read_row_vectors(document: Document) -> dict[str, Section]:
 
 
 # --- OpenPose -------------------------------------------------------------------------------------------------------
-
-
-def is_openpose(document: Document) -> bool:
-    """Return whether the file is one camera with OpenPose's words."""
-    return isinstance(document.data, dict) and {"CameraMatrix", "Intrinsics"} <= document.data.keys()
 
 
 def read_openpose(document: Document) -> dict[str, Section]:

@@ -12,27 +12,12 @@ from typing import Any
 import numpy as np
 
 from tracker.calibrations.camera_matrices import plain_array
-from tracker.calibrations.camera_words import Section, once, section_of
+from tracker.calibrations.camera_words import Section, each, once, section_of
 from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
 from tracker.validation import quoted
 
-_VOXELPOSE = {"R", "T", "fx", "fy", "cx", "cy", "k", "p"}
-_GOOGLE = {"orientation", "position", "focal_length", "principal_point"}
-_MVHUMANNET = {"rotation", "translation", "focal_length", "image_center"}
 _WILDTRACK = {"intr_": {"camera_matrix", "distortion_coefficients"}, "extr_": {"rvec", "tvec"}}
-
-
-def _rows(document: Document) -> list[tuple[str, dict[str, Any]]]:
-    """Return the groups of a file, or the rows of its list, with their names; of a lone camera the file itself."""
-    data = document.data
-    if isinstance(data, list):
-        return [(str(row.get("name", i)), row) for i, row in enumerate(data) if isinstance(row, dict)]
-    return list(document.groups.items()) or ([("", data)] if isinstance(data, dict) else [])
-
-
-def _have(document: Document, keys: set[str]) -> bool:
-    return any(keys <= row.keys() for _, row in _rows(document))
 
 
 def _posed(section: Section, R: Any, position: Any) -> Section:
@@ -44,12 +29,13 @@ def _posed(section: Section, R: Any, position: Any) -> Section:
     return section | {"rotation": R.tolist(), "translation": (-R @ position).tolist()}
 
 
+def _focal(f: Any, ratio: Any) -> list[float] | None:
+    """Return focal lengths from the horizontal one and the ratio of the vertical one to it; None without both."""
+    f, ratio = plain_array(f), plain_array(1.0 if ratio is None else ratio)
+    return [float(f), float(f * ratio)] if f.shape == ratio.shape == () else None
+
+
 # --- XRMoCap --------------------------------------------------------------------------------------------------------
-
-
-def is_xrmocap(document: Document) -> bool:
-    """Return whether the file is one camera of XRPrimer."""
-    return isinstance(document.data, dict) and {"extrinsic_r", "extrinsic_t", "world2cam"} <= document.data.keys()
 
 
 def read_xrmocap(document: Document) -> dict[str, Section]:
@@ -76,41 +62,25 @@ def read_xrmocap(document: Document) -> dict[str, Section]:
 # --- VoxelPose, Google ----------------------------------------------------------------------------------------------
 
 
-def is_voxelpose(document: Document) -> bool:
-    """Return whether cameras have a radial lens `k` and a tangential one `p` beside their numbers."""
-    return _have(document, _VOXELPOSE)
+@each
+def read_voxelpose(document: Document, name: str, row: Mapping[str, Any]) -> Section:
+    """Read a camera whose `T` is its place, in millimetres."""
+    words = {"radial": row.get("k"), "tangential": row.get("p")}
+    words |= {key: row.get(key) for key in ("fx", "fy", "cx", "cy", "width", "height")}
+    return _posed(section_of(words, name, document), row.get("R"), row.get("T"))
 
 
-def read_voxelpose(document: Document) -> dict[str, Section]:
-    """Read cameras whose `T` is their place, in millimetres."""
-    found = {}
-    for name, group in once(document, _rows(document)).items():
-        words = {"radial": group.get("k"), "tangential": group.get("p")}
-        words |= {key: group.get(key) for key in ("fx", "fy", "cx", "cy", "width", "height")}
-        section = section_of(words, name or document.stem, document)
-        found[name] = _posed(section, group.get("R"), group.get("T")) | {"name": name or None}
-    return found
-
-
-def is_google(document: Document) -> bool:
-    """Return whether cameras have an orientation and a position beside their lens."""
-    return _have(document, _GOOGLE)
-
-
-def read_google(document: Document) -> dict[str, Section]:
-    """Read cameras of Google's light fields and of Nerfies: `orientation` maps world to camera."""
-    found = {}
-    for name, group in once(document, _rows(document)).items():
-        lens = {key: value for key, value in group.items() if key not in ("orientation", "position")}
-        focal, ratio = plain_array(group.get("focal_length")), plain_array(group.get("pixel_aspect_ratio", 1.0))
-        if focal.shape == ratio.shape == ():
-            lens["focal_length"] = [float(focal), float(focal * ratio)]
-        section = section_of(lens, name or document.stem, document)
-        if section["fisheye"]:
-            radial = plain_array(group.get("radial_distortion", [])).ravel().tolist()
-            section["distortions"] = [*radial, 0.0, 0.0, 0.0, 0.0][:4]
-        found[name] = _posed(section, group.get("orientation"), group.get("position")) | {"name": name or None}
-    return found
+@each
+def read_google(document: Document, name: str, row: Mapping[str, Any]) -> Section:
+    """Read a camera of Google's light fields or of Nerfies: `orientation` maps world to camera."""
+    lens = {key: value for key, value in row.items() if key not in ("orientation", "position")}
+    if (focal := _focal(row.get("focal_length"), row.get("pixel_aspect_ratio"))) is not None:
+        lens["focal_length"] = focal
+    section = section_of(lens, name, document)
+    if section["fisheye"]:
+        radial = plain_array(row.get("radial_distortion", [])).ravel().tolist()
+        section["distortions"] = [*radial, 0.0, 0.0, 0.0, 0.0][:4]
+    return _posed(section, row.get("orientation"), row.get("position"))
 
 
 # --- calib.io -------------------------------------------------------------------------------------------------------
@@ -136,12 +106,11 @@ def read_calib_io(document: Document) -> dict[str, Section]:
         kind = (model.get("polymorphic_id") or 0) % 2**31 if isinstance(model.get("polymorphic_id"), int) else 0
         names.setdefault(kind, str(model.get("polymorphic_name")).removeprefix("libCalib::CameraModel"))
         numbers = {key: _inner(row).get("val") for key, row in _inner(data, "parameters").items()}
-        f, ratio = plain_array(numbers.pop("f", None)), plain_array(numbers.pop("ar", 1.0))
         order = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tauX", "tauY")
         turn, shift = (_inner(camera, "transform", key) for key in ("rotation", "translation"))
         words = {
             "model": names[kind],
-            "focal_length": [float(f), float(f * ratio)] if f.shape == ratio.shape == () else None,
+            "focal_length": _focal(numbers.get("f"), numbers.get("ar")),
             "principal_point": [numbers.get("cx"), numbers.get("cy")],
             "distortions": [numbers.get(key) or 0.0 for key in order],
             "rvec": [turn.get(key) for key in ("rx", "ry", "rz")],
@@ -162,11 +131,6 @@ def _inner(group: Any, *keys: str) -> Mapping[str, Any]:
 # --- MVHumanNet -----------------------------------------------------------------------------------------------------
 
 
-def is_mvhumannet(document: Document) -> bool:
-    """Return whether cameras have the words of `camera_extrinsics.json`."""
-    return _have(document, _MVHUMANNET)
-
-
 def read_mvhumannet(document: Document) -> dict[str, Section]:
     """Read cameras whose translations, millimetres, count by the factor in `camera_scale.pkl`.
 
@@ -175,7 +139,7 @@ def read_mvhumannet(document: Document) -> dict[str, Section]:
     """
     scale = _camera_scale(document)
     rows = []
-    for key, group in once(document, _rows(document)).items():
+    for key, group in once(document, document.rows).items():
         name = key.partition(".")[0].rpartition("_")[2]
         center = plain_array(group.get("image_center")).ravel()
         words = {"focal_length": group.get("focal_length"), "principal_point": center[:2].tolist()}

@@ -1,6 +1,7 @@
 """Read a calibration file to plain data; its syntax is told by its content, never by its name."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -40,9 +41,31 @@ class Document:
         return {str(key): value for key, value in self.data.items() if isinstance(value, dict)}
 
     @property
+    def rows(self) -> list[tuple[str, dict[str, Any]]]:
+        """Groups at the top, or dicts of a list, with their names; of a lone camera the file itself, without one."""
+        if isinstance(self.data, list):
+            return [(str(row.get("name", i)), row) for i, row in enumerate(self.data) if isinstance(row, dict)]
+        return list(self.groups.items()) or ([("", self.data)] if isinstance(self.data, dict) else [])
+
+    @property
     def stem(self) -> str:
         """Name of the file without what follows its first dot."""
         return self.path.name.partition(".")[0]
+
+
+def at_top(*keys: str) -> Callable[[Document], bool]:
+    """Return whether a file has all of some keys at its top."""
+    return lambda document: isinstance(document.data, dict) and {*keys} <= document.data.keys()
+
+
+def in_groups(*keys: str) -> Callable[[Document], bool]:
+    """Return whether a group at the top of a file has all of some keys."""
+    return lambda document: any({*keys} <= group.keys() for group in document.groups.values())
+
+
+def in_rows(*keys: str) -> Callable[[Document], bool]:
+    """Return whether a camera of a file, one of several or alone, has all of some keys."""
+    return lambda document: any({*keys} <= row.keys() for _, row in document.rows)
 
 
 def read_document(path: Path) -> Document:

@@ -9,9 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 
 from tracker.calibrations.camera_matrices import rotation_of_quaternion
-from tracker.calibrations.camera_words import Section, unusable
+from tracker.calibrations.camera_words import Section, pinhole, unusable
 from tracker.calibrations.document import Document, refuse
 from tracker.calibrations.pose_conventions import OPENGL
+from tracker.geometry import rigid
 
 _SUBPIXELS = 64.0
 """Qualisys counts the sensor in 64ths of a pixel."""
@@ -61,15 +62,9 @@ def read_qualisys(document: Document) -> dict[str, Section]:
         lens = np.array([intrinsic.get(k) for k in _LENS])
         R = OPENGL[:3, :3] @ np.array([[transform[f"r{i}{j}"] for j in (1, 2, 3)] for i in (1, 2, 3)])
         position = np.array([transform[k] for k in "xyz"])
-        found[name] = {
-            "name": name,
-            "size": size,
-            "matrix": [[fu, 0.0, cu - left], [0.0, fv, cv - top], [0.0, 0.0, 1.0]],
-            "distortions": (lens / (_SUBPIXELS if by_pose2sim else 1.0)).tolist(),
-            "rotation": R.tolist(),
-            "translation": (-R @ position).tolist(),
-            "fisheye": False,
-        }
+        K = [[fu, 0.0, cu - left], [0.0, fv, cv - top], [0.0, 0.0, 1.0]]
+        lens = lens / (_SUBPIXELS if by_pose2sim else 1.0)
+        found[name] = pinhole(name, size, K, lens.tolist(), rigid.transform(R, -R @ position))
     return found
 
 
@@ -123,15 +118,9 @@ def read_vicon(document: Document) -> dict[str, Section]:
             raise refuse(document, name, expected, found_norm, "export the file again")
         (focal,), (cu, cv) = values.row("FOCAL_LENGTH", 1), values.row("PRINCIPAL_POINT", 2)
         ratio = values.get("PIXEL_ASPECT_RATIO") or 1.0
-        found[name] = {
-            "name": name,
-            "size": values.row("SENSOR_SIZE", 2),
-            "matrix": [[focal, 0.0, cu], [0.0, focal / ratio, cv], [0.0, 0.0, 1.0]],
-            "distortions": [],
-            "rotation": R.tolist(),
-            "translation": (-R @ np.array(values.row("POSITION", 3))).tolist(),
-            "fisheye": False,
-        }
+        K = [[focal, 0.0, cu], [0.0, focal / ratio, cv], [0.0, 0.0, 1.0]]
+        T_camera_world = rigid.transform(R, -R @ np.array(values.row("POSITION", 3)))
+        found[name] = pinhole(name, values.row("SENSOR_SIZE", 2), K, [], T_camera_world)
     return found
 
 

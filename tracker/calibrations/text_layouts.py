@@ -13,10 +13,9 @@ from pathlib import PurePath
 import numpy as np
 
 from tracker.calibrations.camera_matrices import ProjectionError, rotation_of_quaternion, split_projection
-from tracker.calibrations.camera_words import Section, once, unusable
+from tracker.calibrations.camera_words import Section, once, pinhole, unusable
 from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import axes_point
 from tracker.validation import quoted
 
@@ -64,19 +63,6 @@ def _row(document: Document, camera: str, key: str, text: str, count: int) -> li
     return found
 
 
-def _section(name: str, size: Sequence[float] | None, K: Array, distortions: list[float], T: Array) -> Section:
-    """Return a camera without a fisheye lens, with its pose from world to camera."""
-    return {
-        "name": name or None,
-        "size": size,
-        "matrix": K.tolist(),
-        "distortions": distortions,
-        "rotation": T[:3, :3].tolist(),
-        "translation": T[:3, 3].tolist(),
-        "fisheye": False,
-    }
-
-
 # --- Skeletool ------------------------------------------------------------------------------------------------------
 
 
@@ -110,7 +96,7 @@ def _skeletool_camera(document: Document, values: Mapping[str, str]) -> tuple[st
         )
     K, T = (_row(document, name, key, values.get(key, ""), 16) for key in ("intrinsic", "extrinsic"))
     size = _row(document, name, "size", values.get("size", ""), 2)
-    return name, _section(name, size, np.reshape(K, (4, 4))[:3, :3], [], np.reshape(T, (4, 4)))
+    return name, pinhole(name, size, np.reshape(K, (4, 4))[:3, :3], [], np.reshape(T, (4, 4)))
 
 
 # --- MayaCam --------------------------------------------------------------------------------------------------------
@@ -133,7 +119,7 @@ def read_mayacam2(document: Document) -> dict[str, Section]:
         for key, count in zip(_MAYACAM, (2, 9, 9, 3), strict=True)
     )
     T = rigid.transform(np.reshape(R, (3, 3)), np.array(t))
-    return {"": _section("", size, np.reshape(K, (3, 3)), [], T)}
+    return {"": pinhole(None, size, np.reshape(K, (3, 3)), [], T)}
 
 
 def is_mayacam1(document: Document) -> bool:
@@ -152,7 +138,7 @@ def read_mayacam1(document: Document) -> dict[str, Section]:
     x, y, turn = (rigid.so3_exp(np.radians(a) * axis) for a, axis in zip(angles, np.eye(3), strict=True))
     R = np.diag([1.0, -1.0, -1.0]) @ (turn @ y @ x).T
     K = np.array([[-z, 0.0, u0 - 1], [0.0, -z, height - v0], [0.0, 0.0, 1.0]])
-    return {"": _section("", [width, height], K, [], rigid.transform(R, -R @ np.array(place)))}
+    return {"": pinhole(None, [width, height], K, [], rigid.transform(R, -R @ np.array(place)))}
 
 
 # --- DLT ------------------------------------------------------------------------------------------------------------
@@ -179,7 +165,7 @@ def read_dlt(document: Document) -> dict[str, Section]:
             found[name] = unusable(name, f"camera '{name}': {error}; calibrate it again")
             continue
         Ts.append(rigid.inverse(T))
-        found[name] = _section(name, None, K, [], T)
+        found[name] = pinhole(name, None, K, [], T)
     point = axes_point(Ts) if len(Ts) > 1 else None
     if point is not None and point.is_determined and point.angles_rad.min() > np.pi / 2:
         raise refuse(
@@ -257,7 +243,7 @@ def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, po
     order = _FISHEYE_ORDER if fisheye else _ORDER[: 8 if "k3" in numbers else 4]
     size = _row(document, name, "size", " ".join(lens[2:4]), 2)
     lens_of = [numbers.get(key, 0.0) for key in order]
-    found = _section(name, size, K, lens_of, rigid.transform(R, np.array([x, y, z])))
+    found = pinhole(name, size, K, lens_of, rigid.transform(R, np.array([x, y, z])))
     return found | {"fisheye": fisheye}
 
 
@@ -289,4 +275,4 @@ def _egoexo_camera(document: Document, row: Mapping[str, str | None]) -> tuple[s
         raise refuse(document, name, "a unit quaternion", "another length", "export the file again")
     T = rigid.inverse(rigid.transform(R, np.array(numbers(*(f"t{axis}_world_cam" for axis in "xyz")))))
     K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-    return name, _section(name, numbers("image_width", "image_height"), K, lens, T) | {"fisheye": True}
+    return name, pinhole(name, numbers("image_width", "image_height"), K, lens, T) | {"fisheye": True}
