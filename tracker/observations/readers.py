@@ -46,10 +46,6 @@ def _by_picture(people_of: Callable[[Path], list[PicturePerson]], **more: Any) -
     return read
 
 
-def _read_yolo(files: Sequence[Found], cameras: Sequence[str]) -> Groups:
-    return _by_picture(detections.read_yolo, size=(1, 1))(files, cameras)
-
-
 def _each(read: Callable[[Path, float | None], MarkerTable]) -> Callable[[Sequence[Path], float | None, float], Scenes]:
     return lambda paths, unit_m, rate: [(path, read(path, unit_m)) for path in paths]
 
@@ -163,6 +159,11 @@ def _in_space(name: str, read: Callable[..., Scenes]) -> ObservationLayout[Scene
     return ObservationLayout(name, f"a `{suffix}` for each person", _END, _ends(suffix), read)
 
 
+def _unread(program: str, instead: str, *keys: str) -> ObservationLayout[Any]:
+    """Return the row of a JSON file that is known by keys and not read."""
+    return ObservationLayout(program, "`.json`", " and ".join(f"`{k}`" for k in keys), _has(*keys), instead=instead)
+
+
 def _is_scene(sample: Sample) -> bool:
     return sample.suffix == ".json" and find_layout(sample) in SCENES
 
@@ -172,54 +173,35 @@ _ALL = "one `.json` for all cameras, or one for each"
 _IN_SPACE = "see [Joints in space](#joints-in-space)"
 
 PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
-    "openpose": ObservationLayout(
-        "OpenPose JSON", f"a `.json` {_PICTURE}; of Pose2Sim too", "`people`",
-        _has("people"), _by_picture(read_openpose),
-    ),
-    "easymocap": ObservationLayout(
-        "EasyMocap", f"a `.json` {_PICTURE}", "`annots`", _has("annots"), _by_picture(detections.read_easymocap)
-    ),
-    "mmpose": ObservationLayout(
-        "mmpose, of videos", f"a `.json` {_CAMERA}", "`frame_id` and `instances`, perhaps in `instance_info`",
-        _is_json(detections.is_mmpose_video), _by_file(detections.read_mmpose_video),
-    ),
-    "mmpose pictures": ObservationLayout(
-        "mmpose, of pictures", f"a `.json` {_PICTURE}", "a list of `keypoints` and `keypoint_scores`",
-        _is_json(detections.is_mmpose_picture), _by_picture(detections.read_mmpose_picture),
-    ),
-    "alphapose": ObservationLayout(
-        "AlphaPose", f"a `.json` {_CAMERA}", "a list of `image_id` in words",
-        _is_json(is_alphapose), _by_cameras(lambda path: read_coco(path, "AlphaPose")),
-    ),
-    "label studio": ObservationLayout(
-        "Label Studio", _ALL, "a list of `data` and `annotations`",
-        _is_json(hand_labels.is_label_studio), _by_cameras(hand_labels.read_label_studio),
-    ),
-    "coco": ObservationLayout(
-        "COCO", f"{_ALL}; of Roboflow too", "`images` and `annotations`, or a list of results",
+    "openpose": ObservationLayout("OpenPose JSON", f"a `.json` {_PICTURE}; of Pose2Sim too", "`people`", _has("people"),
+        _by_picture(read_openpose)),
+    "easymocap": ObservationLayout("EasyMocap", f"a `.json` {_PICTURE}", "`annots`", _has("annots"),
+        _by_picture(detections.read_easymocap)),
+    "mmpose": ObservationLayout("mmpose, of videos", f"a `.json` {_CAMERA}",
+        "`frame_id` and `instances`, perhaps in `instance_info`", _is_json(detections.is_mmpose_video),
+        _by_file(detections.read_mmpose_video)),
+    "mmpose pictures": ObservationLayout("mmpose, of pictures", f"a `.json` {_PICTURE}",
+        "a list of `keypoints` and `keypoint_scores`", _is_json(detections.is_mmpose_picture),
+        _by_picture(detections.read_mmpose_picture)),
+    "alphapose": ObservationLayout("AlphaPose", f"a `.json` {_CAMERA}", "a list of `image_id` in words",
+        _is_json(is_alphapose), _by_cameras(lambda path: read_coco(path, "AlphaPose"))),
+    "label studio": ObservationLayout("Label Studio", _ALL, "a list of `data` and `annotations`",
+        _is_json(hand_labels.is_label_studio), _by_cameras(hand_labels.read_label_studio)),
+    "coco": ObservationLayout("COCO", f"{_ALL}; of Roboflow too", "`images` and `annotations`, or a list of results",
         _is_json(lambda data: is_coco(data) and (holds(data, "keypoints") or not holds(data, "segmentation"))),
-        _by_cameras(read_coco),
-    ),
-    "deeplabcut": ObservationLayout(
-        "DeepLabCut, Lightning Pose, EKS", f"a `.csv` {_CAMERA}, of one animal or several, or of labels",
-        "the row `scorer`, without `z`", _is_text(".csv", is_deeplabcut), _by_file(read_deeplabcut_csv),
-    ),
-    "sleap csv": ObservationLayout(
-        "SLEAP's analysis in CSV", f"a `.csv` {_CAMERA}", "columns `track` and `frame_idx`",
-        _is_text(".csv", detections.is_sleap_csv), _by_file(detections.read_sleap_csv),
-    ),
-    "hdf5": ObservationLayout(
-        "SLEAP, NWB, DeepLabCut in HDF5", f"a `.slp`, `.nwb` or `.h5` {_CAMERA}", f"{_END}, and the groups within",
-        _ends(".slp", ".nwb", ".h5"), _read_hdf5,
-    ),
-    "cvat": ObservationLayout(
-        "CVAT", f"a `.xml` {_CAMERA}, for images or for videos", "`<annotations>`",
-        _is_text(".xml", hand_labels.is_cvat), _by_cameras(hand_labels.read_cvat),
-    ),
-    "yolo": ObservationLayout(
-        "YOLO pose", f"a `.txt` {_PICTURE}", "a class, a box and points in each line, in shares of the picture",
-        _is_text(".txt", detections.is_yolo), _read_yolo,
-    ),
+        _by_cameras(read_coco)),
+    "deeplabcut": ObservationLayout("DeepLabCut, Lightning Pose, EKS",
+        f"a `.csv` {_CAMERA}, of one animal or several, or of labels", "the row `scorer`, without `z`",
+        _is_text(".csv", is_deeplabcut), _by_file(read_deeplabcut_csv)),
+    "sleap csv": ObservationLayout("SLEAP's analysis in CSV", f"a `.csv` {_CAMERA}", "columns `track` and `frame_idx`",
+        _is_text(".csv", detections.is_sleap_csv), _by_file(detections.read_sleap_csv)),
+    "hdf5": ObservationLayout("SLEAP, NWB, DeepLabCut in HDF5", f"a `.slp`, `.nwb` or `.h5` {_CAMERA}",
+        f"{_END}, and the groups within", _ends(".slp", ".nwb", ".h5"), _read_hdf5),
+    "cvat": ObservationLayout("CVAT", f"a `.xml` {_CAMERA}, for images or for videos", "`<annotations>`",
+        _is_text(".xml", hand_labels.is_cvat), _by_cameras(hand_labels.read_cvat)),
+    "yolo": ObservationLayout("YOLO pose", f"a `.txt` {_PICTURE}",
+        "a class, a box and points in each line, in shares of the picture", _is_text(".txt", detections.is_yolo),
+        _by_picture(detections.read_yolo, size=(1, 1))),
 }  # fmt: skip
 """Key points in pictures, by the name that is stored, in the order in which they are tried."""
 SPACE_FORMATS: Mapping[str, ObservationLayout[Scenes]] = {
@@ -233,42 +215,32 @@ SPACE_FORMATS: Mapping[str, ObservationLayout[Scenes]] = {
 """Joints in space. Lengths without a unit in the file have the given one, metres, or are refused; rows without times
 have the given rate, 1/s. Each returns the points of each person with the file or folder that they are from."""
 MASK_FORMATS: Mapping[str, ObservationLayout[list[MaskFiles]]] = {
-    "masks": ObservationLayout(
-        "masks in PNG", "a `.png` for each picture, or for each object in it: `CAMERA/000012.png`",
-        _END, _ends(".png"), _read_png,
-    ),
-    "coco masks": ObservationLayout(
-        "COCO segmentation", _ALL, "`segmentation` in `annotations`: polygons and run lengths",
-        _is_json(lambda data: is_coco(data) and holds(data, "segmentation")), _read_coco_masks,
-    ),
+    "masks": ObservationLayout("masks in PNG",
+        "a `.png` for each picture, or for each object in it: `CAMERA/000012.png`", _END, _ends(".png"), _read_png),
+    "coco masks": ObservationLayout("COCO segmentation", _ALL,
+        "`segmentation` in `annotations`: polygons and run lengths",
+        _is_json(lambda data: is_coco(data) and holds(data, "segmentation")), _read_coco_masks),
 }  # fmt: skip
 FORMATS: Mapping[str, ObservationLayout[Any]] = {**PICTURE_FORMATS, **SPACE_FORMATS, **MASK_FORMATS}
 """The layouts that are read, by the name that is stored."""
 _OF_UNREAD = (".mat", ".pkl", ".pickle", ".pt", ".pth", ".xlsx", ".xls", ".fbx", ".glb", ".parquet", ".tak")
-_UNREAD: Sequence[ObservationLayout[Any]] = [
-    ObservationLayout(program, files or "`.json`", keys or _END, recognizes, instead=instead)
-    for program, files, keys, recognizes, instead in (
-        (
-            "AlphaPose's formats of OpenPose",
-            "",
-            "`bodies`",
-            _has("bodies"),
-            "its results in its own format, which is the default",
-        ),
-        ("LabelMe", "", "`shapes` and `imagePath`", _has("shapes", "imagePath"), "COCO"),
-        ("VGG Image Annotator", "", "`_via_img_metadata`", _has("_via_img_metadata"), "COCO"),
-        ("Datumaro", "", "`items` and `categories`", _has("items", "categories"), "COCO or CVAT's XML"),
-        (
-            "a plain array in JSON",
-            "",
-            "lists of numbers alone",
-            _is_text(".json", lambda head: "".join(head).replace(" ", "").startswith("[[[")),
-            "the joints in space by numpy.save, as an array (frames, joints, 3)",
-        ),
-        ("PyTorch", "`.pt`, `.pth`", "", _ends(".pt", ".pth"), "CSV or JSON"),
-        ("a video", "`.mp4`, `.avi`, `.mov`", "", _ends(".mp4", ".avi", ".mov"), "a detector's key points"),
-    )
-]
+_UNREAD: Sequence[ObservationLayout[Any]] = (
+    _unread("AlphaPose's formats of OpenPose", "its results in its own format, which is the default", "bodies"),
+    _unread("LabelMe", "COCO", "shapes", "imagePath"),
+    _unread("VGG Image Annotator", "COCO", "_via_img_metadata"),
+    _unread("Datumaro", "COCO or CVAT's XML", "items", "categories"),
+    ObservationLayout(
+        "a plain array in JSON",
+        "`.json`",
+        "lists of numbers alone",
+        _is_text(".json", lambda head: "".join(head).replace(" ", "").startswith("[[[")),
+        instead="the joints in space by numpy.save, as an array (frames, joints, 3)",
+    ),
+    ObservationLayout("PyTorch", "`.pt`, `.pth`", _END, _ends(".pt", ".pth"), instead="CSV or JSON"),
+    ObservationLayout(
+        "a video", "`.mp4`, `.avi`, `.mov`", _END, _ends(".mp4", ".avi", ".mov"), instead="a detector's key points"
+    ),
+)
 UNREAD = (*NOT_READ, *_UNREAD)
 """Layouts that are known and not read."""
 _OFTEN_OTHER = (".txt", ".xml")
@@ -296,7 +268,7 @@ def find_files(paths: Sequence[Path], masks: bool = False) -> tuple[str, list[Fo
     elif len(found) > 1 or not all(map(_may_be_other, unread)):
         found.pop("masks", None)
     if not found or not all(map(_may_be_other, unread)):
-        raise _unread(Sample(min(unread, key=_may_be_other)[0]))
+        raise _not_read(Sample(min(unread, key=_may_be_other)[0]))
     if {*found} == {"deeplabcut", "hdf5"}:  # DeepLabCut writes each table twice
         tables = {path.with_suffix("") for path, _ in found["deeplabcut"]}
         if all(path.with_suffix("") in tables for path, _ in found["hdf5"]):
@@ -345,7 +317,7 @@ def _may_be_other(file: Found) -> bool:
     return file[0].suffix.lower() in _OFTEN_OTHER
 
 
-def _unread(sample: Sample) -> FormatError:
+def _not_read(sample: Sample) -> FormatError:
     """Return that a file is not read, in the words of the program that wrote it."""
     known = next((layout for layout in UNREAD if layout.recognizes(sample)), None)
     if known is not None:
