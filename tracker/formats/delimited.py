@@ -10,6 +10,8 @@ from tracker.text_files import TABLE_BYTES, TextKind, read_lines
 
 _KIND = TextKind("table", TABLE_BYTES, FormatError, "export it again")
 _SEPARATORS = "\t;,"
+_SKIPPED = ("#", "sep=")
+"""Beginnings of comments, and of Excel's name for the separator."""
 
 
 class TableLine(NamedTuple):
@@ -36,14 +38,15 @@ class Delimited(NamedTuple):
         return (row for row in self.rows if any(row.cells))
 
 
-def read_delimited(path: Path) -> Delimited:
-    """Read the lines of a table one by one.
+def read_delimited(path: Path, kind: TextKind = _KIND, separator: str | None = None) -> Delimited:
+    """Read the lines of a table one by one; with a given separator, no line is a comment.
 
     Raises:
         FormatError: the file is missing or no text, or a line is malformed; the message has the line.
     """
-    where, separator = f"table {path}", _separator(read_lines(path, _KIND))
-    return Delimited(where, separator, _rows(where, separator, read_lines(path, _KIND)))
+    where, skipped = f"{kind.name} {path}", () if separator else _SKIPPED
+    separator = separator or _separator(read_lines(path, kind))
+    return Delimited(where, separator, _rows(where, separator, read_lines(path, kind), skipped))
 
 
 def head_cells(lines: Sequence[str]) -> list[list[str]]:
@@ -63,12 +66,13 @@ def _separator(lines: Iterable[str]) -> str:
     return ","
 
 
-def _rows(where: str, separator: str, lines: Iterable[str]) -> Iterator[TableLine]:
+def _rows(where: str, separator: str, lines: Iterable[str], skipped: tuple[str, ...] = _SKIPPED) -> Iterator[TableLine]:
     for number, line in enumerate(lines, 1):
-        if line.startswith(("#", "sep=")):  # a comment, or Excel's name for the separator
+        if line.startswith(skipped):
             continue
+        is_plain = '"' not in line and len(line) <= csv.field_size_limit()
         try:
-            cells = next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
+            cells = line.split(separator) if is_plain else next(csv.reader([line], delimiter=separator))
         except csv.Error as error:
             raise FormatError(f"{where}, line {number}: {error}; export it again") from error
         yield TableLine(number, [cell.strip() for cell in cells] if line.strip(" \r") else [])

@@ -3,7 +3,7 @@
 import csv
 import re
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -61,11 +61,15 @@ class NumberRows:
         Raises:
             FormatError: the row has another number of columns or is not numbers, or the table is too large.
         """
-        if len(self._values) + self._n_columns > MAX_VALUES:
-            raise FormatError(
-                f"{self._where}, line {line}: expected at most {MAX_VALUES} values, found more; cut it in pieces"
-            )
-        row = self._complete_row(text) or self._row(text, line)
+        self._check_size(line)
+        self._append(self._complete_row(text) or self._row(text, line), line)
+
+    def add_cells(self, cells: Sequence[str], line: int) -> None:
+        """Add a row of cells; see `add`."""
+        self._check_size(line)
+        self._append(self._complete_row(self._separator.join(cells)) or self._numbers(cells, line), line)
+
+    def _append(self, row: list[float], line: int) -> None:
         if not (row[0].is_integer() and abs(row[0]) <= MAX_FRAMES):
             raise FormatError(
                 f"{self._where}, line {line}: expected a whole frame number of at most {MAX_FRAMES} first, "
@@ -73,6 +77,12 @@ class NumberRows:
             )
         self._values.frombytes(np.array(row).tobytes())
         self._lines.append(line)
+
+    def _check_size(self, line: int) -> None:
+        if len(self._values) + self._n_columns > MAX_VALUES:
+            raise FormatError(
+                f"{self._where}, line {line}: expected at most {MAX_VALUES} values, found more; cut it in pieces"
+            )
 
     def _complete_row(self, text: str) -> list[float] | None:
         """Parse a row without blanks, twice as fast as `_row`; None if it needs a closer look."""
@@ -87,11 +97,14 @@ class NumberRows:
         return row if len(row) == self._n_columns else None
 
     def _row(self, text: str, line: int) -> list[float]:
-        where = f"{self._where}, line {line}"
         try:
             fields = next(csv.reader([text], delimiter=self._separator))
         except csv.Error as error:
-            raise FormatError(f"{where}: {error}; export it again") from error
+            raise FormatError(f"{self._where}, line {line}: {error}; export it again") from error
+        return self._numbers(fields, line)
+
+    def _numbers(self, fields: Sequence[str], line: int) -> list[float]:
+        where = f"{self._where}, line {line}"
         try:
             row = [np.nan if f.strip().lower() in _MISSING else float(f) for f in fields]
         except ValueError as error:

@@ -90,17 +90,14 @@ def _read_rows(table: Delimited, columns: Columns) -> _Rows:
         cells += [""] * (last + 1 - len(cells))
         key_of.append(keys.setdefault(tuple(cells[i] for i in named), len(keys)))
         numbers = [str(n) if columns.frame is None else cells[columns.frame], *(cells[i] for i in chosen)]
-        text = ("," if is_comma else "\t").join(numbers)
         if not is_comma:
-            marks |= {",", "."} & {*text}
-            text = text.replace(",", ".").replace("\t", ",")
-        elif text.count(",") >= len(numbers):
-            text = ",".join(f'"{c}"' for c in (c.replace('"', "") for c in numbers))
+            marks |= {",", "."} & {*"".join(numbers)}
+            numbers = [cell.replace(",", ".") for cell in numbers]
         if len(marks) > 1:
             raise FormatError(f"{place}: expected points or commas in decimal numbers, found both; keep one of them")
         if len(keys) > MAX_NAMES:
             raise FormatError(f"{place}: expected at most {MAX_NAMES} points of people, found more; export fewer")
-        rows.add(text, line)
+        rows.add_cells(numbers, line)
     return _Rows(rows, [*keys], np.frombuffer(key_of, dtype=np.int64))
 
 

@@ -5,7 +5,6 @@ first column of a row is the number of the picture, or the path of the picture, 
 labels of a person. The Ensemble Kalman Smoother (EKS) adds coords of its own.
 """
 
-import csv
 import io
 import pickle
 import re
@@ -16,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
+from tracker.formats.delimited import TableLine, read_delimited
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
 from tracker.formats.keypoints.picture_names import picture_names
 from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks, text_of
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
 from tracker.geometry.arrays import Array, IntArray
-from tracker.text_files import read_lines
 from tracker.validation import MAX_NUMBER, quoted
 
 _KIND = text_of("DeepLabCut")
@@ -51,7 +50,7 @@ def read_deeplabcut_csv(path: Path) -> PictureTable:
         FormatError: the file is missing or malformed; the message has the line.
     """
     where = f"DeepLabCut file {path}"
-    lines = enumerate(read_lines(path, _KIND), 1)
+    lines = _filled(path)
     columns, n_index, row = _read_head(lines, where)
     rows, is_of_names = NumberRows(where, ",", 1 + len(columns), n_required=1), False
     while row is not None:
@@ -61,11 +60,9 @@ def read_deeplabcut_csv(path: Path) -> PictureTable:
                 f"{where}, line {line}: expected {n_index + len(columns)} columns, found {len(cells)}; export it again"
             )
         number = _picture_number(cells[:n_index], f"{where}, line {line}")
-        is_of_names = is_of_names or not _NUMBER.fullmatch(cells[n_index - 1].strip())
-        text = io.StringIO()
-        csv.writer(text).writerow([number, *cells[n_index:]])
-        rows.add(text.getvalue().strip(), line)
-        row = _next_row(lines, where)
+        is_of_names = is_of_names or not _NUMBER.fullmatch(cells[n_index - 1])
+        rows.add_cells([str(number), *cells[n_index:]], line)
+        row = next(lines, None)
     numbers, values = rows.table(MAX_NUMBER)
     return _table(columns, numbers, values, where, is_of_names)
 
@@ -127,17 +124,17 @@ def _column(head: Any, where: str) -> _Column:
     return _Column(words[1] if len(words) == 4 else "", words[-2], words[-1])
 
 
-def _read_head(lines: Iterator[tuple[int, str]], where: str) -> tuple[list[_Column], int, tuple[int, list[str]] | None]:
+def _read_head(lines: Iterator[TableLine], where: str) -> tuple[list[_Column], int, TableLine | None]:
     """Return the columns, the number of columns of the index, and the first row of numbers.
 
     Raises:
         FormatError: the head is incomplete, or names too many points.
     """
     head: dict[str, list[str]] = {}
-    row = _next_row(lines, where)
-    while row is not None and row[1][0].strip().lower() in _HEAD:
-        head[row[1][0].strip().lower()] = [cell.strip() for cell in row[1]]
-        row = _next_row(lines, where)
+    row = next(lines, None)
+    while row is not None and row.cells[0].lower() in _HEAD:
+        head[row.cells[0].lower()] = row.cells
+        row = next(lines, None)
     if not {"bodyparts", "coords"} <= head.keys() or len({len(cells) for cells in head.values()}) != 1:
         instead = "semicolons between cells" if row is not None and ";" in row[1][0] else "none"
         raise FormatError(
@@ -157,20 +154,14 @@ def _read_head(lines: Iterator[tuple[int, str]], where: str) -> tuple[list[_Colu
     return columns, n_index, row
 
 
-def _next_row(lines: Iterator[tuple[int, str]], where: str) -> tuple[int, list[str]] | None:
-    """Return the next line that is not blank, by its number, in cells; None at the end."""
-    for number, line in lines:
-        if line.strip():
-            try:
-                return number, next(csv.reader([line]))
-            except csv.Error as error:
-                raise FormatError(f"{where}, line {number}: {error}; export it again") from error
-    return None
+def _filled(path: Path) -> Iterator[TableLine]:
+    """Return the lines of a CSV that are not blank."""
+    return (row for row in read_delimited(path, _KIND, ",").rows if row.cells)
 
 
 def _picture_number(cells: Sequence[str], where: str) -> int:
     """Return the number of a picture: the only cell, or the number in the name of a file."""
-    last = cells[-1].strip()
+    last = cells[-1]
     whole = _NUMBER.fullmatch(last)
     (found,) = picture_names([whole[1] if whole else PurePath(last.replace("\\", "/")).stem])
     if found is None:
@@ -230,8 +221,7 @@ Changes = Mapping[int, Sequence[tuple[int, Array]]]
 
 def patch_deeplabcut_csv(path: Path, changes: Changes) -> bytes:
     """Return a file, which has been read before, with points of some rows replaced; all other bytes stay."""
-    lines = enumerate(read_lines(path, _KIND), 1)
-    columns, n_index, _ = _read_head(lines, str(path))
+    columns, n_index, _ = _read_head(_filled(path), str(path))
     n_rows = len(read_deeplabcut_csv(path).numbers)
     new = {
         row: {n_index + i: value for i, value in cells.items()} for row, cells in _new_cells(columns, changes).items()

@@ -3,7 +3,6 @@
 Files of one picture have no number of their own: it is in their name.
 """
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +11,7 @@ import msgspec
 import numpy as np
 
 from tracker.errors import FormatError
+from tracker.formats.delimited import TableLine, read_delimited
 from tracker.formats.keypoints.openpose import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of, triples
 from tracker.formats.number_rows import MAX_NAMES, not_a_number
@@ -142,8 +142,8 @@ def read_sleap_csv(path: Path) -> PictureTable:
         FormatError: the file is malformed.
     """
     where = f"SLEAP file {path}"
-    lines = read_lines(path, text_of("SLEAP"))
-    head = _cells(next(lines, ""), where)
+    lines = (row for row in read_delimited(path, text_of("SLEAP"), ",").rows if row.cells)
+    head = next(lines, TableLine(1, [])).cells
     names = tuple(cell.removesuffix(".x") for cell in head if cell.endswith(".x"))
     columns = [f"{name}{part}" for name in names for part in (".x", ".y", ".score")]
     if not 0 < len(names) <= MAX_NAMES or len(set(head)) < len(head) or {*columns, "track", "frame_idx"} - set(head):
@@ -153,11 +153,8 @@ def read_sleap_csv(path: Path) -> PictureTable:
         )
     at = [head.index(c) for c in ("frame_idx", *columns)]
     people: dict[int, list[PicturePerson]] = {}
-    for number, line in enumerate(lines, 2):
+    for number, cells in lines:
         here = f"{where}, line {number}"
-        cells = _cells(line, here)
-        if not cells:
-            continue
         if len(cells) != len(head):
             raise FormatError(f"{here}: expected {len(head)} columns, found {len(cells)}; export it again")
         picture, *values = parse_numbers([cells[i] or "nan" for i in at], here)
@@ -187,13 +184,6 @@ def _mmpose_person(person: _Instance, where: str) -> PicturePerson:
 
 def _first_has(rows: list[Any], *keys: str) -> bool:
     return bool(rows) and isinstance(rows[0], dict) and rows[0].keys() >= {*keys}
-
-
-def _cells(line: str, where: str) -> list[str]:
-    try:
-        return next(csv.reader([line]), [])
-    except csv.Error as error:
-        raise FormatError(f"{where}: {error}; export it again") from error
 
 
 def parse_numbers(cells: Sequence[str], where: str) -> list[float]:
