@@ -167,9 +167,7 @@ def next_chapter(path: Path) -> Path | None:
         stem = f"GP01{found['first']}"
     elif found is not None:
         stem = f"{found['codec']}{int(found['chapter']) + 1:02}{found['recording']}"
-    elif (
-        number := re.fullmatch(r"((?:C|MVI_|DJI_)(?:[0-9]+_)??)([0-9]{4,5})(_D)?", path.stem, re.IGNORECASE)
-    ) is not None:
+    elif (number := _NUMBERED.fullmatch(path.stem)) is not None:
         stem = f"{number[1]}{int(number[2]) + 1:0{len(number[2])}}{number[3] or ''}"
     else:
         return None

@@ -65,6 +65,8 @@ def _doubt(times: Sequence[StartTime], fps: float, declared: Collection[float]) 
     step = max(s.step_s for s in times) * fps
     if times[0].source == TIME_CODE and any(not same_rate(rate, fps) for rate in declared):
         return f"it counts at another rate than the session's {fps:g} per second"
+    if times[0].source == TIME_CODE and len({s.text[8] == ":" for s in times}) > 1:
+        return "it leaves out numbers (drop-frame) in some cameras only"
     if step > 1 + AGREE:
         return f"it is known to {step:.0f} frames only"
     if all(s.may_count_pairs for s in times) and len({s.text for s in times}) > 1:
@@ -87,7 +89,6 @@ def clock_notes(found: Sequence[ClockStarts], n_frames: Mapping[str, int]) -> tu
         differs, doubt = max(clocks.starts.values()) > 1 + AGREE, clocks.doubt
         if any(start > n_frames[name] - 1 for name, start in clocks.starts.items()):
             doubt = doubt or "by it the cameras have no frame in common"
-            differs = clocks.source != CREATION_TIME  # as a copy or a conversion may set it
         listed = listed_starts(clocks.starts)
         if chosen is None and not doubt:
             chosen = clocks
@@ -150,9 +151,10 @@ def check_chapters(footage: Mapping[str, Footage]) -> list[str]:
     A video whose next chapter lies beside it is noted too.
 
     Raises:
-        RecordingError: files in one folder do not follow one another, or have no clock that shows it.
+        RecordingError: files in one folder do not follow one another, or have no clock that shows it; or two cameras
+            have files of one recording.
     """
-    notes = []
+    notes, camera_of = [], {f.path: name for name, f in footage.items()}
     for name, f in footage.items():
         if isinstance(f, ChapteredVideo) and len(f.chapters) > 1:
             sources = {_followed_by(one, other, name, f.path) for one, other in pairwise(f.chapters)}
@@ -161,6 +163,11 @@ def check_chapters(footage: Mapping[str, Footage]) -> list[str]:
         following = next_chapter(f.path) if isinstance(f, VideoFile) else None
         gap = _gap(f, following) if isinstance(f, VideoFile) and following is not None else None
         if following is not None and (gap.is_none if gap is not None else following.stem[0] in "Gg"):
+            if following in camera_of:
+                raise RecordingError(
+                    f"cameras '{name}' and '{camera_of[following]}' have chapters of one recording, {f.path.name} and "
+                    f"{following.name}; give each camera its own recording"
+                )
             notes.append(
                 f"camera '{name}': {following.name} beside {f.path.name} is the next chapter of its recording and is "
                 "not used; put the chapters alone into a folder, and give that as the footage"
@@ -195,7 +202,8 @@ def _followed_by(one: Chapter, other: Chapter, camera: str, folder: Path) -> str
         return gap.source
     found = "no clock in both that shows it"
     if gap is not None:
-        found = f"that {other.path.name} begins {abs(gap.seconds):.3g} s {'after' if gap.seconds > 0 else 'before'} "
+        apart = f"{float(f'{abs(gap.seconds):.3g}'):g} s {'after' if gap.seconds > 0 else 'before'}"
+        found = f"that {other.path.name} begins {apart} "
         found += f"{one.path.name} ends by its {gap.source}"
     raise RecordingError(
         f"camera '{camera}': expected the videos in {folder} to follow one another, found {found}; give one file, or "
@@ -216,7 +224,7 @@ def find_name_starts(footage: Mapping[str, Footage]) -> ClockStarts | None:
     if all(f.numbers is not None for f in folders.values()):
         for name, own in times.items():
             _check_numbers(name, folders[name], own)
-        return None
+        return _against_numbers(folders, times) if len(times) == len(footage) else None
     if len(times) < len(footage):
         if len({f.named.readings for f in folders.values()} | {f.numbers is None for f in folders.values()}) > 2:
             name, folder = next((n, f) for n, f in folders.items() if f.numbers is None)
@@ -260,6 +268,19 @@ def _check_numbers(name: str, folder: ImageFolder, times: Array) -> None:
             f"{steps[gaps[0]] - 1} pictures are missing between them",
             Remedy("pair_images"),
         )
+
+
+def _against_numbers(folders: Mapping[str, ImageFolder], times: Mapping[str, Array]) -> ClockStarts | None:
+    """Return the starts by times, in doubt, where they contradict the numbers; None where they have no common span."""
+    try:
+        clocks = _paired_by_time(folders, times)
+    except RecordingError:
+        return None
+    numbers = {name: np.array(f.numbers) for name, f in folders.items()}
+    begin = max(own[0] for own in numbers.values())
+    starts = {name: float((begin - own[0]) / np.diff(own).min()) for name, own in numbers.items()}
+    contradicts = disagreement("numbers", starts, clocks.source, clocks.starts)
+    return clocks._replace(doubt="the numbers in the names pair frames") if contradicts else None
 
 
 def _paired_by_time(folders: Mapping[str, ImageFolder], times: Mapping[str, Array]) -> ClockStarts:

@@ -249,6 +249,7 @@ def test_chapters_are_joined_by_their_clocks(room, codes, key, clock):
     [
         ((None, None), r"in \S+left to follow one another, found no clock in both that shows it"),
         (("10:00:00:00", None), "no clock in both"),
+        (("10:00:00:00", "11:00:00:00"), r"GX020042\.MP4 begins 3600 s after GX010042\.MP4 ends by its time code"),
         (("10:00:00:00", "10:00:00:20"), r"GX020042\.MP4 begins 0\.334 s after GX010042\.MP4 ends by its time code"),
         (("10:00:00:00", "10:00:00:00"), r"GX020042\.MP4 begins 0\.334 s before GX010042\.MP4 ends by its time code"),
     ],
@@ -281,3 +282,46 @@ def test_names_that_show_nothing_contradict_no_flash(room):
     videos = folders(room, front=[f"f{k}" for k in range(9)], left=list("abcdefghi"))
     session = new(room, videos=videos, fps=30.0, offsets={"left": 0, "front": 0})
     assert clock_disagreement(session, "flash", [FoundStart("left", 5.0, None, 9.0, True)]) == []
+
+
+@pytest.mark.parametrize("names", [("GX010042.MP4", "GX020042.MP4"), ("C0001.MP4", "C0002.MP4")])
+def test_chapters_of_one_recording_are_no_two_cameras(room, names):
+    chapters(room, ("10:00:00:00", "10:00:00:10"), names=names)
+    front, left = (room / "left" / name for name in names)
+    expected = f"'front' and 'left' have chapters of one recording, {names[0]} and {names[1]}; give each camera its own"
+    assert_refused(room, RecordingError, expected, videos=(), camera_paths={"front": front, "left": left})
+
+
+def numbered_and_timed(first, times):
+    return [f"{first + k:04d}_{round(1e6 * t)}" for k, t in enumerate(times)]
+
+
+def test_numbers_that_times_contradict_are_named(room):
+    names = {"front": numbered_and_timed(0, TIMES), "left": numbered_and_timed(0, TIMES + 4 / 30)}
+    session, (note,) = noted(room, videos=folders(room, **names), fps=30.0)
+    assert [c.offset for c in session.cameras] == [0, 0]
+    assert note.startswith("by the time in the names of the pictures ('front' from 0000_1698000017900000.png on")
+    assert note.endswith("would be front=4 left=0; they are not taken: the numbers in the names pair frames")
+
+
+def test_numbers_that_times_confirm_or_say_nothing_of(room):
+    """The clocks of two machines may be hours apart: numbers of one trigger need no word on them."""
+    names = {"front": numbered_and_timed(0, TIMES), "left": numbered_and_timed(4, TIMES[4:])}
+    _, notes = noted(room, videos=folders(room, **names), fps=30.0, common_frames=True)
+    assert not any("the numbers in the names" in note for note in notes)
+    names = {"a/front": numbered_and_timed(0, TIMES), "a/left": numbered_and_timed(0, TIMES + 5000)}
+    (room / "a").mkdir()
+    _, notes = noted(room, folder=room / "t", videos=folders(room, **names), fps=30.0)
+    assert notes == []
+
+
+def test_creation_times_without_a_common_frame_are_named(room):
+    videos = tagged(room, "creation_time", front="2026-01-02T03:04:05Z", left="2026-01-02T03:05:05Z")
+    _, (note,) = noted(room, videos=videos)
+    assert "would be front=1798.2 left=0; they are not taken: it is known to 30 frames only" in note
+
+
+def test_time_codes_of_two_forms(room):
+    """Without drop frames a time code is no time of day: from the first minute on the two forms differ."""
+    _, (note,) = noted(room, videos=tagged(room, front="00:00:10;00", left="00:00:10:05"))
+    assert "they are not taken: it leaves out numbers (drop-frame) in some cameras only" in note
