@@ -17,6 +17,7 @@ from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
 from tracker.validation import quoted
 
+_FISHEYE = ("k1", "k2", "k3", "k4")
 _WILDTRACK = {"intr_": {"camera_matrix", "distortion_coefficients"}, "extr_": {"rvec", "tvec"}}
 
 
@@ -112,7 +113,7 @@ def read_calib_io(document: Document) -> dict[str, Section]:
             "model": names[kind],
             "focal_length": _focal(numbers.get("f"), numbers.get("ar")),
             "principal_point": [numbers.get("cx"), numbers.get("cy")],
-            "distortions": [numbers.get(key) or 0.0 for key in order],
+            "distortions": [numbers.get(key) or 0.0 for key in (order if "p1" in numbers else _FISHEYE)],
             "rvec": [turn.get(key) for key in ("rx", "ry", "rz")],
             "t": [shift.get(key) for key in "xyz"],
             "size": _inner(data, "CameraModelCRT", "CameraModelBase", "imageSize"),

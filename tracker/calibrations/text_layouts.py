@@ -46,6 +46,7 @@ def _lines(document: Document) -> list[str]:
 
 def _numbers(text: str) -> list[float]:
     """Return the numbers of a line, apart by commas, semicolons or blanks; an empty list if a word is none."""
+    text = text.replace(",", ".") if ";" in text else text  # decimal commas
     try:
         return [float(word) for word in re.split(r"[,;\s]+", text.strip(" ,;\t"))]
     except ValueError:
@@ -74,12 +75,12 @@ def is_skeletool(document: Document) -> bool:
 def read_skeletool(document: Document) -> dict[str, Section]:
     """Read the cameras of Skeletool, in millimetres; its lenses other than pinholes are refused."""
     cameras: list[dict[str, str]] = []
-    for line in _lines(document)[1:]:
-        key, _, value = line.partition(" ")
+    for line in filter(None, _lines(document)[1:]):
+        key, *value = line.split(maxsplit=1)
         if key == "name":
             cameras.append({})
-        if key and cameras:
-            cameras[-1].setdefault(key, value.strip())
+        if cameras:
+            cameras[-1].setdefault(key, "".join(value))
     return once(document, (_skeletool_camera(document, camera) for camera in cameras))
 
 
@@ -205,20 +206,23 @@ def read_colmap(document: Document) -> dict[str, Section]:
     """Read pictures with the lenses of their cameras, named by the pictures, or by the folders that these lie in."""
     lenses = {row[0]: row for row in _colmap_lenses(document)}
     pictures = list(_colmap_pictures(document))
+    are_together = len({PurePath(row[9]).parent for row in pictures}) == 1
     if not pictures:
         return {f"camera {key}": _colmap_camera(document, f"camera {key}", row, None) for key, row in lenses.items()}
     return once(
         document,
         (
-            (name := _colmap_name(row[9]), _colmap_camera(document, name, lenses.get(row[8]), row[1:8]))
+            (
+                name := _colmap_name(PurePath(row[9]), are_together),
+                _colmap_camera(document, name, lenses.get(row[8]), row[1:8]),
+            )
             for row in pictures
         ),
     )
 
 
-def _colmap_name(picture: str) -> str:
-    path = PurePath(picture)
-    return path.parent.name or path.stem
+def _colmap_name(picture: PurePath, are_together: bool) -> str:
+    return picture.stem if are_together else picture.parent.name or picture.stem
 
 
 def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, pose: Sequence[str] | None) -> Section:

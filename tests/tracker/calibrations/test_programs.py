@@ -66,6 +66,13 @@ def test_a_camera_of_skeletool_is_there_once(tmp_path):
         read_cameras(path)
 
 
+def test_words_of_skeletool_may_be_apart_by_tabs(tmp_path):
+    rig = rig_for(skeletool, RIG)
+    path = skeletool(tmp_path, rig)
+    path.write_text(re.sub(r"  +(?=\S+ )|(?<=\S)  +", "\t", path.read_text()))
+    assert_read(path, rig)
+
+
 def test_the_first_mayacam_has_1024_pixels_where_it_says_none(tmp_path):
     rig = [replace(c, size=(1024, 1024)) for c in rig_for(mayacam1, RIG)]
     for path in mayacam1(tmp_path, rig).iterdir():
@@ -84,6 +91,13 @@ def test_coefficients_whose_rows_are_counted_from_the_bottom_are_refused(tmp_pat
         read_cameras(path)
     turned[4:8] = 479 * np.vstack([turned[8:], np.ones(3)]) - turned[4:8]  # as the message says
     np.savetxt(path, turned, delimiter=",", fmt="%.17g")
+    assert_read(path, rig)
+
+
+def test_decimal_commas_of_coefficients_apart_by_semicolons(tmp_path):
+    rig = rig_for(dlt, RIG)
+    path = dlt(tmp_path, rig)
+    path.write_text(path.read_text().replace(",", ";").replace(".", ","))
     assert_read(path, rig)
 
 
@@ -127,6 +141,26 @@ def test_pictures_of_colmap_in_folders_of_cameras(tmp_path):
     changed(tmp_path / "images.txt", ("right/0001.png", "left/0002.png"))
     with pytest.raises(CalibrationError, match="two cameras are named 'left'"):
         read_cameras(path)
+
+
+def test_pictures_of_colmap_in_one_folder_are_named_by_themselves(tmp_path):
+    path = colmap(tmp_path, RIG)
+    changed(tmp_path / "images.txt", *((f"cam{i}.png", f"images/cam{i}.png") for i in range(3)))
+    assert_read(path, RIG)
+    assert [e.name for e in read_cameras(path).entries] == ["cam0", "cam1", "cam2"]
+
+
+def test_fisheyes_of_calib_io_have_four_coefficients(tmp_path):
+    rig = [replace(c, distortion=np.array([0.1, 0.02, 0.03, 0.04]), fisheye=True) for c in rig_for(calib_io, RIG)]
+    path = calib_io(tmp_path, rig)
+    data = json.loads(path.read_text().replace("CameraModelOpenCV", "CameraModelKannalaBrandt"))
+    for camera, c in zip(data["Calibration"]["cameras"], rig, strict=True):
+        lens = camera["model"]["ptr_wrapper"]["data"]["parameters"]
+        own = {"k1", "k2", "k3", "k4", "f", "ar", "cx", "cy"}
+        lens |= {f"k{i + 1}": {"val": float(k)} for i, k in enumerate(c.distortion)}
+        camera["model"]["ptr_wrapper"]["data"]["parameters"] = {key: lens[key] for key in own}
+    path.write_text(json.dumps(data))
+    assert_read(path, rig)
 
 
 def test_another_lens_of_ego_exo4d_is_left_out(tmp_path):
