@@ -236,6 +236,13 @@ _UNREAD: Sequence[ObservationLayout[Any]] = (
         _is_text(".json", lambda head: "".join(head).replace(" ", "").startswith("[[[")),
         instead="the joints in space by numpy.save, as an array (frames, joints, 3)",
     ),
+    ObservationLayout(
+        "Label Studio's JSON-MIN",
+        "`.json`",
+        "a list with `annotation_id`",
+        _is_json(hand_labels.is_json_min),
+        instead="JSON",
+    ),
     ObservationLayout("PyTorch", "`.pt`, `.pth`", _END, _ends(".pt", ".pth"), instead="CSV or JSON"),
     ObservationLayout(
         "a video", "`.mp4`, `.avi`, `.mov`", _END, _ends(".mp4", ".avi", ".mov"), instead="a detector's key points"
@@ -268,7 +275,7 @@ def find_files(paths: Sequence[Path], masks: bool = False) -> tuple[str, list[Fo
     elif len(found) > 1 or not all(map(_may_be_other, unread)):
         found.pop("masks", None)
     if not found or not all(map(_may_be_other, unread)):
-        raise _not_read(Sample(min(unread, key=_may_be_other)[0]))
+        raise _not_read(Sample(min(unread, key=_may_be_other)[0]), "leave it out, or " if found else "")
     if {*found} == {"deeplabcut", "hdf5"}:  # DeepLabCut writes each table twice
         tables = {path.with_suffix("") for path, _ in found["deeplabcut"]}
         if all(path.with_suffix("") in tables for path, _ in found["hdf5"]):
@@ -317,7 +324,7 @@ def _may_be_other(file: Found) -> bool:
     return file[0].suffix.lower() in _OFTEN_OTHER
 
 
-def _not_read(sample: Sample) -> FormatError:
+def _not_read(sample: Sample, advice: str) -> FormatError:
     """Return that a file is not read, in the words of the program that wrote it."""
     known = next((layout for layout in UNREAD if layout.recognizes(sample)), None)
     if known is not None:
@@ -329,10 +336,14 @@ def _not_read(sample: Sample) -> FormatError:
         except FormatError as error:
             return error
         is_group = isinstance(data, dict)
-        found = f"JSON with the keys {quoted(', '.join(map(str, data)))}" if is_group else f"JSON with {quoted(data)}"
+        found = (
+            f"JSON with the keys {quoted(', '.join(map(str, data)))}"
+            if is_group and data
+            else f"JSON with {quoted(data)}"
+        )
     return FormatError(
         f"file {sample.path}: expected key points, joints or masks of a program that docs/observations.md lists, found "
-        f"{found}; export it in one of its formats"
+        f"{found}; {advice}export it in one of its formats"
     )
 
 

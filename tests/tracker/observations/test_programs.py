@@ -19,6 +19,7 @@ from program_files import (
 
 from tracker.errors import FormatError
 from tracker.formats.keypoints.coco_reading import read_coco
+from tracker.formats.keypoints.detections import read_yolo
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints
 from tracker.observations.readers import FORMATS as FORMATS_BY_NAME
@@ -267,6 +268,11 @@ def test_messages_name_the_program_that_wrote_the_file(tmp_path, name, text, exp
         ("a.json", '{"shapes": [], "imagePath": "a.png"}', "is of LabelMe, which is not read; export COCO"),
         ("a.mat", "MATLAB", "is of a MATLAB file, which is not read; export a CSV"),
         ("a.json", '{"a": 1, "b": 2}', "found JSON with the keys 'a, b'; export it in one of its formats"),
+        (
+            "a.json",
+            '[{"image": "a.png", "annotation_id": 1}]',
+            "of Label Studio's JSON-MIN, which is not read; export JSON",
+        ),
         ("a.json", "{", "a.json is not valid JSON"),
         ("a.json", "[[1, 2]]", r"found JSON with \[\[1, 2\]\]"),
         ("notes.txt", "hello", "found one that begins with 'hello'"),
@@ -285,8 +291,35 @@ def test_notes_beside_files_are_left_out(session, tmp_path):
     (tmp_path / "f" / "camera.xml").write_text("<opencv_storage/>")
     assert find_files((tmp_path / "f",))[0] == "sleap csv"
     (tmp_path / "f" / "settings.json").write_text("{}")
-    with pytest.raises(FormatError, match=r"settings\.json: expected key points"):
+    with pytest.raises(
+        FormatError, match=r"settings\.json: expected key points.*found JSON with \{\}; leave it out, or export it"
+    ):
         find_files((tmp_path / "f",))
+
+
+def yolo_person(points, dims, *more, box=None):
+    """A line of a person with x, y, and a visibility if there are three dimensions; the box is around the points."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    box = [*(low + high) / 2, *(high - low)] if box is None else box
+    values = points if dims == 2 else np.column_stack([points, np.full(len(points), 0.9)])
+    return " ".join(map(str, [0, *box, *values.ravel(), *more]))
+
+
+@pytest.mark.parametrize("more", [(), (0.9,), (0.9, 3)])
+@pytest.mark.parametrize("dims", [2, 3])
+@pytest.mark.parametrize("n_points", [16, 17, 25, 26, 33])
+def test_points_of_yolo_have_a_visibility_or_none(tmp_path, n_points, dims, more):
+    points = np.random.default_rng(n_points).uniform((0.1, 0.2), (0.4, 0.9), (2, n_points, 2))
+    (tmp_path / "a_1.txt").write_text("\n".join(yolo_person(p, dims, *more) for p in points))
+    found = read_yolo(tmp_path / "a_1.txt")
+    np.testing.assert_allclose([person.points[:, :2] for person in found], points)
+
+
+def test_points_of_yolo_that_fit_both_readings_are_asked_about(tmp_path):
+    points = np.random.default_rng(0).uniform((0.1, 0.2), (0.4, 0.9), (17, 2))
+    (tmp_path / "a_1.txt").write_text(yolo_person(points, 3, box=(0.5, 0.5, 1, 1)))
+    with pytest.raises(FormatError, match="17 points with a visibility or 25 without"):
+        read_yolo(tmp_path / "a_1.txt")
 
 
 def coco_of(n_names, n_annotations, **more):

@@ -12,9 +12,11 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.delimited import TableLine, read_delimited
+from tracker.formats.joint_maps import joint_maps_of_size
 from tracker.formats.keypoints.openpose import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of, triples
 from tracker.formats.number_rows import MAX_NAMES, not_a_number
+from tracker.geometry.arrays import Array
 from tracker.text_files import read_json, read_lines
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, Name, Number, check
 
@@ -113,15 +115,31 @@ def read_yolo(path: Path) -> list[PicturePerson]:
     found = []
     for number, line in enumerate(read_lines(path, text_of("YOLO")), 1):
         if line.strip():
-            values = parse_numbers(line.split(), f"YOLO file {path}, line {number}")[len(_BOX) :]
-            n_points = len(values) // 3
-            if not 0 < n_points <= MAX_NAMES or len(found) >= MAX_PEOPLE:
+            where = f"YOLO file {path}, line {number}"
+            values = parse_numbers(line.split(), where)
+            if not 0 < (len(values) - len(_BOX)) // 3 <= MAX_NAMES or len(found) >= MAX_PEOPLE:
                 raise FormatError(
-                    f"YOLO file {path}, line {number}: expected a box and x, y, visibility of each point, of up to "
-                    f"{MAX_PEOPLE} people, found {len(_BOX) + len(values)} numbers; export key points"
+                    f"{where}: expected a box and x, y, visibility of each point, of up to {MAX_PEOPLE} people, found "
+                    f"{len(values)} numbers; export key points"
                 )
-            found.append(PicturePerson(triples(np.reshape(values[: 3 * n_points], (-1, 3)).tolist())))
+            found.append(PicturePerson(_yolo_points(np.array(values), where)))
     return found
+
+
+def _yolo_points(values: Array, where: str) -> Array:
+    """Return points with a visibility, or without one if a skeleton has that many, and more of them are in the box."""
+    box, values = np.split(values[1:], [len(_BOX) - 1])
+    n_with, n_without = len(values) // 3, (len(values) - (values[-1] >= 1)) // 2  # a track counts from 1
+    with_, without = np.reshape(values[: 3 * n_with], (-1, 3)), np.reshape(values[: 2 * n_without], (-1, 2))
+    inside = [np.mean(np.abs(p[:, :2] - box[:2]) <= box[2:] / 2) for p in (with_, without)]
+    if joint_maps_of_size(n_without) and inside[1] >= inside[0] and values.any():
+        if inside[1] == inside[0] and joint_maps_of_size(n_with):
+            raise FormatError(
+                f"{where}: expected numbers of one known skeleton, found those of {n_with} points with a visibility or "
+                f"{n_without} without; export visibilities, and boxes that are around the points"
+            )
+        return triples(without.tolist(), np.ones(n_without).tolist())
+    return triples(with_.tolist())
 
 
 def is_yolo(head: Sequence[str]) -> bool:
