@@ -52,7 +52,7 @@ PHRASES = {
     ),
     "pair_images": Phrases(
         "rename them so that one number counts, or say --offset CAM=0 to pair them in their order",
-        "rename them so that one number counts",
+        "rename them so that one number counts, or give an offset of 0 to pair them in their order",
     ),
     "give_camera_background": Phrases(
         "add it or leave out --background", "add it, or leave the field Background empty"

@@ -33,8 +33,8 @@ class CameraChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Its video or folder of images."""
     side_name: Name | None = None
     """Name after which its background and masks are filed; null for its own."""
-    offset: _Offset = 0
-    """Frame k of the session is frame k + offset of the camera; it may have a fraction."""
+    offset: _Offset | None = None
+    """Frame k of the session is frame k + offset of the camera; it may have a fraction. None leaves it to clocks."""
 
 
 class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -118,7 +118,7 @@ def _request(form: NewSessionForm) -> NewSession:
         background=None if form.background is None else typed_path(form.background),
         masks=None if form.masks is None else typed_path(form.masks),
         side_names={c.name: c.side_name for c in form.cameras if c.side_name is not None},
-        offsets={c.name: c.offset for c in form.cameras if c.offset},
+        offsets={c.name: c.offset for c in form.cameras if c.offset is not None},
         people=tuple(form.people),
         models=_of_each(form, "body model", [_model(m) for m in form.models]) or DEFAULT_MODEL,
         heights=_of_each(form, "height", [h / 100 for h in form.heights_cm]),

@@ -5,9 +5,9 @@ import { previewOf } from "./path_picker.js";
 
 /**
  * @typedef {{path: string, name: string}} Footage
- * @typedef {{footage: string, side: string, offset: number}} Choice footage is empty where the camera is left out; side is
+ * @typedef {{footage: string, side: string, offset: number | null}} Choice footage is empty where the camera is left out; side is
  *   the name after which background and masks are filed
- * @typedef {{name: string, footage: string, side_name: string, offset: number}} CameraChoice
+ * @typedef {{name: string, footage: string, side_name: string, offset: number | null}} CameraChoice
  */
 
 const ELSEWHERE = "\0";
@@ -44,7 +44,7 @@ export class CameraCards {
     const before = isKept ? this.#choices : new Map();
     this.#files = files;
     this.#choices = new Map(
-      names.map((name) => [name, before.get(name) ?? { footage: assigned[name] ?? "", side: name, offset: 0 }]),
+      names.map((name) => [name, before.get(name) ?? { footage: assigned[name] ?? "", side: name, offset: null }]),
     );
     this.#draw();
   }
@@ -99,12 +99,11 @@ export class CameraCards {
     const picture = choice.footage ? firstFrame(name, choice.footage) : noPicture("No footage");
     const title = Object.assign(document.createElement("b"), { textContent: name });
     const offset = document.createElement("input");
-    Object.assign(offset, { id: `new-offset-${index}`, type: "number", step: "any", value: String(choice.offset), className: "query-field" });
-    offset.title = `Offset of ${name}: number of frames that it began earlier than the others, such as 2 or 2.4`;
+    Object.assign(offset, { id: `new-offset-${index}`, type: "number", step: "any", placeholder: "auto", value: String(choice.offset ?? ""), className: "query-field" });
+    offset.title = `Offset of ${name}: number of frames that it began earlier than the others, such as 2 or 2.4. Empty: by the clocks of the footage, else 0`;
     offset.setAttribute("aria-label", `Offset of ${name} in frames`);
     offset.addEventListener("change", () => {
-      choice.offset = Number(offset.value) || 0;
-      offset.value = String(choice.offset);
+      choice.offset = offset.value === "" ? null : Number(offset.value);
       this.#changed();
     });
     const line = document.createElement("span");

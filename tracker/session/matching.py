@@ -216,7 +216,7 @@ def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, in
         if gaps := missing_numbers(numbers):
             raise RecordingError(
                 f"camera '{name}': {path} has no image with number {_listed(gaps)}, expected every number from "
-                f"{numbers[0]} to {numbers[-1]}; restore it, or number the images without a gap"
+                f"{numbers[0]} to {numbers[-1]}; restore it, or put a copy of its neighbour there"
             )
     if offsets or shorten or len(numbered) < 2:
         return

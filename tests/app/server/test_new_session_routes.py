@@ -114,6 +114,23 @@ async def test_footage_is_given_to_cameras_by_hand(folders, serve, form):
     assert "one body model for all" in line["failed"]
 
 
+async def test_an_offset_of_0_is_given_on_purpose(folders, serve, form):
+    """Names of pictures that do not show the instant are paired in their order by it, without it they are refused."""
+    client, walk = await serve(), folders[0]
+    cameras = []
+    for name, words in (("FRONT", ("a", "b")), ("LEFT", ("1000", "2000"))):
+        image = cv2.VideoCapture(str(walk / f"{name}.mp4")).read()[1]
+        (walk / f"{name}_pictures").mkdir()
+        for word in words:
+            cv2.imwrite(str(walk / f"{name}_pictures" / f"{word}.png"), image)
+        cameras.append({"name": name, "footage": str(walk / f"{name}_pictures"), "offset": None})
+    (*_, line) = await client.make(form | {"cameras": cameras, "fps": 30})
+    assert "give an offset of 0 to pair them in their order" in line["failed"], line
+    cameras[1]["offset"] = 0
+    lines = await client.make(form | {"cameras": cameras, "fps": 30})
+    assert "made" in lines[-1], lines
+
+
 @pytest.mark.slow
 async def test_frames_that_only_some_cameras_have_are_left_out_by_choice(folders, serve, form):
     client, walk = await serve(), folders[0]
