@@ -151,10 +151,6 @@ PHRASES = {
         "make the session with the --model, a preset or a file, that the poses are of",
         "make a session with the body model that the poses are of",
     ),
-    "check_joint_units": Phrases(
-        "check the units of the file, and --joint-map",
-        "check the units of the file, and which joint each marker stands for",
-    ),
     "check_world_of_file": Phrases(
         "check --axes, the units of the file, and that it is in the world of the calibration and of this recording",
         "check the axes and units of the file, and that it is in the world of the calibration and of this recording",

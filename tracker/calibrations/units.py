@@ -9,6 +9,7 @@ from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import METRES, CameraEntry, Units
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import MIN_APART_M, axes_point
+from tracker.geometry.cameras import MAX_PINHOLE_ANGLE
 from tracker.validation import quoted
 
 _DISTANCE, _FOCAL = USUAL_SIZES["distance"], USUAL_SIZES["focal length"]
@@ -68,9 +69,11 @@ def check_focal_lengths(entries: Sequence[CameraEntry], where: str) -> None:
     for entry in entries:
         side = max(entry.size or 2 * entry.K[:2, 2] + 1)
         share = float(entry.K[0, 0]) / side
-        if share > _FOCAL.high or (share < _FOCAL.low and not entry.fisheye):
+        # Pictures of a fisheye that a program has undistorted are wider than those of any lens without distortion.
+        low = _FOCAL.low if np.any(entry.distortion) else round(0.5 / np.tan(MAX_PINHOLE_ANGLE), 2)
+        if share > _FOCAL.high or (share < low and not entry.fisheye):
             raise CalibrationError(
-                f"{where}, camera {quoted(entry.name)}: expected a focal length of {_FOCAL.low:g} to {_FOCAL.high:g} "
+                f"{where}, camera {quoted(entry.name)}: expected a focal length of {low:g} to {_FOCAL.high:g} "
                 f"times the longer side of the picture, found {share:.2g} times ({entry.K[0, 0]:.5g} px of {side:.0f})",
                 Remedy("any_size"),
             )

@@ -36,7 +36,7 @@ USUAL_SIZES: Mapping[str, UsualSize] = {
 """By kind of thing. Squares of a board: from one that is as small as a hand to one that two people carry. Distance of
 cameras from what they look at: a person fills a lens of 60 degrees at 0.5 m, and has 25 px of 1,000 at 60 m. People: of
 those who walk, the smallest have 0.6 m, and few have 2.3 m (WHO growth standards). Focal lengths: fields of view of 118
-to 11 degrees; fisheyes may have shorter ones."""
+to 11 degrees. Fisheyes have shorter ones, and undistorted pictures of them up to 140 degrees (`MAX_PINHOLE_ANGLE`)."""
 _UNITS = {word: METRES_BY_WORD[unit] for word, unit in {
     "metres": "m", "centimetres": "cm", "millimetres": "mm", "inches": "in"
 }.items()}  # fmt: skip

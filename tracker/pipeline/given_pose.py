@@ -8,7 +8,6 @@ import numpy as np
 
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
 from tracker.acquisition.from_joints import height_from_joints, pose_at_joints
-from tracker.body.dimensions import HEIGHT_LIMITS_M
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import fit_to_points
@@ -76,19 +75,19 @@ def set_pose_at_joints(
     row = np.flatnonzero(joints.frames == frame)
     if not len(row):
         raise TrackerError(_no_row(frame, joints), Remedy("frame_of_file"))
+    doubts = examine_joints(session, index, joints, axes, frame)
+    if doubts and not unusual:
+        raise doubts[0]
     points = dict(zip(joints.names, joints.points[row[0]], strict=True))
     limbs = {n: p for n, p in points.items() if n in LIMB_JOINTS and np.all(np.isfinite(p))}
     if fit_sizes or (has_preset_sizes(person.model) and set(joints.names).issuperset(LIMB_JOINTS)):
-        person = replace(person, model=person.model.with_height(_checked(height_from_joints(person.model, joints))))
+        person = replace(person, model=person.model.with_height(height_from_joints(person.model, joints)))
     with SessionLock(session.folder):
         acquired = _acquire(session, person, joints) if fit_sizes else None
         if acquired is not None and acquired.is_better:
             person = replace(person, model=acquired.body)
         pose = fit_to_points(person.model, limbs, centers=True).pose
         views = _views(session, person, pose)
-        doubts = examine_joints(session, index, joints, axes, frame)
-        if doubts and not unusual:
-            raise doubts[0]
         if person is not session.people[index]:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
             save_session(replace(session, people=people))
@@ -138,16 +137,6 @@ def _no_row(frame: int, joints: MarkerTable) -> str:
         return f"no row for frame {frame}: the file lacks frames {before + 1} to {after - 1}"
     placed = f" ({joints.notes[0]})" if joints.notes else ""
     return f"expected a row of frame {frame}, found frames {frames[0]} to {frames[-1]} in the file{placed}"
-
-
-def _checked(height_m: float) -> float:
-    lowest, highest = HEIGHT_LIMITS_M
-    if not lowest <= height_m <= highest:
-        raise TrackerError(
-            f"expected joints of a body {lowest} to {highest} m tall, found one of {height_m:.3g} m",
-            Remedy("check_joint_units"),
-        )
-    return height_m
 
 
 def _acquire(session: Session, person: Person, joints: MarkerTable) -> Acquisition:

@@ -112,7 +112,9 @@ def test_init_says_where_the_body_is_and_refuses_what_is_nowhere(run, session, t
         "px beside the picture",
         "--axes",
     ]
-    assert_refused(run("init", session, "--joints", tmp_path / "far.trc", "--frame", "2"), expected)
+    far = ["init", session, "--joints", tmp_path / "far.trc", "--frame", "2"]
+    assert_refused(run(*far), ["expected people that two cameras show", ", 40.01,", "--axes"])
+    assert_refused(run(*far, "--unusual"), expected)
     assert sorted(stored(session)) == [0, 1]
 
     write_trc(tmp_path / "small.trc", joints.names, joints.points / 1000, 25.0)

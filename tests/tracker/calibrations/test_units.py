@@ -108,14 +108,18 @@ def test_rooms_of_unusual_size_need_a_word(tmp_path, factor, limit):
     assert "check that the unit is metres" in note
 
 
-@pytest.mark.parametrize(("factor", "fisheye"), [(0.25, False), (6.0, False), (6.0, True)])
-def test_unusual_focal_lengths_need_a_word(tmp_path, factor, fisheye):
+@pytest.mark.parametrize(
+    ("factor", "k1", "fisheye", "low"),
+    [(0.25, 0.1, False, 0.3), (0.17, 0.0, False, 0.18), (6.0, 0.1, False, 0.3), (6.0, 0.1, True, 0.3)],
+)
+def test_unusual_focal_lengths_need_a_word(tmp_path, factor, k1, fisheye, low):
     K = np.diag([factor * 1.28, factor * 1.28, 1.0]) @ RIG_K  # 500 px of 640 are 0.78
     K[:2, 2] = RIG_K[:2, 2]
-    path = opencv_words(tmp_path, [replace(c, K=K) for c in cameras(ring(4))])
+    lens = {"K": K, "distortion": np.array([k1, 0.0, 0.0, 0.0])}
+    path = opencv_words(tmp_path, [replace(c, **lens) for c in cameras(ring(4))])
     rows = json.loads(path.read_text())
     path.write_text(json.dumps({name: row | {"fisheye": fisheye} for name, row in rows.items()}))
-    with pytest.raises(CalibrationError, match=r"focal length of 0\.3 to 5 times the longer side .* found") as caught:
+    with pytest.raises(CalibrationError, match=f"focal length of {low} to 5 times the longer side .* found") as caught:
         read_cameras(path)
     assert caught.value.remedy.code == "any_size"
     assert len(read_cameras(path, any_size=True).entries) == 4

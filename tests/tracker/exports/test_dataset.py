@@ -45,7 +45,7 @@ def test_pictures_labels_and_cameras_agree(tmp_path, couple, pixels):
     _, recording = exported(tmp_path, session, range(1, 3), pixels=pixels)
     coco = COCO(str(recording / "labels" / "coco.json"))
     cameras = {
-        layout: [e.camera(None) for e in read_cameras(recording / "calibration" / name, any_size=True).entries]
+        layout: [e.camera(None) for e in read_cameras(recording / "calibration" / name).entries]
         for layout, name in (("anipose", "anipose.toml"), ("opencv", "opencv.yml"))
     }
     people = coco.getCatIds(["person"])

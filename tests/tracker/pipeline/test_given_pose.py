@@ -40,7 +40,7 @@ def test_a_pose_at_joints_is_a_keyframe_near_them(session, joints):
 
 @pytest.mark.parametrize(
     ("frames", "factor", "remedy"),
-    [(slice(0, 3), 1.0, "frame_of_file"), (slice(None), 100.0, "check_joint_units")],
+    [(slice(0, 3), 1.0, "frame_of_file"), (slice(None), 100.0, "read_in_unit")],
     ids=["no such row", "centimetres"],
 )
 def test_joints_that_cannot_be_used_leave_the_session_as_it_was(session, joints, frames, factor, remedy):
