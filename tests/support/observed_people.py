@@ -5,6 +5,7 @@ import json
 import numpy as np
 from rigs import cameras, ring
 
+from tracker.evaluation.references import read_joints
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.joint_maps import known_joint_maps
 from tracker.formats.model_toml import load_model
@@ -37,6 +38,16 @@ def walking(n_frames, start=(-0.5, 0.0, 0.0), step=(0.03, 0.01, 0.0), names=BODY
         swing = np.sin(0.3 * k) * 0.35 * np.abs(points[:, 2] - 1.0) * np.sign(points[:, 1])
         out[k, :, 0] += np.where(points[:, 2] < 1.3, swing, 0.0)
         out[k] += np.array(start) + k * np.array(step)
+    return out
+
+
+def true_motion(session):
+    """Points of the person whom the sample shows, (n_frames, n_points, 3), metres; NaN where they are unknown."""
+    truth = read_joints(session.folder / "truth.trc", session.fps)
+    out = np.full((session.n_frames, len(BODY_25.points), 3), np.nan)
+    for point, marker in BODY_25.markers.items():
+        if point in truth.names and marker in BODY_25.points:  # others are means of two
+            out[:, BODY_25.points.index(marker)] = truth.points[:, truth.names.index(point)]
     return out
 
 

@@ -7,7 +7,7 @@ import shutil
 
 import aiohttp
 import pytest
-from observed_people import seen, walking, write_openpose
+from observed_people import seen, true_motion, write_openpose
 from serving import listening
 
 from app.server import server
@@ -67,11 +67,11 @@ async def serve(controller, tmp_path):
 
 @pytest.fixture
 def form(controller, tmp_path):
-    """The form of files of a person who walks before the cameras of the session."""
+    """The form of files of the person whom the cameras of the session show."""
     session = controller.session
-    points = seen(session, [walking(session.n_frames, step=(0.002, 0.0, 0.0))])
+    points = seen(session, [true_motion(session)])
     folder = write_openpose(tmp_path / "found", session.camera_names, points)
-    return {"paths": str(folder), "name": "net", "people": [session.people[0].name], "unusual": True}
+    return {"paths": str(folder), "name": "net", "people": [session.people[0].name]}
 
 
 async def test_files_are_described_and_then_stored(controller, serve, form):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gestures import drag, wait_for
 from mask_files import write_masks
-from observed_people import BODY_25, seen, walking, write_openpose
+from observed_people import BODY_25, seen, true_motion, write_openpose
 
 from app.control.tracking import observing
 from app.drawing import overlays
@@ -28,11 +28,10 @@ def controller(opened):
 
 @pytest.fixture
 def request_of(controller, tmp_path):
-    """Files of a person who walks before the cameras of the session, and the request that imports them."""
+    """Files of the person whom the cameras of the session show, and the request that imports them."""
     session = controller.session
-    motion = walking(session.n_frames, step=(0.002, 0.0, 0.0))
-    files = write_openpose(tmp_path / "found", session.camera_names, seen(session, [motion]))
-    return ImportRequest("openpose", (files,), tuple(p.name for p in session.people), unusual=True)
+    files = write_openpose(tmp_path / "found", session.camera_names, seen(session, [true_motion(session)]))
+    return ImportRequest("openpose", (files,), tuple(p.name for p in session.people))
 
 
 @pytest.fixture
