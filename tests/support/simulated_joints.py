@@ -120,7 +120,7 @@ class Case:
         self.stated_m = self.height_m * float(np.exp(0.05 * self.rng.normal()))
 
     def found(self, points, skeleton=None, axes="x,y,z", in_space=True):
-        """What speaks against points that are read as a skeleton, by default their own."""
+        """Reasons against points that are read as a skeleton, by default their own."""
         given = Reading(skeleton or self.skeleton, axes)
         same_size = [m for m in SKELETONS.values() if len(m.points) == len(given.joint_map.points)]
         maps = [given.joint_map, *(m for m in same_size if m.name != given.joint_map.name)]

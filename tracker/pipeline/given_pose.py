@@ -42,7 +42,7 @@ class GivenPose:
     backup_error: str | None = None
     """Why the store could not be backed up; None if it could."""
     notes: tuple[str, ...] = ()
-    """Sentences on what speaks against the joints, which the user accepted."""
+    """Sentences on reasons against the joints, which the user accepted."""
 
     @property
     def points_world(self) -> Array:

@@ -39,7 +39,7 @@ class PeoplePriors(NamedTuple):
     postures: float = 10.0
     """Number of postures from which on their common offsets count more than their number."""
     parts: int = 4
-    """Parts that tell something each in each view: forearms and calves."""
+    """Parts that are independent evidence in each view: forearms and calves."""
     stretch_s: float = 2.0
     """Shortest stretch of a motion that is looked at, seconds: two steps of each leg."""
     most_off: float = 0.5

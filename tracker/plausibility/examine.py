@@ -37,7 +37,7 @@ def plan_examined_import(session: Session, request: ImportRequest) -> ImportPlan
 
 
 def examine_import(session: Session, request: ImportRequest, plan: ImportPlan) -> ImportPlan:
-    """Return a plan with what speaks against its points as problems, or as notes where the user accepts that.
+    """Return a plan with reasons against its points as problems, or as notes where the user accepts that.
 
     Args:
         session: its cameras, footage and people.
@@ -59,7 +59,7 @@ def examine_import(session: Session, request: ImportRequest, plan: ImportPlan) -
 
 
 def examine_joints(session: Session, person: int, joints: MarkerTable, axes: str, around: int) -> list[FormatError]:
-    """Return what speaks against joints of a person in space, by the frames around one.
+    """Return reasons against joints of a person in space, by the frames around one.
 
     Args:
         session: its cameras, footage and people.
@@ -79,7 +79,7 @@ def examine_joints(session: Session, person: int, joints: MarkerTable, axes: str
 
 
 def examine_keypoints(observations: ObservationSet, cameras: Sequence[Camera], fps: float) -> list[FormatError]:
-    """Return what speaks against the names of key points, by the bones of the people whom they calibrated.
+    """Return reasons against the names of key points, by the bones of the people whom they calibrated.
 
     Args:
         observations: key points in pictures.
@@ -238,12 +238,12 @@ def _impossible(read: ReadPoints, reading: Reading) -> list[FormatError]:
         elif not USUAL_SIZES["person"].has(bones.stature):
             text = f"expected a person of a usual height, found one {bones.stature:.3g} m tall"
             found.append(FormatError(text, Remedy("check_points")))
-    witness = None if read.witness is None else read.witness.certain
-    cost = replace(read, witness=witness).misplaced(reading)
+    known_people = None if read.known_people is None else read.known_people.certain
+    cost = replace(read, known_people=known_people).misplaced(reading)
     if not found and cost > PRIORS.most_off:
         places = np.concatenate([[*p.values()] for p in read.places(reading)], axis=1).reshape(-1, 3)
         middle = ", ".join(f"{x:.2f}" for x in np.nanmedian(places, axis=0))
-        is_filmed = witness is not None and witness.knows_frames
+        is_filmed = known_people is not None and known_people.knows_frames
         wanted, where = ("people", "their silhouettes") if is_filmed else ("points", "pictures")
         text = f"expected {wanted} that two cameras show, found {1 - cost:.0%} in {where}, around {middle} m"
         found.append(FormatError(text, Remedy("check_world_of_file")))

@@ -33,7 +33,7 @@ class PosedPerson:
         return self
 
     def costs(self, places: Places, shift: int = 0) -> Array:
-        """Return how far joints lie from the known ones, (F,); see `readings.Witness`."""
+        """Return how far joints lie from the known ones, (F,); see `readings.KnownPeople`."""
         names = [name for name in places if name in self.places]
         if not names:
             return np.full(len(next(iter(places.values()))), np.nan)

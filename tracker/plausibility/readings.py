@@ -28,7 +28,7 @@ from tracker.plausibility.body_likelihood import (
 )
 
 
-class Witness(Protocol):
+class KnownPeople(Protocol):
     """Evidence of where people are on some frames."""
 
     @property
@@ -40,8 +40,8 @@ class Witness(Protocol):
         """Whether it differs from frame to frame."""
 
     @property
-    def certain(self) -> "Witness":
-        """The part of it that also tells by itself that people are elsewhere."""
+    def certain(self) -> "KnownPeople":
+        """The part of it that suffices to refute people who are elsewhere."""
 
     def costs(self, places: Places, shift: int = 0) -> Array:
         """Return how far a person is from it, (F,): mean truncated squares, 0 to 1; NaN where unknown.
@@ -98,7 +98,7 @@ class ReadPoints:
     """Direction of the vertical of the session, (3,)."""
     fps: float
     """Frames of the session per second."""
-    witness: Witness | None
+    known_people: KnownPeople | None
     """The people of the recording on these frames; None for the body alone."""
 
     @property
@@ -198,7 +198,7 @@ class ReadPoints:
         It is at most a quarter of the stretch and `SAMPLES` steps. A parabola places it between two frames.
         """
         most = min(len(self.points) // 4, SAMPLES)
-        if self.witness is None or not self.witness.knows_frames or not most:
+        if self.known_people is None or not self.known_people.knows_frames or not most:
             return 0.0
         costs = np.array([self._costs(replace(reading, shift=s)) for s in range(-most, most + 1)])
         both = np.isfinite(costs).all(axis=0)  # the same frames and people at all shifts
@@ -220,13 +220,13 @@ class ReadPoints:
 
         Distances are normal with the standard deviation of joints, up to `INLIER_M`. Each limb counts in each view.
         """
-        if self.witness is None:
+        if self.known_people is None:
             return 0.0
         sigma_m = PRIORS.error * float(np.mean(self.statures_m))
-        return -0.5 * (INLIER_M / sigma_m) ** 2 * PRIORS.parts * self.witness.n_views * self.n_postures
+        return -0.5 * (INLIER_M / sigma_m) ** 2 * PRIORS.parts * self.known_people.n_views * self.n_postures
 
     def _costs(self, reading: Reading) -> Array:
         """Return how far each person is from those of the recording, (n_people * F,), 0 to 1; NaN if unknown."""
-        if self.witness is None:
+        if self.known_people is None:
             return np.empty(0)
-        return np.concatenate([self.witness.costs(p, reading.shift) for p in self.places(reading)])
+        return np.concatenate([self.known_people.costs(p, reading.shift) for p in self.places(reading)])
