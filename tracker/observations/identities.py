@@ -16,8 +16,8 @@ SAME_PERSON_M = 0.4
 
 
 @dataclass
-class _Track:
-    """A person who is followed."""
+class PersonTrack:
+    """A person who is followed, as long as enough views show the person."""
 
     last_world: Array
     """Last known position of each point, (n_points, 3), metres; NaN where never known."""
@@ -42,24 +42,30 @@ def match_people(views: Views, points_px: Array, confidence: Array, n_people: in
     assert isinstance(is_present, np.ndarray)
     if n_people == 1 and is_present.sum(axis=2).max(initial=0) <= 1:
         return np.where(is_present, 0, -1)
-    tracks: list[_Track] = []
+    tracks: list[PersonTrack] = []
     for frame in range(len(points_px)):
-        _follow(views, points_px[frame], confidence[frame], is_present[frame], frame, tracks)
-    chosen = _people(tracks, n_people)
+        follow_people(views, points_px[frame], confidence[frame], frame, tracks)
     out = np.full(is_present.shape, -1, dtype=np.int64)
-    for person, some in enumerate(chosen):
+    for person, some in enumerate(most_seen_people(tracks, n_people)):
         for track in some:
             for (frame, view), detection in track.members.items():
                 out[frame, view, detection] = person
     return out
 
 
-def _follow(
-    views: Views, points_px: Array, confidence: Array, is_present: Mask, frame: int, tracks: list[_Track]
-) -> None:
-    """Assign the detections of a frame to the tracks, and begin tracks with those that are left."""
+def follow_people(views: Views, points_px: Array, confidence: Array, frame: int, tracks: list[PersonTrack]) -> None:
+    """Assign the detections of a frame to the tracks, and begin tracks with those that are left.
+
+    Args:
+        views: the cameras.
+        points_px: undistorted px, (n_views, n_detections, n_points, 2); NaN where absent.
+        confidence: (n_views, n_detections, n_points).
+        frame: its number.
+        tracks: of the frames before; they are extended.
+    """
     from scipy.optimize import linear_sum_assignment  # imported lazily: it takes a third of a second
 
+    is_present = (np.isfinite(points_px).all(axis=-1) & (confidence > 0)).any(axis=-1)
     taken: dict[int, dict[int, int]] = {}
     left = {(v, int(d)) for v in range(len(is_present)) for d in np.flatnonzero(is_present[v])}
     for v in range(len(is_present)):
@@ -67,14 +73,14 @@ def _follow(
         if not (detections and tracks):
             continue
         distances = np.array(
-            [[_distance(views, v, t.last_world, points_px[v, d], confidence[v, d]) for d in detections] for t in tracks]
+            [[track_distance(views, v, t.last_world, points_px[v, d], confidence[v, d]) for d in detections] for t in tracks]
         )
         for row, i in zip(*linear_sum_assignment(distances), strict=True):
             if distances[row, i] < SAME_PERSON_M:
                 taken.setdefault(int(row), {})[v] = detections[i]
                 left.discard((v, detections[i]))
     for group in _groups(views, points_px, confidence, sorted(left)):
-        tracks.append(_Track(np.full((*points_px.shape[2:3], 3), np.nan), {}))
+        tracks.append(PersonTrack(np.full((*points_px.shape[2:3], 3), np.nan), {}))
         taken[len(tracks) - 1] = group
     for t, group in taken.items():
         tracks[t].members |= {(frame, v): d for v, d in group.items()}
@@ -89,7 +95,7 @@ def _follow(
         tracks[t].last_world[known] = found[known]
 
 
-def _distance(views: Views, view: int, points_world: Array, points_px: Array, confidence: Array) -> float:
+def track_distance(views: Views, view: int, points_world: Array, points_px: Array, confidence: Array) -> float:
     """Return the median distance of a detection from points in space, metres; 1e3 if nothing can be compared."""
     projected, depths = views.project(points_world)
     apart = np.linalg.norm(projected[:, view] - points_px, axis=-1) * depths[:, view] / views.focal_px[view]
@@ -132,9 +138,9 @@ def _ray_distances(views: Views, a: int, b: int, u: Array, v: Array) -> Array:
     return apart[np.isfinite(apart)]
 
 
-def _people(tracks: list[_Track], n_people: int) -> list[list[_Track]]:
+def most_seen_people(tracks: list[PersonTrack], n_people: int) -> list[list[PersonTrack]]:
     """Join tracks that follow one another to people, those with most detections first; in order of appearance."""
-    people: list[list[_Track]] = []
+    people: list[list[PersonTrack]] = []
     for track in sorted(tracks, key=lambda t: -len(t.members)):
         frames = {frame for frame, _ in track.members}
         free = [some for some in people if not any(frames & {f for f, _ in t.members} for t in some)]
@@ -145,7 +151,7 @@ def _people(tracks: list[_Track], n_people: int) -> list[list[_Track]]:
     return sorted(people, key=lambda some: min(min(t.members) for t in some))
 
 
-def _gap(some: list[_Track], track: _Track) -> float:
+def _gap(some: list[PersonTrack], track: PersonTrack) -> float:
     """Return the distance of the last positions of a person and of a track, metres."""
     apart = [np.nanmedian(np.linalg.norm(t.last_world - track.last_world, axis=-1)) for t in some]
     return float(np.min(apart))

@@ -1,0 +1,147 @@
+"""People by the two networks of BlazePose: a finder of people and the landmarks of one (Bazarevsky et al. 2020).
+
+The networks are those of MediaPipe; their inputs and outputs are described in its model card. Each runs on one thread.
+"""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
+
+from tracker.detection.detector import SQUARE_M, Figure, PictureSquare
+from tracker.geometry.arrays import Array, Image, IntArray
+
+_N_POINTS = 33
+_STRIDES = ((8, 2), (16, 2), (32, 6))
+"""Cells of the finder's grids, px of its input, and anchors in each."""
+_LEAST = 0.5
+"""Probability from which there is a person: more likely than not."""
+_OVERLAP = 0.3
+"""Share of overlap, intersection over union, from which two boxes are of one person (Bazarevsky et al. 2020)."""
+_AROUND = 1.25
+"""Side of the square of the landmarks over the diameter of the circle around a person (model card)."""
+_KERNEL = 3
+"""Cells of a heat map around a landmark whose center of mass refines it (model card: a kernel of 7)."""
+
+
+class BlazePose:
+    """The finder of people and the network of landmarks."""
+
+    skeleton = "BlazePose_33"
+
+    def __init__(self, finder: Path, landmarks: Path) -> None:
+        """Load both networks.
+
+        Raises:
+            TrackerError: a file is missing or no such network, or the package that runs it is not installed.
+        """
+        self._finder, self._landmarks = _Network(finder), _Network(landmarks)
+        self._anchors = _anchors(self._finder.size)
+
+    def find(self, picture: Image, square: PictureSquare) -> Sequence[PictureSquare]:
+        """See `Detector.find`."""
+        n = self._finder.size
+        to_pixels = square.to_pixels(n)
+        crop = cv2.warpAffine(picture, to_pixels, (n, n), flags=cv2.INTER_AREA, borderMode=cv2.BORDER_CONSTANT)
+        raw, logits = self._finder(crop / np.float32(127.5) - 1)
+        probability = expit(logits[:, 0])
+        keep = probability > _LEAST
+        raw, anchors, probability = raw[keep] / n, self._anchors[keep], probability[keep]
+        corners = raw[:, :2] + anchors - raw[:, 2:4] / 2
+        back, out = cv2.invertAffineTransform(to_pixels), []
+        for group in _groups(np.column_stack([corners, raw[:, 2:4]]), probability):
+            weights = probability[group] / probability[group].sum()
+            hips, rim = (weights @ (raw[group, at : at + 2] + anchors[group]) * n - 0.5 for at in (4, 6))
+            out.append(_square_around(_mapped(back, hips), _mapped(back, rim)))
+        return out
+
+    def look(self, picture: Image, square: PictureSquare) -> Figure | None:
+        """See `Detector.look`."""
+        n = self._landmarks.size
+        to_pixels = square.to_pixels(n)
+        flags = cv2.INTER_AREA if square.side_px > n else cv2.INTER_LINEAR
+        crop = cv2.warpAffine(picture, to_pixels, (n, n), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        marks, presence, logits, heat, _ = self._landmarks(crop / np.float32(255))
+        if (present := float(presence.item())) <= _LEAST:
+            return None
+        marks = marks.reshape(-1, 5)[:_N_POINTS]
+        back = cv2.invertAffineTransform(to_pixels)
+        points = _mapped(back, _refined(marks[:, :2] / n, heat) * n - 0.5)
+        seen = expit(marks[:, 3]) * expit(marks[:, 4])
+        return Figure(points, seen.astype(np.float64), present, _mask(logits[..., 0], back))
+
+
+class _Network:
+    """A network of TensorFlow Lite."""
+
+    def __init__(self, path: Path) -> None:
+        from ai_edge_litert.interpreter import Interpreter  # imported lazily: an optional package
+
+        self._net = Interpreter(str(path), num_threads=1)
+        self._net.allocate_tensors()
+        self._input, self._outputs = self._net.get_input_details()[0], self._net.get_output_details()
+        self.size = int(self._input["shape"][1])
+
+    def __call__(self, image: Array) -> list[Any]:
+        self._net.set_tensor(self._input["index"], np.ascontiguousarray(image[None], np.float32))
+        self._net.invoke()
+        return [self._net.get_tensor(o["index"])[0] for o in self._outputs]
+
+
+def _anchors(size: int) -> Array:
+    """Return the centers of the finder's cells, one for each anchor, (n, 2), as shares of its input."""
+    out = []
+    for stride, count in _STRIDES:
+        centers = (np.arange(size // stride) + 0.5) * stride / size
+        out.append(np.repeat(np.stack(np.meshgrid(centers, centers), axis=-1).reshape(-1, 2), count, axis=0))
+    return np.concatenate(out)
+
+
+def _groups(boxes: Array, probability: Array) -> list[IntArray]:
+    """Join the boxes, (n, 4) as corner and size, that overlap the most probable one, and so on with those left."""
+    left, out = np.argsort(-probability), []
+    while len(left):
+        corner = np.maximum(boxes[left, :2], boxes[left[0], :2])
+        end = np.minimum(boxes[left, :2] + boxes[left, 2:], boxes[left[0], :2] + boxes[left[0], 2:])
+        common = np.maximum(end - corner, 0).prod(axis=1)
+        areas = boxes[left, 2:].prod(axis=1)
+        near = common > _OVERLAP * (areas + areas[0] - common)
+        near[0] = True
+        out.append(left[near])
+        left = left[~near]
+    return out
+
+
+def _square_around(hips_px: Array, rim_px: Array) -> PictureSquare:
+    """Return the square of a person whose circle, around the hips, passes the rim above the head."""
+    up = rim_px - hips_px
+    return PictureSquare(hips_px, 2 * _AROUND * float(np.hypot(*up)), float(np.arctan2(up[0], -up[1])))
+
+
+def _mapped(to_picture: Array, points: Array) -> Array:
+    return points @ to_picture[:, :2].T + to_picture[:, 2]
+
+
+def _refined(places: Array, heat: Array) -> Array:
+    """Move landmarks, (N, 2) as shares of the square, to the centers of mass of their heat maps around them."""
+    n, out = heat.shape[0], places.astype(np.float64)
+    for i, (column, row) in enumerate((places * n).astype(int)):
+        if not (0 <= column < n and 0 <= row < n):
+            continue
+        top, left = max(0, row - _KERNEL), max(0, column - _KERNEL)
+        weights = expit(heat[top : row + _KERNEL + 1, left : column + _KERNEL + 1, i])
+        if weights.max() >= _LEAST:
+            rows, columns = np.mgrid[top : top + weights.shape[0], left : left + weights.shape[1]]
+            out[i] = np.array([(weights * columns).sum(), (weights * rows).sum()]) / weights.sum() / n
+    return out
+
+
+def _mask(logits: Array, back: Array) -> Callable[[tuple[int, int]], NDArray[np.float32]]:
+    def probability(shape: tuple[int, int]) -> NDArray[np.float32]:
+        return cv2.warpAffine(expit(logits).astype(np.float32), back, shape[::-1], flags=cv2.INTER_LINEAR)
+
+    return probability
