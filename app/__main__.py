@@ -35,7 +35,7 @@ from app.cli.annotation import assign, compare, merge, next_, share, tasks
 from app.cli.arguments import gather_repeated
 from app.cli.batches import batch
 from app.cli.calibration import calibrate, check, sync
-from app.cli.observations import import_, judge
+from app.cli.observations import detect, import_, judge
 from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
@@ -51,6 +51,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "new": new.command,
     "calibrate": calibrate.command,
     "import": import_.command,
+    "detect": detect.command,
     "info": info.command,
     "relink": relink.command,
     "sync": sync.command,

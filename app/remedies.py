@@ -221,6 +221,13 @@ PHRASES = {
     "install_import": Phrases(
         "install it with: pip install 'quadrille[import]'", "install it with: pip install quadrille[import]"
     ),
+    "install_detect": Phrases(
+        "install it with: pip install 'quadrille[detect]'", "install it with: pip install quadrille[detect]"
+    ),
+    "get_models": Phrases(
+        "fetch it with quadrille detect --get-models, or say --models FOLDER where it is",
+        "fetch it on the command line with: quadrille detect --get-models",
+    ),
     "name_people_of_files": Phrases("name them with --person", "give one file for each person"),
     "count_frames": Phrases("say --clock frames", "correct Time in the file"),
     "choose_clock": Phrases(

@@ -73,11 +73,16 @@ def _check_mode(mode: int, path: Path) -> None:
 
 
 def write_text_atomic(path: Path, text: str, mode: int = 0o666) -> None:
-    """Write UTF-8 text to a temporary sibling, then rename it to `path`: a crash leaves the old file or the new one.
+    """Write UTF-8 text; see `write_bytes_atomic`."""
+    write_bytes_atomic(path, text.encode("utf-8"), mode)
+
+
+def write_bytes_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
+    """Write bytes to a temporary sibling, then rename it to `path`: a crash leaves the old file or the new one.
 
     Args:
         path: the file.
-        text: its content.
+        data: its content.
         mode: permissions, less those that the process masks; 0o600 for a file of this user alone.
 
     Raises:
@@ -85,9 +90,9 @@ def write_text_atomic(path: Path, text: str, mode: int = 0o666) -> None:
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
-        opened = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-        with open(opened, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
+        opened = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
+        with open(opened, "wb") as file:
+            file.write(data)
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)

@@ -23,6 +23,7 @@ ROOMS = [
     "tracker.session",
     "tracker.store",
     "tracker.observations",
+    "tracker.detection",
     "tracker.images",
     "tracker.contours",
     "tracker.evidence",

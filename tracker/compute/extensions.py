@@ -13,6 +13,7 @@ The module that it names should import little, because help and menus load it. G
 | `quadrille.exporters` | `tracker.exports.export_format.ExportFormat` |
 | `quadrille.metrics` | `tracker.evaluation.metric.Metric` |
 | `quadrille.calibrations` | `tracker.calibrations.calibration_layout.CalibrationLayout` |
+| `quadrille.detectors` | `tracker.detection.detector.DetectorKind` |
 | `quadrille.starts` | `tracker.initialization.generators.start_generators.StartGenerator` |
 """
 
@@ -33,7 +34,13 @@ _LOG = logging.getLogger(__name__)
 _OWN_POINTS = metadata.Distribution.__dict__["entry_points"]
 _UNREAD: dict[str, str] = {}
 _LOCK = threading.Lock()  # one is loaded at a time: output is redirected for all threads
-GROUPS = ("quadrille.exporters", "quadrille.metrics", "quadrille.calibrations", "quadrille.starts")
+GROUPS = (
+    "quadrille.exporters",
+    "quadrille.metrics",
+    "quadrille.calibrations",
+    "quadrille.detectors",
+    "quadrille.starts",
+)
 """Groups of entry points that are read."""
 
 

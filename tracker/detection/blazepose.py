@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from tracker.detection.detector import SQUARE_M, Figure, PictureSquare
+from tracker.detection.detector import Figure, PictureSquare
 from tracker.geometry.arrays import Array, Image, IntArray
 
 _N_POINTS = 33

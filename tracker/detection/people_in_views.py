@@ -5,6 +5,7 @@ every view around the place that the other views and the frame before show, and 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from tracker.detection.detector import SQUARE_M, Detector, Figure, PictureSquare
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.observations.identities import SAME_PERSON_M, PersonTrack, follow_people, track_distance
+from tracker.observations.observed import ObservationSet
 from tracker.observations.triangulation import Views
 
 _TORSO = ("left_shoulder", "right_shoulder", "left_hip", "right_hip")
@@ -70,6 +72,19 @@ class PeopleInViews:
                 self._complete(track, frame, figures, pictures)
         return figures
 
+    def recall(self, observations: ObservationSet) -> dict[int, list[list[Figure]]]:
+        """Take over the figures that were seen before, by frame, and follow the people among them."""
+        points, out = observations.points, dict[int, list[list[Figure]]]()
+        assert points is not None
+        for k in observations.row_frames[0].astype(int).tolist():
+            is_seen = points.is_known[k].any(axis=-1)
+            out[k] = [
+                [Figure(points.points_px[k, v, i], points.confidence[k, v, i], 1.0) for i in np.flatnonzero(own)]
+                for v, own in enumerate(is_seen)
+            ]
+            follow_people(self._views, *self._arrays(out[k]), k, self.tracks)
+        return out
+
     def _look_for(self, track: PersonTrack, figures: list[list[Figure]], pictures: Sequence[Image | None]) -> None:
         """Look for a person in all views, around the last place."""
         for v, picture in enumerate(pictures):
@@ -113,7 +128,7 @@ class PeopleInViews:
             apart = np.linalg.norm(found.points_px - other.points_px, axis=1)
             if np.nanmedian(apart) < _SAME_SHARE * square.side_px:
                 return
-        figures.append(found)
+        figures.append(replace(found, mask=None))  # masks of all frames would fill the memory
 
     def _hips(self, figure: Figure) -> Array:
         return figure.points_px[self._torso[2:]].mean(axis=0)

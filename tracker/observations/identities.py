@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.arrays import Array, IntArray
 from tracker.observations.triangulation import INLIER_M, Views, triangulate_points
 
 SAME_PERSON_M = 0.4
@@ -73,7 +73,10 @@ def follow_people(views: Views, points_px: Array, confidence: Array, frame: int,
         if not (detections and tracks):
             continue
         distances = np.array(
-            [[track_distance(views, v, t.last_world, points_px[v, d], confidence[v, d]) for d in detections] for t in tracks]
+            [
+                [track_distance(views, v, t.last_world, points_px[v, d], confidence[v, d]) for d in detections]
+                for t in tracks
+            ]
         )
         for row, i in zip(*linear_sum_assignment(distances), strict=True):
             if distances[row, i] < SAME_PERSON_M:

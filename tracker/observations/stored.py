@@ -80,19 +80,22 @@ def source_path(session: Session, name: str, source: SourceFile) -> Path:
     return files_folder(session, name) / source.path
 
 
-def save_observations(session: Session, observations: ObservationSet, files: Mapping[str, Path]) -> None:
+def save_observations(
+    session: Session, observations: ObservationSet, files: Mapping[str, Path], replaces: bool = False
+) -> None:
     """Store observations with a session.
 
     Args:
         session: to whose folder they are written.
         observations: their sources name the files.
         files: the file to copy for each path of a source.
+        replaces: whether they take the place of those of the same name.
 
     Raises:
         SessionError: there are observations of this name, a file changed since it was read, or the folder cannot be
             written.
     """
-    with appearing_folder(session, observations.name) as temporary:
+    with appearing_folder(session, observations.name, replaces) as temporary:
         for source in observations.sources:
             _copy(files[source.path], temporary / _FILES / source.path, source.sha256)
         with (temporary / _POINTS).open("wb") as file:
@@ -115,23 +118,31 @@ def new_folder(session: Session, name: str) -> Path:
 
 
 @contextmanager
-def appearing_folder(session: Session, name: str) -> Generator[Path, None, None]:
+def appearing_folder(session: Session, name: str, replaces: bool = False) -> Generator[Path, None, None]:
     """Yield a folder beside that of observations of a name, which it becomes at the end of the `with` block.
 
+    Args:
+        session: the session.
+        name: of the observations.
+        replaces: whether there are observations of this name, which go.
+
     Raises:
-        SessionError: there are observations of this name, or the folder cannot be written.
+        SessionError: there are others of this name, or the folder cannot be written.
     """
-    folder = new_folder(session, name)
-    temporary = folder.with_name(f".{name}.{secrets.token_hex(4)}.tmp")
+    folder = session.folder / FOLDER / name if replaces else new_folder(session, name)
+    temporary, replaced = (folder.with_name(f".{name}.{secrets.token_hex(4)}.tmp") for _ in range(2))
     try:
         temporary.mkdir(parents=True)
         yield temporary
+        if replaces:
+            folder.rename(replaced)
         temporary.rename(folder)
         sync_folder(folder.parent)
     except OSError as error:
         raise SessionError(f"cannot write {folder}: {error}; see that you may write to the session's folder") from error
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        for folder in (temporary, replaced):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def load_observations(session: Session, name: str) -> ObservationSet:

@@ -1,0 +1,144 @@
+"""Detect the people of a session: the points of all figures in all views, stored as observations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.compute.progress import Report, unreported
+from tracker.detection.detector import Detector, Figure
+from tracker.detection.people_in_views import PeopleInViews
+from tracker.errors import TrackerError
+from tracker.footage.recording import Recording
+from tracker.formats.joint_maps import JointMap, known_joint_maps
+from tracker.geometry.arrays import Array
+from tracker.geometry.ground_plane import floor_plane
+from tracker.observations.identities import PersonTrack
+from tracker.observations.observed import ObservationSet, ObservedPoints
+from tracker.observations.stored import list_observations, load_observations, save_observations
+from tracker.session.session import Session
+
+FORMAT = "detection"
+"""Format of observations that were detected here: they have no files."""
+_SEEN_SHARE = 0.5
+"""Share of the frames in which someone is seen who belongs to the recording: in most of them."""
+
+
+@dataclass(frozen=True)
+class DetectionPlan:
+    """What to detect, and under which name it is stored."""
+
+    name: str
+    """Name of the observations."""
+    detector: str
+    """Name of the detector and of its model, which are stored."""
+    frames: range
+    """Frames of the session, ascending."""
+
+
+@dataclass(frozen=True)
+class Detected:
+    """The outcome of a detection."""
+
+    frames: range
+    """Frames that were detected, now or before."""
+    is_complete: bool
+    """Whether these are all frames of the plan."""
+    n_figures: tuple[int, ...]
+    """Pictures of each view that show a person, by view."""
+    notes: tuple[str, ...]
+    """Sentences on what is remarkable."""
+
+
+def detect_people(session: Session, detector: Detector, plan: DetectionPlan, report: Report = unreported) -> Detected:
+    """Detect people on the frames of a plan, and store what was found; also if it is stopped.
+
+    A detection that was stopped goes on where it ended.
+
+    Args:
+        session: the session, which this process has locked.
+        detector: sees a picture.
+        plan: what to detect.
+        report: shows progress. A KeyboardInterrupt that it raises stops the work.
+
+    Raises:
+        TrackerError: the name is taken by other observations, the footage cannot be read, or nobody is seen.
+    """
+    before = _begun(session, plan)
+    convention = next(m for m in known_joint_maps() if m.name == detector.skeleton)
+    columns = {point: convention.points.index(marker) for point, marker in convention.markers.items()}
+    cameras = [c.camera for c in session.cameras]
+    people = PeopleInViews(detector, columns, cameras, floor_plane(session.up, session.floor).normal, session.fps)
+    found = {} if before is None else people.recall(before)
+    todo = [k for k in plan.frames if k not in found]
+    try:
+        with Recording(session.cameras) as recording:
+            for i, k in enumerate(todo):
+                report("detecting people", i / len(todo))
+                found[k] = people.see(k, recording.read(k))
+    except KeyboardInterrupt:
+        pass
+    if not any(own for views in found.values() for own in views):
+        raise TrackerError(
+            f"expected people in the pictures of frames {plan.frames.start} to {plan.frames.stop - 1}, found none; "
+            "look at the footage, try another model, or place the bodies by hand"
+        )
+    done = range(plan.frames.start, max(found) + 1)
+    notes = _notes(session, people.tracks, found)
+    save_observations(
+        session, _observations(session, plan, convention, found, done, notes), {}, replaces=before is not None
+    )
+    counts = tuple(sum(bool(views[v]) for views in found.values()) for v in range(len(cameras)))
+    return Detected(done, len(found) == len(plan.frames), counts, notes)
+
+
+def _begun(session: Session, plan: DetectionPlan) -> ObservationSet | None:
+    """Return what an earlier detection by the same plan has stored; None if there is none.
+
+    Raises:
+        TrackerError: there are other observations of this name, or it is complete.
+    """
+    if plan.name not in list_observations(session):
+        return None
+    stored = load_observations(session, plan.name)
+    options = dict(stored.options)
+    if stored.format != FORMAT or options["detector"] != plan.detector or options["frames"] != _text(plan.frames):
+        found = f"those of {stored.format}" + f", {options['detector']}" * ("detector" in options)
+        raise TrackerError(f"expected a free name, found '{plan.name}' taken by {found}; choose another name")
+    if options["detected"] == options["frames"]:
+        raise TrackerError(f"expected a free name, found '{plan.name}', which is complete; choose another name")
+    return stored
+
+
+def _text(frames: range) -> str:
+    return f"{frames.start}:{frames.stop}"
+
+
+def _observations(
+    session: Session, plan: DetectionPlan, convention: JointMap, found: dict[int, list[list[Figure]]], done: range,
+    notes: tuple[str, ...],
+) -> ObservationSet:  # fmt: skip
+    names = [c.camera.name for c in session.cameras]
+    n = max(len(own) for views in found.values() for own in views)
+    shape = session.n_frames, len(names), n, len(convention.points)
+    px, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
+    for k, views in found.items():
+        for v, own in enumerate(views):
+            for i, figure in enumerate(own):
+                px[k, v, i], confidence[k, v, i] = figure.points_px, figure.confidence
+    options = ("detector", plan.detector), ("frames", _text(plan.frames)), ("detected", _text(done))
+    points = ObservedPoints(convention.points, tuple(names), px, confidence)
+    rows: Array = np.array(sorted(found), dtype=np.float64)
+    people = tuple(p.name for p in session.people)
+    return ObservationSet(plan.name, FORMAT, people, convention, points, None, (rows,), (), notes, options)
+
+
+def _notes(session: Session, tracks: Sequence[PersonTrack], found: dict[int, list[list[Figure]]]) -> tuple[str, ...]:
+    """Say whether other people than those of the session are seen."""
+    n_seen = sum(len({k for k, _ in t.members}) > _SEEN_SHARE * len(found) for t in tracks)
+    n = len(session.people)
+    if n_seen == n:
+        return ()
+    if n_seen > n:
+        return (f"{n_seen} people are seen in most frames, the session has {n}: those seen most are taken",)
+    return (f"{n_seen} of {n} people are seen in most frames",)
