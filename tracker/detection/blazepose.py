@@ -52,7 +52,7 @@ class BlazePose:
         keep = probability > _LEAST
         raw, anchors, probability = raw[keep] / n, self._anchors[keep], probability[keep]
         corners = raw[:, :2] + anchors - raw[:, 2:4] / 2
-        back, out = cv2.invertAffineTransform(to_pixels), []
+        back, out = _inverse(to_pixels), []
         for group in _groups(np.column_stack([corners, raw[:, 2:4]]), probability):
             weights = probability[group] / probability[group].sum()
             hips, rim = (weights @ (raw[group, at : at + 2] + anchors[group]) * n - 0.5 for at in (4, 6))
@@ -69,7 +69,7 @@ class BlazePose:
         if (present := float(presence.item())) <= _LEAST:
             return None
         marks = marks.reshape(-1, 5)[:_N_POINTS]
-        back = cv2.invertAffineTransform(to_pixels)
+        back = _inverse(to_pixels)
         points = _mapped(back, _refined(marks[:, :2] / n, heat) * n - 0.5)
         seen = expit(marks[:, 3]) * expit(marks[:, 4])
         return Figure(points, seen.astype(np.float64), present, _mask(logits[..., 0], back))
@@ -86,7 +86,7 @@ class _Network:
         self._input, self._outputs = self._net.get_input_details()[0], self._net.get_output_details()
         self.size = int(self._input["shape"][1])
 
-    def __call__(self, image: Array) -> list[Any]:
+    def __call__(self, image: NDArray[np.floating]) -> list[Any]:
         self._net.set_tensor(self._input["index"], np.ascontiguousarray(image[None], np.float32))
         self._net.invoke()
         return [self._net.get_tensor(o["index"])[0] for o in self._outputs]
@@ -122,6 +122,10 @@ def _square_around(hips_px: Array, rim_px: Array) -> PictureSquare:
     return PictureSquare(hips_px, 2 * _AROUND * float(np.hypot(*up)), float(np.arctan2(up[0], -up[1])))
 
 
+def _inverse(to_pixels: Array) -> Array:
+    return np.asarray(cv2.invertAffineTransform(to_pixels), dtype=np.float64)
+
+
 def _mapped(to_picture: Array, points: Array) -> Array:
     return points @ to_picture[:, :2].T + to_picture[:, 2]
 
@@ -142,6 +146,7 @@ def _refined(places: Array, heat: Array) -> Array:
 
 def _mask(logits: Array, back: Array) -> Callable[[tuple[int, int]], NDArray[np.float32]]:
     def probability(shape: tuple[int, int]) -> NDArray[np.float32]:
-        return cv2.warpAffine(expit(logits).astype(np.float32), back, shape[::-1], flags=cv2.INTER_LINEAR)
+        found = cv2.warpAffine(expit(logits).astype(np.float32), back, shape[::-1], flags=cv2.INTER_LINEAR)
+        return np.asarray(found, dtype=np.float32)
 
     return probability

@@ -50,13 +50,16 @@ class Detected:
     """Sentences on what is remarkable."""
 
 
-def detect_people(session: Session, detector: Detector, plan: DetectionPlan, report: Report = unreported) -> Detected:
+def detect_people(
+    session: Session, recording: Recording, detector: Detector, plan: DetectionPlan, report: Report = unreported
+) -> Detected:
     """Detect people on the frames of a plan, and store what was found; also if it is stopped.
 
     A detection that was stopped goes on where it ended.
 
     Args:
         session: the session, which this process has locked.
+        recording: its footage.
         detector: sees a picture.
         plan: what to detect.
         report: shows progress. A KeyboardInterrupt that it raises stops the work.
@@ -66,16 +69,16 @@ def detect_people(session: Session, detector: Detector, plan: DetectionPlan, rep
     """
     before = _begun(session, plan)
     convention = next(m for m in known_joint_maps() if m.name == detector.skeleton)
-    columns = {point: convention.points.index(marker) for point, marker in convention.markers.items()}
+    at = {marker: i for i, marker in enumerate(convention.points)}
+    columns = {point: at[marker] for point, marker in convention.markers.items() if marker in at}
     cameras = [c.camera for c in session.cameras]
     people = PeopleInViews(detector, columns, cameras, floor_plane(session.up, session.floor).normal, session.fps)
     found = {} if before is None else people.recall(before)
     todo = [k for k in plan.frames if k not in found]
     try:
-        with Recording(session.cameras) as recording:
-            for i, k in enumerate(todo):
-                report("detecting people", i / len(todo))
-                found[k] = people.see(k, recording.read(k))
+        for i, k in enumerate(todo):
+            report("detecting people", i / len(todo))
+            found[k] = people.see(k, recording.read(k))
     except KeyboardInterrupt:
         pass
     if not any(own for views in found.values() for own in views):

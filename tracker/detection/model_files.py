@@ -127,12 +127,13 @@ def _tarball(temporary: Path) -> Callable[[str], bytes]:
             "use the network full"
         )
     _run([npm, "pack", "--silent", _TARBALL], temporary)
-    archive = tarfile.open(next(temporary.glob("*.tgz")))
+    path = next(temporary.glob("*.tgz"))
 
     def read(member: str) -> bytes:
-        file = archive.extractfile(member)
-        assert file is not None
-        return file.read()
+        with tarfile.open(path) as archive:
+            file = archive.extractfile(member)
+            assert file is not None, member
+            return file.read()
 
     return read
 

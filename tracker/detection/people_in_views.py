@@ -21,9 +21,9 @@ _FIND_EVERY_S = 0.5
 """Time between two searches of whole pictures for people who enter, seconds: someone walks 0.7 m meanwhile."""
 _KEEP_S = 0.5
 """Time for which a person is sought at the last place, seconds; the same, as the search is made anew then."""
-_SAME_SHARE = 0.1
-"""Median distance of the points of two figures of one picture, as a share of a square's side, up to which they are one
-person: 0.24 m, as two people hardly ever overlap in all points."""
+_SAME_M = 0.12
+"""Median distance of the points of two figures of one picture, metres at the depth of the person, up to which they are
+one: half a trunk, and several times what a detector's squares change in its points."""
 
 
 class PeopleInViews:
@@ -115,23 +115,24 @@ class PeopleInViews:
             turn = self._turn(v, self._middle)
             for part in _parts(picture.shape[:2], turn):
                 for square in self._detector.find(picture, part):
-                    self._add(figures[v], picture, square)
+                    if not any(self._is_around(square, figure) for figure in figures[v]):
+                        self._add(figures[v], picture, square)
 
     def _add(self, figures: list[Figure], picture: Image, square: PictureSquare) -> None:
         """Keep the person of a square, unless it is one of the figures already."""
-        if any(np.linalg.norm(self._hips(f) - square.center_px) < _SAME_SHARE * square.side_px for f in figures):
-            return
         found = self._detector.look(picture, square)
         if found is None:
             return
         for other in figures:
             apart = np.linalg.norm(found.points_px - other.points_px, axis=1)
-            if np.nanmedian(apart) < _SAME_SHARE * square.side_px:
+            if np.nanmedian(apart) * SQUARE_M < _SAME_M * square.side_px:
                 return
         figures.append(replace(found, mask=None))  # masks of all frames would fill the memory
 
-    def _hips(self, figure: Figure) -> Array:
-        return figure.points_px[self._torso[2:]].mean(axis=0)
+    def _is_around(self, square: PictureSquare, figure: Figure) -> bool:
+        """Return whether a square is around the hips of a figure: others behind it are found by other views."""
+        hips = figure.points_px[self._torso[2:]].mean(axis=0)
+        return bool(np.linalg.norm(hips - square.center_px) * SQUARE_M < 2 * _SAME_M * square.side_px)
 
     def _square(self, track: PersonTrack, view: int) -> PictureSquare | None:
         """Return the square of a view around the last place of a person; None where the view does not show it."""
@@ -168,7 +169,7 @@ class PeopleInViews:
 
 
 def figure_arrays(views: Views, figures: Sequence[Sequence[Figure]]) -> tuple[Array, Array]:
-    """Return points, (n_views, n_detections, n_points, 2), undistorted px, and confidences, (n_views, ..., n_points)."""
+    """Return points, (n_views, n_detections, n_points, 2), undistorted px, and confidences of the same shape but 2."""
     n = max((len(own) for own in figures), default=0)
     n_points = next((len(f.confidence) for own in figures for f in own), 0)
     px, confidence = np.full((len(figures), n, n_points, 2), np.nan), np.zeros((len(figures), n, n_points))

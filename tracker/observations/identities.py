@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.observations.triangulation import INLIER_M, Views, triangulate_points
 
 SAME_PERSON_M = 0.4
@@ -65,7 +65,7 @@ def follow_people(views: Views, points_px: Array, confidence: Array, frame: int,
     """
     from scipy.optimize import linear_sum_assignment  # imported lazily: it takes a third of a second
 
-    is_present = (np.isfinite(points_px).all(axis=-1) & (confidence > 0)).any(axis=-1)
+    is_present: Mask = np.any(np.isfinite(points_px).all(axis=-1) & (confidence > 0), axis=-1)
     taken: dict[int, dict[int, int]] = {}
     left = {(v, int(d)) for v in range(len(is_present)) for d in np.flatnonzero(is_present[v])}
     for v in range(len(is_present)):

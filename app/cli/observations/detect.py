@@ -64,14 +64,20 @@ def command(arguments: Annotated[DetectArguments, tyro.conf.arg(name="")]) -> No
 def _detect(arguments: DetectArguments, path: Path, folder: Path, reporter: Reporter) -> dict[str, Any]:
     from tracker.detection.detect import DetectionPlan, detect_people
     from tracker.detection.detectors import load_detector
+    from tracker.footage.recording import Recording
     from tracker.session.lock import SessionLock
     from tracker.session.session import load_session
 
     session = load_session(path)
     frames = parse_frames(arguments.frames, session)
     detector, text = load_detector(arguments.detector, arguments.model, folder)
-    with SessionLock(session.folder), reporter.over(len(frames), "detecting people") as advance:
-        found = detect_people(session, detector, DetectionPlan(arguments.name, text, frames), lambda *_: advance())
+    with (
+        SessionLock(session.folder),
+        Recording(session.cameras) as recording,
+        reporter.over(len(frames), "detecting people") as advance,
+    ):
+        plan = DetectionPlan(arguments.name, text, frames)
+        found = detect_people(session, recording, detector, plan, lambda *_: advance())
     pictures = {c.camera.name: n for c, n in zip(session.cameras, found.n_figures, strict=True)}
     return {
         "name": arguments.name, "detector": text, "frames": [found.frames.start, found.frames.stop],

@@ -1,0 +1,110 @@
+"""People are detected in all views together: missed ones are sought where the others see them, and stored."""
+
+import numpy as np
+import pytest
+from fake_detector import FakeDetector
+from observed_people import make_session, seen, walking
+
+from tracker.detection.detect import DetectionPlan, detect_people
+from tracker.errors import TrackerError
+from tracker.observations.joints import triangulate_observations
+from tracker.observations.stored import list_observations, load_observations
+
+N = 12
+
+
+@pytest.fixture
+def couple(tmp_path):
+    session = make_session(tmp_path / "s", N, people=("ann", "ben"))
+    return session, [walking(N, (-0.6, 0.3, 0.0)), walking(N, (0.4, -0.7, 0.0), (-0.02, 0.02, 0.0))]
+
+
+def run(session, detector, frames=range(N), name="net", report=lambda *_: None):
+    return detect_people(session, detector, detector, DetectionPlan(name, "fake", frames), report)
+
+
+def errors_m(session, motions, name="net", frames=range(N)):
+    """Distances of the triangulated points from the truth, by whichever order of the people is nearer, metres."""
+    found = triangulate_observations(load_observations(session, name), [c.camera for c in session.cameras])
+    truth = np.stack(motions, axis=1)[frames]
+    own = found.joints.joints_world[frames]
+    return min((np.linalg.norm(own[:, order] - truth, axis=-1) for order in ([0, 1], [1, 0])), key=np.nanmean)
+
+
+def test_people_are_found_and_placed(couple):
+    session, motions = couple
+    found = run(session, FakeDetector(seen(session, motions, noise_px=1.0)))
+    assert (found.is_complete, found.n_figures, found.notes) == (True, (N,) * 4, ())
+    assert np.nanmax(errors_m(session, motions)) < 0.05
+
+
+def test_a_view_that_misses_someone_is_searched_where_the_others_see_the_person(couple):
+    session, motions = couple
+    points = seen(session, motions)
+    detector = FakeDetector(points, unfound={(0, 0), (3, 1)})
+    run(session, detector)
+    px = load_observations(session, "net").points.points_px
+    assert np.isfinite(px[..., 0, 0]).sum(axis=-1).tolist() == [[2] * 4] * N
+    assert np.nanmax(errors_m(session, motions)) < 1e-3
+
+
+def test_whole_pictures_are_searched_twice_a_second_while_everybody_is_seen(couple):
+    session, motions = couple
+    detector = FakeDetector(seen(session, motions))
+    run(session, detector)
+    assert detector.n_finds == 4 * 3, "the whole and two parts of four pictures, on the first frame"
+    assert detector.n_looks == 4 * 2 * N
+
+
+def test_no_more_than_the_people_who_are_there_are_stored(couple):
+    session, motions = couple
+    run(session, FakeDetector(seen(session, motions)))
+    assert load_observations(session, "net").points.points_px.shape[2] == 2
+
+
+def test_a_stopped_detection_goes_on_and_ends_like_one_that_was_not(couple):
+    session, motions = couple
+    detector = FakeDetector(seen(session, motions))
+
+    def stop(_, share, *text):
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    found = run(session, detector, report=stop)
+    assert (found.is_complete, found.frames) == (False, range(7))
+    with pytest.raises(TrackerError, match="taken by those of detection, fake"):
+        run(session, detector, range(3))
+    assert run(session, detector).is_complete
+    run(session, detector, name="whole")
+    one, other = (load_observations(session, name).points for name in ("net", "whole"))
+    np.testing.assert_array_equal(one.points_px, other.points_px)
+    with pytest.raises(TrackerError, match="which is complete"):
+        run(session, detector)
+
+
+def test_a_detection_that_sees_nobody_stores_nothing(couple):
+    session, motions = couple
+    everyone = {(v, p) for v in range(4) for p in range(2)}
+    with pytest.raises(TrackerError, match="expected people in the pictures of frames 0 to 11, found none"):
+        run(session, FakeDetector(seen(session, motions), unseen=everyone))
+    assert list_observations(session) == []
+
+
+@pytest.mark.parametrize(("people", "expected"), [
+    (("ann",), "2 people are seen in most frames, the session has 1: those seen most are taken"),
+    (("ann", "ben", "cid"), "2 of 3 people are seen in most frames"),
+])  # fmt: skip
+def test_other_numbers_of_people_are_noted(tmp_path, couple, people, expected):
+    session = make_session(tmp_path / "other", N, people=people)
+    assert run(session, FakeDetector(seen(session, couple[1]))).notes == (expected,)
+
+
+def test_someone_who_enters_late_is_found(couple):
+    session, motions = couple
+    points = seen(session, [np.repeat(m, 4, axis=0) for m in motions])[: 4 * N]
+    points[:20, :, 1] = -1000.0
+    session = make_session(session.folder.parent / "long", 4 * N, people=("ann", "ben"))
+    run(session, FakeDetector(points), range(4 * N))
+    px = load_observations(session, "net").points.points_px
+    first = np.isfinite(px[:, :, 1, 0, 0]).all(axis=1).argmax()
+    assert 20 <= first <= 20 + 0.5 * session.fps
