@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tracker.detection.detector import Figure, PictureSquare
+from tracker.detection.detector import DetectedPerson, PictureSquare
 
 
 class FakeDetector:
@@ -41,7 +41,7 @@ class FakeDetector:
                 apart = np.linalg.norm((points[9, :2] + points[12, :2]) / 2 - square.center_px)
                 near.append((apart, person, points))
         apart, _, points = min(near, default=(np.inf, 0, None), key=lambda found: found[:2])
-        return Figure(points[:, :2].copy(), points[:, 2], 1.0) if apart < 0.2 * square.side_px else None
+        return DetectedPerson(points[:, :2].copy(), points[:, 2], 1.0) if apart < 0.2 * square.side_px else None
 
     def _people(self, picture):
         view, low, high = picture[0, 0].tolist()

@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from tracker.detection.detector import Figure, PictureSquare
+from tracker.detection.detector import DetectedPerson, PictureSquare
 from tracker.geometry.arrays import Array, Image, IntArray
 
-_N_POINTS = 33
+_BEYOND = ("hips", "rim", "shoulders", "rim of shoulders", "left palm", "right palm")
+"""Landmarks behind those of the skeleton, from which MediaPipe makes the next square."""
 _STRIDES = ((8, 2), (16, 2), (32, 6))
 """Cells of the finder's grids, px of its input, and anchors in each."""
-_LEAST = 0.5
-"""Probability from which there is a person: more likely than not."""
 _OVERLAP = 0.3
 """Share of overlap, intersection over union, from which two boxes are of one person (Bazarevsky et al. 2020)."""
 _AROUND = 1.25
@@ -48,9 +47,8 @@ class BlazePose:
         to_pixels = square.to_pixels(n)
         crop = cv2.warpAffine(picture, to_pixels, (n, n), flags=cv2.INTER_AREA, borderMode=cv2.BORDER_CONSTANT)
         raw, logits = self._finder(crop / np.float32(127.5) - 1)
-        probability = expit(logits[:, 0])
-        keep = probability > _LEAST
-        raw, anchors, probability = raw[keep] / n, self._anchors[keep], probability[keep]
+        keep = logits[:, 0] > 0
+        raw, anchors, probability = raw[keep] / n, self._anchors[keep], expit(logits[keep, 0])
         corners = raw[:, :2] + anchors - raw[:, 2:4] / 2
         back, out = _inverse(to_pixels), []
         for group in _groups(np.column_stack([corners, raw[:, 2:4]]), probability):
@@ -59,20 +57,20 @@ class BlazePose:
             out.append(_square_around(_mapped(back, hips), _mapped(back, rim)))
         return out
 
-    def look(self, picture: Image, square: PictureSquare) -> Figure | None:
+    def look(self, picture: Image, square: PictureSquare) -> DetectedPerson | None:
         """See `Detector.look`."""
         n = self._landmarks.size
         to_pixels = square.to_pixels(n)
         flags = cv2.INTER_AREA if square.side_px > n else cv2.INTER_LINEAR
         crop = cv2.warpAffine(picture, to_pixels, (n, n), flags=flags, borderMode=cv2.BORDER_REPLICATE)
         marks, presence, logits, heat, _ = self._landmarks(crop / np.float32(255))
-        if (present := float(presence.item())) <= _LEAST:
+        if (present := float(presence.item())) < 1 - present:
             return None
-        marks = marks.reshape(-1, 5)[:_N_POINTS]
+        marks = marks.reshape(-1, 5)[: -len(_BEYOND)]
         back = _inverse(to_pixels)
         points = _mapped(back, _refined(marks[:, :2] / n, heat) * n - 0.5)
         seen = expit(marks[:, 3]) * expit(marks[:, 4])
-        return Figure(points, seen.astype(np.float64), present, _mask(logits[..., 0], back))
+        return DetectedPerson(points, seen.astype(np.float64), present, _mask(logits[..., 0], back))
 
 
 class _Network:
@@ -137,8 +135,9 @@ def _refined(places: Array, heat: Array) -> Array:
         if not (0 <= column < n and 0 <= row < n):
             continue
         top, left = max(0, row - _KERNEL), max(0, column - _KERNEL)
-        weights = expit(heat[top : row + _KERNEL + 1, left : column + _KERNEL + 1, i])
-        if weights.max() >= _LEAST:
+        logits = heat[top : row + _KERNEL + 1, left : column + _KERNEL + 1, i]
+        if logits.max() >= 0:
+            weights = expit(logits)
             rows, columns = np.mgrid[top : top + weights.shape[0], left : left + weights.shape[1]]
             out[i] = np.array([(weights * columns).sum(), (weights * rows).sum()]) / weights.sum() / n
     return out

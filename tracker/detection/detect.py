@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracker.compute.progress import Report, unreported
-from tracker.detection.detector import Detector, Figure
-from tracker.detection.people_in_views import PeopleInViews
+from tracker.detection.detector import Detector
+from tracker.detection.people_in_views import PeopleInViews, Seen
 from tracker.errors import TrackerError
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import JointMap, known_joint_maps
@@ -20,8 +20,6 @@ from tracker.session.session import Session
 
 FORMAT = "detection"
 """Format of observations that were detected here: they have no files."""
-_SEEN_SHARE = 0.5
-"""Share of the frames in which someone is seen who belongs to the recording: in most of them."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ def _text(frames: range) -> str:
 
 
 def _observations(
-    session: Session, plan: DetectionPlan, convention: JointMap, found: dict[int, list[list[Figure]]], done: range,
+    session: Session, plan: DetectionPlan, convention: JointMap, found: dict[int, Seen], done: range,
     notes: tuple[str, ...],
 ) -> ObservationSet:  # fmt: skip
     names = [c.camera.name for c in session.cameras]
@@ -136,9 +134,9 @@ def _observations(
     return ObservationSet(plan.name, FORMAT, people, convention, points, None, (rows,), (), notes, options)
 
 
-def _notes(session: Session, tracks: Sequence[PersonTrack], found: dict[int, list[list[Figure]]]) -> tuple[str, ...]:
+def _notes(session: Session, tracks: Sequence[PersonTrack], found: dict[int, Seen]) -> tuple[str, ...]:
     """Say whether other people than those of the session are seen."""
-    n_seen = sum(len({k for k, _ in t.members}) > _SEEN_SHARE * len(found) for t in tracks)
+    n_seen = sum(len({k for k, _ in t.members}) > len(found) / 2 for t in tracks)
     n = len(session.people)
     if n_seen == n:
         return ()

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tracker.geometry.arrays import Array, Image
 
 SQUARE_M = 2.4
-"""Side of the square around the hips of a person, metres, in which a detector looks for the person's points: whoever
-stands fills 0.7 of it, and raised arms lie within."""
+"""Side of the square around the hips of a person, metres, in which a detector looks for the person's points: someone
+who stands fills 0.7 of it, and raised arms lie within."""
 
 
 class PictureSquare(NamedTuple):
@@ -33,7 +33,7 @@ class PictureSquare(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Figure:
+class DetectedPerson:
     """A person whom a detector sees in a picture."""
 
     points_px: Array
@@ -55,7 +55,7 @@ class Detector(Protocol):
     def find(self, picture: Image, square: PictureSquare) -> Sequence[PictureSquare]:
         """Return the squares around the people in a part of a picture, (H, W, 3) RGB, the most certain first."""
 
-    def look(self, picture: Image, square: PictureSquare) -> Figure | None:
+    def look(self, picture: Image, square: PictureSquare) -> DetectedPerson | None:
         """Return the person around whom a square of a picture, (H, W, 3) RGB, lies; None if there is nobody."""
 
 

@@ -6,24 +6,24 @@ every view around the place that the other views and the frame before show, and 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
-from tracker.detection.detector import SQUARE_M, Detector, Figure, PictureSquare
+from tracker.detection.detector import SQUARE_M, DetectedPerson, Detector, PictureSquare
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.observations.identities import SAME_PERSON_M, PersonTrack, follow_people, track_distance
 from tracker.observations.observed import ObservationSet
-from tracker.observations.triangulation import Views
+from tracker.observations.triangulation import INLIER_M, Views
 
 _TORSO = ("left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _FIND_EVERY_S = 0.5
-"""Time between two searches of whole pictures for people who enter, seconds: someone walks 0.7 m meanwhile."""
-_KEEP_S = 0.5
-"""Time for which a person is sought at the last place, seconds; the same, as the search is made anew then."""
-_SAME_M = 0.12
-"""Median distance of the points of two figures of one picture, metres at the depth of the person, up to which they are
-one: half a trunk, and several times what a detector's squares change in its points."""
+"""Time between two searches of whole pictures for people who enter, seconds: someone walks 0.7 m meanwhile. A person
+who is lost is sought at the last place until then."""
+
+Seen: TypeAlias = list[list[DetectedPerson]]
+"""The people whom each view sees on a frame."""
 
 
 class PeopleInViews:
@@ -43,12 +43,12 @@ class PeopleInViews:
         """
         self._detector, self._views, self._up = detector, Views(cameras), up
         self._torso = [body_points[name] for name in _TORSO]
-        self._every, self._keep = max(1, round(_FIND_EVERY_S * fps)), max(1, round(_KEEP_S * fps))
+        self._every = max(1, round(_FIND_EVERY_S * fps))
         self._middle = viewed_point(cameras)
         self._last_search: int | None = None
         self.tracks: list[PersonTrack] = []
 
-    def see(self, frame: int, pictures: Sequence[Image | None]) -> list[list[Figure]]:
+    def see(self, frame: int, pictures: Sequence[Image | None]) -> Seen:
         """Find the people of a frame, who become members of `tracks`.
 
         Args:
@@ -58,8 +58,8 @@ class PeopleInViews:
         Returns:
             The figures of each view, in which the tracks have their indices.
         """
-        figures: list[list[Figure]] = [[] for _ in pictures]
-        known = [t for t in self.tracks if frame - t.seen <= self._keep]
+        figures: Seen = [[] for _ in pictures]
+        known = [t for t in self.tracks if frame - t.seen <= self._every]
         for track in known:
             self._look_for(track, figures, pictures)
         is_time = self._last_search is None or frame - self._last_search >= self._every
@@ -72,29 +72,30 @@ class PeopleInViews:
                 self._complete(track, frame, figures, pictures)
         return figures
 
-    def recall(self, observations: ObservationSet) -> dict[int, list[list[Figure]]]:
+    def recall(self, observations: ObservationSet) -> dict[int, Seen]:
         """Take over the figures that were seen before, by frame, and follow the people among them."""
-        points, out = observations.points, dict[int, list[list[Figure]]]()
+        points, out = observations.points, dict[int, Seen]()
         assert points is not None
         for k in observations.row_frames[0].astype(int).tolist():
             is_seen = points.is_known[k].any(axis=-1)
             out[k] = [
-                [Figure(points.points_px[k, v, i], points.confidence[k, v, i], 1.0) for i in np.flatnonzero(own)]
+                [
+                    DetectedPerson(points.points_px[k, v, i], points.confidence[k, v, i], 1.0)
+                    for i in np.flatnonzero(own)
+                ]
                 for v, own in enumerate(is_seen)
             ]
             follow_people(self._views, *self._arrays(out[k]), k, self.tracks)
         return out
 
-    def _look_for(self, track: PersonTrack, figures: list[list[Figure]], pictures: Sequence[Image | None]) -> None:
+    def _look_for(self, track: PersonTrack, figures: Seen, pictures: Sequence[Image | None]) -> None:
         """Look for a person in all views, around the last place."""
         for v, picture in enumerate(pictures):
             square = self._square(track, v)
             if picture is not None and square is not None:
                 self._add(figures[v], picture, square)
 
-    def _complete(
-        self, track: PersonTrack, frame: int, figures: list[list[Figure]], pictures: Sequence[Image | None]
-    ) -> None:
+    def _complete(self, track: PersonTrack, frame: int, figures: Seen, pictures: Sequence[Image | None]) -> None:
         """Look for a person of this frame in the views that lack the person, where the others show one."""
         for v, picture in enumerate(pictures):
             if picture is None or (frame, v) in track.members or (square := self._square(track, v)) is None:
@@ -107,7 +108,7 @@ class PeopleInViews:
             if track_distance(self._views, v, track.last_world, px, confidence) < SAME_PERSON_M:
                 track.members[frame, v] = before
 
-    def _search(self, figures: list[list[Figure]], pictures: Sequence[Image | None]) -> None:
+    def _search(self, figures: Seen, pictures: Sequence[Image | None]) -> None:
         """Look for people in whole pictures, and in their parts for small ones."""
         for v, picture in enumerate(pictures):
             if picture is None:
@@ -118,21 +119,21 @@ class PeopleInViews:
                     if not any(self._is_around(square, figure) for figure in figures[v]):
                         self._add(figures[v], picture, square)
 
-    def _add(self, figures: list[Figure], picture: Image, square: PictureSquare) -> None:
+    def _add(self, figures: list[DetectedPerson], picture: Image, square: PictureSquare) -> None:
         """Keep the person of a square, unless it is one of the figures already."""
         found = self._detector.look(picture, square)
         if found is None:
             return
         for other in figures:
             apart = np.linalg.norm(found.points_px - other.points_px, axis=1)
-            if np.nanmedian(apart) * SQUARE_M < _SAME_M * square.side_px:
+            if np.nanmedian(apart) * SQUARE_M < INLIER_M * square.side_px:
                 return
         figures.append(replace(found, mask=None))  # masks of all frames would fill the memory
 
-    def _is_around(self, square: PictureSquare, figure: Figure) -> bool:
+    def _is_around(self, square: PictureSquare, figure: DetectedPerson) -> bool:
         """Return whether a square is around the hips of a figure: others behind it are found by other views."""
         hips = figure.points_px[self._torso[2:]].mean(axis=0)
-        return bool(np.linalg.norm(hips - square.center_px) * SQUARE_M < 2 * _SAME_M * square.side_px)
+        return bool(np.linalg.norm(hips - square.center_px) * SQUARE_M < 2 * INLIER_M * square.side_px)
 
     def _square(self, track: PersonTrack, view: int) -> PictureSquare | None:
         """Return the square of a view around the last place of a person; None where the view does not show it."""
@@ -158,17 +159,17 @@ class PeopleInViews:
         up = b - a
         return float(np.arctan2(up[0], -up[1])) if np.isfinite(up).all() else 0.0
 
-    def _undistorted(self, view: int, figure: Figure) -> tuple[Array, Array]:
+    def _undistorted(self, view: int, figure: DetectedPerson) -> tuple[Array, Array]:
         px = np.full((1, len(self._views.cameras), *figure.points_px.shape), np.nan)
         px[0, view] = figure.points_px
         return self._views.undistorted(px)[0, view], figure.confidence
 
-    def _arrays(self, figures: Sequence[Sequence[Figure]]) -> tuple[Array, Array]:
+    def _arrays(self, figures: Sequence[Sequence[DetectedPerson]]) -> tuple[Array, Array]:
         """Return the points of all figures, (n_views, n_detections, n_points, 2), undistorted px, and confidences."""
         return figure_arrays(self._views, figures)
 
 
-def figure_arrays(views: Views, figures: Sequence[Sequence[Figure]]) -> tuple[Array, Array]:
+def figure_arrays(views: Views, figures: Sequence[Sequence[DetectedPerson]]) -> tuple[Array, Array]:
     """Return points, (n_views, n_detections, n_points, 2), undistorted px, and confidences of the same shape but 2."""
     n = max((len(own) for own in figures), default=0)
     n_points = next((len(f.confidence) for own in figures for f in own), 0)

@@ -8,6 +8,7 @@ Imports `geometry`, `body`, `formats`, `footage`, `session` and `store`. Callers
 __all__ = [
     "assignment",
     "body_points",
+    "identities",
     "importing",
     "joints",
     "observed",
