@@ -24,7 +24,7 @@ FORMAT = "detection"
 
 @dataclass(frozen=True)
 class DetectionPlan:
-    """What to detect, and under which name it is stored."""
+    """Frames to detect people on, and the name under which they are stored."""
 
     name: str
     """Name of the observations."""

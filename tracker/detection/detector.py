@@ -64,7 +64,7 @@ class DetectorKind(NamedTuple):
 
     name: str
     help: str
-    """What it is, its license, and what it needs, in a sentence."""
+    """A sentence on it, with its license and what it needs."""
     models: tuple[str, ...]
     """Names of its models, from the quickest to the most accurate; empty if a file is the model."""
     load: Callable[[str, Path], Detector]
