@@ -224,6 +224,10 @@ PHRASES = {
     "install_detect": Phrases(
         "install it with: pip install 'quadrille[detect]'", "install it with: pip install quadrille[detect]"
     ),
+    "install_detect_onnx": Phrases(
+        "install it with: pip install 'quadrille[detect-onnx]'",
+        "install it with: pip install quadrille[detect-onnx]",
+    ),
     "get_models": Phrases(
         "fetch it with quadrille detect --get-models, or say --models FOLDER where it is",
         "fetch it on the command line with: quadrille detect --get-models",

@@ -20,10 +20,23 @@ def _blazepose(model: str, folder: Path) -> Detector:
     return BlazePose(model_file(folder, "pose_detection.tflite"), model_file(folder, f"pose_landmark_{model}.tflite"))
 
 
+def _onnx(model: str, folder: Path) -> Detector:
+    try:
+        import onnxruntime  # noqa: F401  whether it is installed
+
+        from tracker.detection.onnx_pose import OnnxPose
+    except ImportError as error:
+        raise TrackerError(
+            "expected the package onnxruntime, which runs ONNX files, found none", Remedy("install_detect_onnx")
+        ) from error
+    return OnnxPose([path if (path := Path(name)).is_file() else folder / name for name in model.split(",")])
+
+
 _OWN = (
     DetectorKind(
         "blazepose", "BlazePose of MediaPipe (Apache License 2.0), 33 points", ("lite", "full", "heavy"), _blazepose
     ),
+    DetectorKind("onnx", "files of your own: RTMO.onnx, or FINDER.onnx,RTMPOSE.onnx", (), _onnx),
 )
 
 DETECTORS = Extended({kind.name: kind for kind in _OWN}, "quadrille.detectors", DetectorKind)
