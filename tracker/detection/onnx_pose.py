@@ -118,7 +118,7 @@ class _Network:
     def __call__(self, names: set[str], image: NDArray[Any]) -> list[NDArray[Any]]:
         """Return outputs in the order of their names, without the axis of the batch."""
         batch = np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32)
-        return [found[0] for found in self._session.run(sorted(names), {self._input.name: batch})]
+        return [np.asarray(found)[0] for found in self._session.run(sorted(names), {self._input.name: batch})]
 
 
 class _Crop(NamedTuple):
