@@ -228,9 +228,10 @@ PHRASES = {
         "install it with: pip install 'quadrille[detect-onnx]'",
         "install it with: pip install quadrille[detect-onnx]",
     ),
+    "export_joints": Phrases("export poses with --format", "export poses in another format"),
     "get_models": Phrases(
         "fetch it with quadrille detect --get-models, or say --models FOLDER where it is",
-        "fetch it on the command line with: quadrille detect --get-models",
+        "fetch the networks on the command line, as docs/observations.md describes",
     ),
     "name_people_of_files": Phrases("name them with --person", "give one file for each person"),
     "count_frames": Phrases("say --clock frames", "correct Time in the file"),

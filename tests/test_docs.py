@@ -85,7 +85,20 @@ def test_commands_are_understood(words, monkeypatch, capsys):
     names = [w for w in words[1:] if not w.startswith("-")]
     commands = {"open", "new", "info", "index", "init", "track", "evaluate", "export", "simulate", "bench"}
     commands |= {"import", "relink", "restore", "acquire", "observability", "experiment", "body", "calibrate"}
-    commands |= {"check", "sync", "judge", "assign", "tasks", "merge", "compare", "share", "batch", "doctor", "next"}
+    commands |= {
+        "check",
+        "sync",
+        "judge",
+        "assign",
+        "tasks",
+        "merge",
+        "compare",
+        "share",
+        "batch",
+        "doctor",
+        "next",
+        "detect",
+    }
     command = names[0] if names and names[0] in commands else "open"
     monkeypatch.setattr(sys, "argv", ["quadrille", command, "--help"])
     with pytest.raises(SystemExit) as end:

@@ -50,7 +50,7 @@ HOUSE = {
         ["tracking/estimation"],
         ["tracking", "initialization/generators"],
         ["search", "appearance"],
-        ["fitting", "voxels"],
+        ["fitting", "voxels", "detection"],
         ["evidence", "observations"],
         ["contours", "images", "store"],
         ["session"],

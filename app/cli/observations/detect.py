@@ -44,7 +44,8 @@ def command(arguments: Annotated[DetectArguments, tyro.conf.arg(name="")]) -> No
     Ctrl+C stops it and keeps what was found; run it again to go on. quadrille track SESSION --init auto --of NAME
     --evidence both tracks by the key points and the contours.
     """
-    from tracker.detection.model_files import LICENSE, default_folder, fetch_models
+    from app.cli.observations.model_packages import fetch_models
+    from tracker.detection.model_files import LICENSE, default_folder
 
     folder = arguments.models or default_folder()
     reporter = Reporter(silent=arguments.json)

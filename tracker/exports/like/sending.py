@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tracker.errors import FormatError, SessionError
+from tracker.errors import FormatError, Remedy, SessionError
 from tracker.exports.export_files import moved_at_end, unwritable
 from tracker.exports.like.mended_points import PoseChoice, mended_points
 from tracker.exports.like.patches import Files, mended_pictures, mended_space
@@ -55,6 +55,12 @@ def export_like(
     if exchange_sides and observations.points is None:
         raise FormatError(
             f"expected key points, in which sides can be exchanged, found the points in space '{observations.name}'"
+        )
+    if not observations.sources:
+        raise FormatError(
+            f"expected observations that were imported, found '{observations.name}', which was detected here and has "
+            "no files to send back",
+            Remedy("export_joints"),
         )
     contents = _stored_contents(session, observations)
     cameras = [c.camera for c in session.cameras]

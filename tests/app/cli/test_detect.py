@@ -1,0 +1,59 @@
+"""`quadrille detect`, with a detector that knows the truth."""
+
+import json
+from contextlib import nullcontext
+
+import pytest
+from command_line import assert_refused
+from fake_detector import FakeDetector
+from observed_people import make_session, seen, walking
+
+from tracker.detection.detector import DetectorKind
+from tracker.detection.detectors import DETECTORS
+from tracker.detection.model_files import MODEL_FILES
+
+N = 8
+
+
+@pytest.fixture
+def session(tmp_path, monkeypatch):
+    session = make_session(tmp_path / "s", N)
+    detector = FakeDetector(seen(session, [walking(N)]))
+    monkeypatch.setattr("tracker.footage.recording.Recording", lambda cameras: nullcontext(detector))
+    monkeypatch.setitem(DETECTORS.own, "fake", DetectorKind("fake", "knows the truth", (), lambda *_: detector))
+    return session.folder
+
+
+def test_detected_people_are_shown_stored_and_known_to_other_commands(run, session):
+    words = "detect", session, "--as", "net", "--detector", "fake", "--model", "own"
+    status, out, _ = run(*words)
+    assert (status, out.splitlines()) == (0, [
+        "net: fake own, frames 0 to 7", *(f"  cam{v}: people in 8 of 8 pictures" for v in range(4)), "stored as net",
+    ])  # fmt: skip
+    assert_refused(run(*words), ["expected a free name, found 'net', which is complete"])
+    info = json.loads(run("info", session, "--json")[1])
+    assert "net" in json.dumps(info)
+    assert_refused(run("export", session, "--like", "net", "--out", session / "out"), ["detected", "--format"])
+
+
+@pytest.mark.parametrize(("more", "expected"), [
+    (["--detector", "magic"], ["expected a detector of blazepose, onnx, fake, found 'magic'"]),
+    (["--model", "huge"], ["expected as the model of blazepose one of lite, full, heavy, found 'huge'"]),
+    (["--detector", "fake"], ["expected as the model of fake a file"]),
+    (["--frames", "5:50", "--model", "lite"], ["expected --frames as A:B within 0:8"]),
+])  # fmt: skip
+def test_wrong_options(run, session, more, expected):
+    assert_refused(run("detect", session, *more), expected)
+
+
+def test_missing_and_foreign_networks_are_refused(run, session, tmp_path):
+    pytest.importorskip("ai_edge_litert")
+    words = "detect", session, "--model", "lite", "--models", tmp_path
+    assert_refused(run(*words), ["expected the network pose_detection.tflite", "--get-models"])
+    for name in MODEL_FILES:
+        (tmp_path / name).write_bytes(b"TFL3")
+    assert_refused(run(*words), ["as its makers published it, found another file"])
+
+
+def test_a_command_without_a_session_is_refused(run):
+    assert_refused(run("detect"), ["expected a session folder, or --get-models, found neither"])
