@@ -138,6 +138,10 @@ PHRASES = {
         "clear those of one person, or track without --init and --acquire",
         "clear those of one person, or track from here (T)",
     ),
+    "start_beyond": Phrases(
+        "choose --frames with that frame, or place the people on one of these",
+        "choose frames with that one, or place the people on one of these",
+    ),
     # bodies and joints
     "paper_body": Phrases(
         "make a session of it with 'quadrille new --model {body}', or track without --paper",

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalClock, OptionalName, OptionalPath, OptionalWhole, SessionArg
-from app.cli.target import Target, load_target
+from app.cli.arguments import OptionalClock, OptionalName, OptionalPath, OptionalRange, OptionalWhole, SessionArg
+from app.cli.target import Target, load_target, parse_frames
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
@@ -45,6 +45,8 @@ class InitArguments:
     """keypoints: name of the imported observations."""
     frame: int = 0
     """frame to set; with auto the first one to try."""
+    frames: OptionalRange = None
+    """A:B, half open: auto and keypoints take one of these; all by default."""
     voxel_size: float = 25.0
     """edge of a voxel, mm."""
     person: OptionalName = None
@@ -73,6 +75,8 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
     if (method == "keypoints") != (arguments.of is not None):
         raise TrackerError("expected --method keypoints together with --of NAME, found one of them; give both")
     at = load_target(arguments.session, arguments.person, several=is_found)
+    if arguments.frames is not None and method not in ("auto", "keypoints"):
+        raise TrackerError(f"expected --frames with --method auto or keypoints, found {method}; say --frame instead")
     if not 0 <= frame < at.session.n_frames:
         n = at.session.n_frames
         raise TrackerError(f"expected --frame within 0:{n} (from 0 to {n - 1}), found {frame}; correct it")
@@ -157,13 +161,15 @@ def _init_from_silhouettes(at: Target, arguments: InitArguments) -> None:
     check_voxel_size(arguments.voxel_size / 1000)
     progress = Reporter(silent=arguments.json or arguments.method != "auto")
     generator = None if arguments.method in ("auto", "keypoints") else arguments.method
-    settings = FindSettings(arguments.frame, generator, arguments.voxel_size / 1000, arguments.of)
-    found = init_from_footage(at, arguments.method, settings, arguments.person is None, progress)
+    frames = parse_frames(arguments.frames, at.session)
+    first = arguments.frame if arguments.frame in frames else frames.start
+    settings = FindSettings(first, generator, arguments.voxel_size / 1000, arguments.of)
+    found = init_from_footage(at, arguments.method, settings, frames, arguments.person is None, progress)
     print(format_json(found) if arguments.json else format_first_poses(found))
 
 
 def init_from_footage(
-    at: Target, method: str, settings: "FindSettings", only_unplaced: bool, progress: Reporter
+    at: Target, method: str, settings: "FindSettings", frames: range, only_unplaced: bool, progress: Reporter
 ) -> dict[str, Any]:
     """Find the poses of people on one frame, and store them as one entry of the history.
 
@@ -171,6 +177,7 @@ def init_from_footage(
         at: the session and the people.
         method: its name in the history.
         settings: of the search.
+        frames: that may be used.
         only_unplaced: whether people who have a pose keep it.
         progress: says what was tried.
 
@@ -195,7 +202,7 @@ def init_from_footage(
             raise TrackerError(
                 "expected a person without a pose, found none; name one with --person to find the person again"
             )
-        first = find_people(session, opened.observer, people, range(session.n_frames), settings, report)
+        first = find_people(session, opened.observer, people, frames, settings, report)
         opened.store_found(first, f"init from {method}")
     return first_poses_record(session, first)
 

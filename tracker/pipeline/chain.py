@@ -211,6 +211,13 @@ def start_frame(people: Sequence[Mapping[int, str]], frames: Sequence[int]) -> i
     """
     placed = [k for k in frames if all(k in own for own in people)]
     if not placed:
+        elsewhere = sorted(set.intersection(*(set(own) for own in people)))
+        if elsewhere:
+            raise TrackerError(
+                f"expected a frame of {min(frames)} to {max(frames)} on which all people have a pose, found frame "
+                f"{elsewhere[0]}",
+                Remedy("start_beyond"),
+            )
         raise TrackerError("expected a frame on which all people have a pose, found none", Remedy("common_start"))
     return min(placed, key=lambda k: (sum(own[k] in FOLLOWED for own in people), k))
 

@@ -169,6 +169,7 @@ def test_a_folder_in_use_is_not_overwritten(run, room):
     [
         (["init", "SESSION", "--joints", "TRUTH", "--frame", "50"], ["0:50", "50"]),
         (["init", "SESSION", "--joints", "TRUTH", "--frame", "-1"], ["0:50"]),
+        (["init", "SESSION", "--method", "voxels", "--frames", "2:9"], ["auto or keypoints", "found voxels"]),
         (["track", "SESSION", "--frames", "40:60"], ["0:50", "'40:60'"]),
         (["track", "SESSION", "--frames", "7:7"], ["'7:7'"]),
         (["track", "SESSION", "--frames", "7"], ["'7'"]),

@@ -197,11 +197,13 @@ def test_it_starts_where_people_were_put_rather_than_where_they_were_tracked():
     assert start_frame([put, followed], range(10)) == 3
     assert start_frame([put, followed], range(5)) == 3
     assert start_frame([{2: "tracked", 3: "tracked"}], range(10)) == 2
+    with pytest.raises(TrackerError, match="expected a frame of 0 to 1 on which all people have a pose, found frame 2"):
+        start_frame([put, followed], range(2))
 
 
-def test_people_placed_on_different_frames_alone_are_refused(opened, found):
+def test_people_placed_beyond_the_frames_alone_are_refused(opened, found):
     put(opened, 9)
-    with pytest.raises(TrackerError, match="a frame on which all people have a pose"):
+    with pytest.raises(TrackerError, match="a frame of 0 to 5 on which all people have a pose, found frame 9"):
         run(opened)
     assert found == []
 
