@@ -111,7 +111,7 @@ $(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
 
 # .slow: the programs that write imported files and read exported ones, and the site's; OpenSim is big.
 $(VENV)/.slow: $(VENV)/.tested
-	$(PIP_INSTALL) '.[dev,slow,import,export,docs]'
+	$(PIP_INSTALL) '.[dev,slow,import,export,detect,detect-onnx,docs]'
 	touch $@
 
 # .documented: what makes a site of the documents.

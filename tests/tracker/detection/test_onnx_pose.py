@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
-from tiny_networks import write_finder, write_landmarks, write_people
 
 from tracker.detection.detector import PictureSquare
 from tracker.detection.detectors import load_detector
 from tracker.errors import TrackerError
+
+pytestmark = pytest.mark.slow
+pytest.importorskip("onnx", reason="onnx and onnxruntime are of the slow tests")
+from tiny_networks import write_finder, write_landmarks, write_people  # noqa: E402  needs onnx
 
 BOX = [16.0, 8.0, 32.0, 56.0, 0.9]
 WHOLE = PictureSquare(np.array([319.5, 239.5]), 640.0)
