@@ -16,7 +16,7 @@ class UseObservations(Command, frozen=True, tag="observations"):
     `POST observations/plan` reads files, and `POST observations/import` stores them: paths come by such requests alone.
     """
 
-    action: Literal["show", "judge", "take", "track", "track_contours", "stop", "discard"]
+    action: Literal["show", "judge", "take", "track", "track_contours", "detect", "stop", "discard"]
     """`track` finds who has no pose by the key points and tracks by contours and key points; `track_contours` tracks by
     contours alone. `find_people` stops both. `discard` forgets files that were read and are not imported."""
     name: Name = ""

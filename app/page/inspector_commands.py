@@ -103,6 +103,7 @@ def _observations(controller: Controller, _: int, message: UseObservations) -> N
         "judge": lambda: observing.judge(message.name),
         "take": lambda: observing.take(message.name),
         "track": lambda: observing.track(message.name, as_evidence=True),
+        "detect": observing.detect,
         "track_contours": lambda: observing.track(message.name, as_evidence=False),
         "stop": observing.stop,
         "discard": observing.discard,

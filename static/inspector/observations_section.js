@@ -38,6 +38,10 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   judge.className = "is-primary";
   const take = textButton("Take as poses", "Store them as poses that can be corrected; keyframes stay, and undo takes them back", () => act("take", current()));
   const report = textButton("Write report", "Save the judgement as one HTML file with pictures of the worst frames", () => void writeReport());
+  const detect = textButton("Detect people", "Let a network find the key points of people on all frames, where no background shows them; docs/observations.md says how to get it", () =>
+    act("detect"),
+  );
+  const detecting = group(detect);
   const buttons = group(judge, take, report);
   const evidence = document.createElement("select");
   evidence.title = "Evidence of the run. For poses by the key points alone, take them as poses";
@@ -59,7 +63,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   const form = importForm(store, sessions, () => act("discard"));
   const body = document.createElement("div");
   body.className = "acquisition";
-  body.append(none, list, buttons, tracking, work, status, verdict, worst, more, form.element);
+  body.append(none, list, detecting, buttons, tracking, work, status, verdict, worst, more, form.element);
 
   /** Whether the last search for people was begun here. */
   let isTracking = false;
@@ -147,6 +151,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     const search = isTracking && !now.running && finding ? finding : now;
     const isSearching = finding?.running ?? false;
     buttons.hidden = tracking.hidden = !current() || now.running || isSearching;
+    detecting.hidden = now.running || isSearching;
     work.hidden = !search.running;
     progress.value = search.share;
     status.textContent = search.running ? `${capital(search.stage)} …` : search.message;

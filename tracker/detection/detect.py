@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 
@@ -109,6 +110,25 @@ def _begun(session: Session, plan: DetectionPlan) -> ObservationSet | None:
     if options["detected"] == options["frames"]:
         raise TrackerError(f"expected a free name, found '{plan.name}', which is complete; choose another name")
     return stored
+
+
+def open_name(session: Session, name: str, detector: str, frames: range) -> str:
+    """Return a name for a detection: one that is free, or that of one of the same plan that was stopped.
+
+    Args:
+        session: the session.
+        name: to begin with; a number is added to it.
+        detector: see `DetectionPlan`.
+        frames: see `DetectionPlan`.
+    """
+    for number in count(1):
+        tried = name if number == 1 else f"{name} {number}"
+        try:
+            _begun(session, DetectionPlan(tried, detector, frames))
+        except TrackerError:
+            continue
+        return tried
+    raise AssertionError
 
 
 def _text(frames: range) -> str:

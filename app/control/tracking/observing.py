@@ -4,6 +4,7 @@ import logging
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ from app.control.tracking.finding import FindingPeople
 from app.remedies import page_text
 from app.state.observations import ObservedSet
 from tracker.compute.progress import Report
+from tracker.detection.detect import DetectionPlan, detect_people, open_name
+from tracker.detection.detector import Detector
+from tracker.detection.detectors import load_detector
+from tracker.detection.model_files import default_folder
 from tracker.errors import TrackerError
 from tracker.initialization.first_pose import FirstPoses
 from tracker.judging.judge import judge
@@ -32,6 +37,8 @@ from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 _LOG = logging.getLogger(__name__)
+_DETECTED = "detected"
+"""Name of what is detected here."""
 _STEPS = 100
 """Progress is shown in so many steps."""
 
@@ -95,6 +102,21 @@ class Observing:
             self._finding.start(of=name, as_evidence=as_evidence)
             self._set(shown=shown, plan=None, message="", failed=False)
 
+    def detect(self) -> None:
+        """Begin to detect people by a network on all frames; what is found is shown and stored.
+
+        Raises:
+            TrackerError: other work on observations is under way, or the networks are not there.
+        """
+        with self._session_state.lock:
+            self._refuse_if_busy()
+            session = self._session_state.session
+            detector, text = load_detector("blazepose", None, default_folder())
+            plan = DetectionPlan(
+                open_name(session, _DETECTED, text, range(session.n_frames)), text, range(session.n_frames)
+            )
+            self._start(plan.name, partial(self._detect, detector, plan))
+
     def stop(self) -> None:
         """Stop the work; nothing of it is stored. The caller must not hold the lock."""
         self._stopping.set()
@@ -147,8 +169,11 @@ class Observing:
 
     def _begin(self, name: str, work: Callable[[str], str]) -> None:
         with self._session_state.lock:
-            shown = self._free_to_use(name)
-            self._set(shown=shown, plan=None, running=True, stage="starting", share=0.0, message="", failed=False)
+            self._set(shown=self._free_to_use(name))
+            self._start(name, work)
+
+    def _start(self, name: str, work: Callable[[str], str]) -> None:
+        self._set(plan=None, running=True, stage="starting", share=0.0, message="", failed=False)
         self._stopping.clear()
         self._thread = threading.Thread(target=self._work, args=(name, work), name="observations", daemon=True)
         self._thread.start()
@@ -159,11 +184,30 @@ class Observing:
         Raises:
             TrackerError: some is, or it cannot be read.
         """
+        self._refuse_if_busy()
+        return load_observations(self._session_state.session, name)
+
+    def _refuse_if_busy(self) -> None:
         if self._session_state.state.observations.running:
             raise TrackerError(
                 "expected no other work on observations under way, found some; stop it or wait for its end"
             )
-        return load_observations(self._session_state.session, name)
+
+    def _detect(self, detector: Detector, plan: DetectionPlan, name: str) -> str:
+        session, recording = self._session_state.session, self._session_state.frames.observer.recording
+
+        def report(stage: str, share: float, text: str = "", /) -> None:
+            try:
+                self._report(stage, share)
+            except _StoppedError:
+                raise KeyboardInterrupt from None
+
+        found = detect_people(session, recording, detector, plan, report)
+        self._list()
+        self._set(shown=load_observations(session, name))
+        ended = "" if found.is_complete else "Stopped; what was found is kept, and Detect people goes on. "
+        n = found.frames.stop - found.frames.start
+        return ended + f"Detected people on {n} frames. {' '.join(f'Note: {note}.' for note in found.notes)}"
 
     def _work(self, name: str, work: Callable[[str], str]) -> None:
         try:

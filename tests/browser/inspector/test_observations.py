@@ -52,6 +52,17 @@ async def test_sets_are_listed_shown_and_judged(page, endpoint, section):
     await until(lambda: endpoint.received[-1]["action"] == "stop")
 
 
+async def test_people_are_detected_where_nothing_was_imported(page, endpoint, section):
+    await endpoint.broadcast(EMPTY | {"sets": []})
+    await page.keyboard.press("Alt+j")
+    detect = section.get_by_role("button", name="Detect people")
+    await detect.click()
+    await until(lambda: endpoint.received[-1] == {"type": "observations", "action": "detect", "name": ""})
+    await endpoint.broadcast(EMPTY | {"sets": [], "running": True, "stage": "detecting people", "share": 0.4})
+    await section.get_by_text("Detecting people …").wait_for()
+    assert await detect.is_hidden()
+
+
 FINDING = {
     "type": "finding", "running": True, "stage": "acquiring sizes", "share": 0.5, "message": "", "failed": False,
     "notes": [], "frame": None, "tried": None, "camera": None, "axes": [],
