@@ -10,7 +10,7 @@ import numpy as np
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
-from tracker.judging.judge import DOUBTED, Judgement
+from tracker.judging.judge import Judgement
 from tracker.judging.verdicts import LIMBS
 from tracker.observations.observed import ObservationSet
 from tracker.observations.plans import MaskPlan
@@ -67,7 +67,7 @@ def limbs_off(judgements: Sequence[Judgement], camera: Camera, frame: int) -> Fl
         places = judgement.imported.places(frame)
         for limb, verdict in judgement.frames.get(frame, {}).items():
             known = [j for j in LIMBS[limb] if j in places]
-            if verdict.probability_off >= DOUBTED and known:
+            if verdict.is_doubted and known:
                 px = camera.pinhole.project(np.array([places[j] for j in known]))
                 people.append(dict(zip(known, px, strict=True)))
     return _joined(people, [np.array([*own.values()]) for own in people], camera)

@@ -12,7 +12,7 @@ from app.export.report_files import write_html
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
-from tracker.judging.judge import DOUBTED, Doubt, Judgement
+from tracker.judging.judge import Doubt, Judgement
 from tracker.judging.verdicts import LIMBS
 from tracker.session.session import Session
 
@@ -54,7 +54,7 @@ def shown_doubts(worst: Sequence[Doubt]) -> list[Doubt]:
     """Return the entries with pictures: of doubts of one limb on frames close together the worst."""
     out = list[Doubt]()
     for doubt in worst:
-        if doubt.verdict.probability_off < DOUBTED or len(out) == _SHOWN:
+        if not doubt.verdict.is_doubted or len(out) == _SHOWN:
             break
         if not any(o.limb == doubt.limb and abs(o.frame - doubt.frame) <= _APART for o in out):
             out.append(doubt)
@@ -62,7 +62,7 @@ def shown_doubts(worst: Sequence[Doubt]) -> list[Doubt]:
 
 
 def _person(own: Judgement, recording: Recording, cameras: Sequence[Camera]) -> list[str]:
-    doubted = [d for d in own.worst if d.verdict.probability_off >= DOUBTED]
+    doubted = [d for d in own.worst if d.verdict.is_doubted]
     out = [f"<h2>{html.escape(own.person)}</h2>"]
     percent = f"{100 * own.share_in_order:.0f}%"
     out.append(f"<p>{percent} of {len(own.frames)} frames are in order; {len(doubted)} limbs are off.</p>")

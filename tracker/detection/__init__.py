@@ -4,4 +4,4 @@ Imports `geometry`, `formats`, `footage`, `session` and `observations`. A networ
 each other is in `people_in_views`. Callers use `detectors.DETECTORS` and `detect.detect_people`.
 """
 
-__all__ = ["detect", "detectors", "model_files"]
+__all__ = ["detect", "detector", "detectors", "model_files"]

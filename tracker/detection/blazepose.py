@@ -5,7 +5,7 @@ The networks are those of MediaPipe; their inputs and outputs are described in i
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -17,14 +17,21 @@ from tracker.geometry.arrays import Array, Image, IntArray
 
 _BEYOND = ("hips", "rim", "shoulders", "rim of shoulders", "left palm", "right palm")
 """Landmarks behind those of the skeleton, from which MediaPipe makes the next square."""
-_STRIDES = ((8, 2), (16, 2), (32, 6))
-"""Cells of the finder's grids, px of its input, and anchors in each."""
-_OVERLAP = 0.3
-"""Share of overlap, intersection over union, from which two boxes are of one person (Bazarevsky et al. 2020)."""
-_AROUND = 1.25
-"""Side of the square of the landmarks over the diameter of the circle around a person (model card)."""
-_KERNEL = 3
-"""Cells of a heat map around a landmark whose center of mass refines it (model card: a kernel of 7)."""
+
+
+class _Card(NamedTuple):
+    """Facts of the networks, as their model card states them."""
+
+    strides: tuple[tuple[int, int], ...]
+    """Cells of the finder's grids, px of its input, and anchors in each."""
+    around: float
+    """Side of the square of the landmarks over the diameter of the circle around a person."""
+    kernel: int
+    """Cells of a heat map on each side of a landmark whose center of mass refines it."""
+
+
+_CARD = _Card(((8, 2), (16, 2), (32, 6)), 1.25, 3)
+"""The facts of these versions."""
 
 
 class BlazePose:
@@ -93,21 +100,21 @@ class _Network:
 def _anchors(size: int) -> Array:
     """Return the centers of the finder's cells, one for each anchor, (n, 2), as shares of its input."""
     out = []
-    for stride, count in _STRIDES:
+    for stride, count in _CARD.strides:
         centers = (np.arange(size // stride) + 0.5) * stride / size
         out.append(np.repeat(np.stack(np.meshgrid(centers, centers), axis=-1).reshape(-1, 2), count, axis=0))
     return np.concatenate(out)
 
 
 def _groups(boxes: Array, probability: Array) -> list[IntArray]:
-    """Join the boxes, (n, 4) as corner and size, that overlap the most probable one, and so on with those left."""
+    """Join the boxes, (n, 4) as corner and size, that overlap the most probable one by half, and so on."""
     left, out = np.argsort(-probability), []
     while len(left):
         corner = np.maximum(boxes[left, :2], boxes[left[0], :2])
         end = np.minimum(boxes[left, :2] + boxes[left, 2:], boxes[left[0], :2] + boxes[left[0], 2:])
         common = np.maximum(end - corner, 0).prod(axis=1)
         areas = boxes[left, 2:].prod(axis=1)
-        near = common > _OVERLAP * (areas + areas[0] - common)
+        near = 2 * common > areas + areas[0] - common
         near[0] = True
         out.append(left[near])
         left = left[~near]
@@ -117,7 +124,7 @@ def _groups(boxes: Array, probability: Array) -> list[IntArray]:
 def _square_around(hips_px: Array, rim_px: Array) -> PictureSquare:
     """Return the square of a person whose circle, around the hips, passes the rim above the head."""
     up = rim_px - hips_px
-    return PictureSquare(hips_px, 2 * _AROUND * float(np.hypot(*up)), float(np.arctan2(up[0], -up[1])))
+    return PictureSquare(hips_px, 2 * _CARD.around * float(np.hypot(*up)), float(np.arctan2(up[0], -up[1])))
 
 
 def _inverse(to_pixels: Array) -> Array:
@@ -134,8 +141,8 @@ def _refined(places: Array, heat: Array) -> Array:
     for i, (column, row) in enumerate((places * n).astype(int)):
         if not (0 <= column < n and 0 <= row < n):
             continue
-        top, left = max(0, row - _KERNEL), max(0, column - _KERNEL)
-        logits = heat[top : row + _KERNEL + 1, left : column + _KERNEL + 1, i]
+        top, left = max(0, row - _CARD.kernel), max(0, column - _CARD.kernel)
+        logits = heat[top : row + _CARD.kernel + 1, left : column + _CARD.kernel + 1, i]
         if logits.max() >= 0:
             weights = expit(logits)
             rows, columns = np.mgrid[top : top + weights.shape[0], left : left + weights.shape[1]]

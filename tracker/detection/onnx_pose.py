@@ -17,10 +17,9 @@ from tracker.errors import TrackerError
 from tracker.formats.joint_maps import joint_map_of_size
 from tracker.geometry.arrays import Array, Image
 
-_MEAN, _SIGMA = np.array([123.675, 116.28, 103.53]), np.array([58.395, 57.12, 57.375])
-"""Mean and standard deviation of red, green and blue in ImageNet, by which RTMPose's input is normalized."""
-_BORDER = 114
-"""Value of the pixels beside a picture in the input of RTMO, YOLOX and RTMDet."""
+_COLORS = np.array([[123.675, 116.28, 103.53], [58.395, 57.12, 57.375]])
+"""Mean and standard deviation of red, green and blue in ImageNet, by which RTMPose's input is normalized; beside a
+picture, inputs have the mean."""
 _OUTPUTS = {"landmarks": {"simcc_x", "simcc_y"}, "people": {"dets", "keypoints"}, "finder": {"dets", "labels"}}
 
 
@@ -49,7 +48,7 @@ class OnnxPose:
             people = self._people(picture, square)
             return [_square_around(p.points_px.min(axis=0), p.points_px.max(axis=0), square.turn_rad) for p in people]
         network = self._by_role["finder"]
-        crop, back = _crop(picture, square, network.size, _BORDER)
+        crop, back = _crop(picture, square, network.size)
         boxes, labels = network({"dets", "labels"}, crop[..., ::-1])
         found = boxes[(labels == 0) & (boxes[:, 4] > 1 - boxes[:, 4])]
         corners = found[np.argsort(-found[:, 4]), :4].reshape(-1, 2, 2) @ back[:, :2].T + back[:, 2]
@@ -63,8 +62,8 @@ class OnnxPose:
             nearest = int(np.argmin(apart)) if apart else -1
             return people[nearest] if apart and apart[nearest] < square.side_px / 4 else None
         network = self._by_role["landmarks"]
-        crop, back = _crop(picture, square, network.size, 0)
-        x, y = network({"simcc_x", "simcc_y"}, (crop - _MEAN) / _SIGMA)
+        crop, back = _crop(picture, square, network.size)
+        x, y = network({"simcc_x", "simcc_y"}, (crop - _COLORS[0]) / _COLORS[1])
         height, width = network.size
         columns, rows = x.argmax(axis=1) * width / x.shape[1], y.argmax(axis=1) * height / y.shape[1]
         confidence = np.clip(np.minimum(x.max(axis=1), y.max(axis=1)), 0, 1).astype(np.float64)
@@ -74,7 +73,7 @@ class OnnxPose:
 
     def _people(self, picture: Image, square: PictureSquare) -> list[DetectedPerson]:
         network = self._by_role["people"]
-        crop, back = _crop(picture, square, network.size, _BORDER)
+        crop, back = _crop(picture, square, network.size)
         boxes, points = network({"dets", "keypoints"}, crop[..., ::-1])
         order = [i for i in np.argsort(-boxes[:, 4]) if boxes[i, 4] > 1 - boxes[i, 4]]
         return [
@@ -126,14 +125,19 @@ class _Crop(NamedTuple):
     back: Array
 
 
-def _crop(picture: Image, square: PictureSquare, size: tuple[int, int], border: int) -> _Crop:
+def _crop(picture: Image, square: PictureSquare, size: tuple[int, int]) -> _Crop:
     """Return an image of a size, height and width, that shows a square, and the map back to the picture, (2, 3)."""
     height, width = size
     to_pixels = square.to_pixels(max(height, width))
     to_pixels[:, 2] += (width - max(height, width)) / 2, (height - max(height, width)) / 2
     flags = cv2.INTER_AREA if square.side_px > max(height, width) else cv2.INTER_LINEAR
     image = cv2.warpAffine(
-        picture, to_pixels, (width, height), flags=flags, borderMode=cv2.BORDER_CONSTANT, borderValue=(border,) * 3
+        picture,
+        to_pixels,
+        (width, height),
+        flags=flags,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=_COLORS[0].tolist(),
     )
     return _Crop(np.asarray(image, np.uint8), np.asarray(cv2.invertAffineTransform(to_pixels), np.float64))
 

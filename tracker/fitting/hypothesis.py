@@ -14,8 +14,9 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.jit import njit
 from tracker.fitting.gauss_newton import Fit
 from tracker.geometry.arrays import Array, IntArray
+from tracker.observations.triangulation import INLIER_M
 
-SAME_POSE_M = 0.10
+SAME_POSE_M = INLIER_M
 """Two poses are the same if no point of the body is farther apart, metres: the width of a limb. Contours nearer than
 that overlap, so that refinement leads from one pose to the other. From nothing, with 0.10 and with 0.12, `fast_arms`
 ended at 34.8 and 34.3 mm, and the simulated heavy man at 23.1 and 26.8 mm."""

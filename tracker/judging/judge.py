@@ -28,8 +28,6 @@ from tracker.tracking.pose_errors import point_covariances
 from tracker.tracking.tracker import TrackerSettings
 from tracker.tracking.view_tracks import left_out
 
-DOUBTED = 0.5
-"""Probability from which a limb is said to be off, and gets a reason."""
 _NOTABLE_M = 0.03
 """Constant offset of a joint from which it is worth a sentence, metres: conventions differ by less at most joints."""
 _PARTS = (("upper_arm", 0, 1), ("forearm", 1, 2)), (("thigh", 0, 1), ("calf", 1, 2))
@@ -49,6 +47,11 @@ class LimbVerdict(NamedTuple):
     """Why, for people; empty where it is in order."""
     joint: str = ""
     """Name of its farthest joint."""
+
+    @property
+    def is_doubted(self) -> bool:
+        """Whether the limb is more likely off than not; it gets a reason then."""
+        return self.probability_off >= 1 - self.probability_off
 
 
 class Doubt(NamedTuple):
@@ -86,7 +89,7 @@ class Judgement:
     @property
     def share_in_order(self) -> float:
         """Share of the frames with no limb that is off."""
-        fine = [all(v.probability_off < DOUBTED for v in of_frame.values()) for of_frame in self.frames.values()]
+        fine = [all(not v.is_doubted for v in of_frame.values()) for of_frame in self.frames.values()]
         return float(np.mean(fine)) if fine else 1.0
 
     @property
@@ -165,7 +168,7 @@ def judge_person(
             if columns:
                 names = [imported.names[i] for i in columns]
                 verdicts[limb] = _verdict(own, usual, limb, names, of_frame[columns])
-        doubted = [limb for limb, v in verdicts.items() if v.probability_off >= DOUBTED]
+        doubted = [limb for limb, v in verdicts.items() if v.is_doubted]
         if doubted:
             seen = _Outside(observer, k) if observer is not None else None
             for limb in doubted:

@@ -12,7 +12,7 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import OTHER_BODY_M
-from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
+from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M, Hypothesis
 from tracker.geometry.arrays import Array
 from tracker.tracking.run_confidence import RUN_MODEL
 
@@ -24,8 +24,8 @@ SELDOM_NATS = 10.0
 """How much likelier the colours of the run must find a limb elsewhere until it is off as likely as not, nats. Of 3,354
 limbs of twelve simulated people in their place, 0.2% had more; of 83 that were put elsewhere by more than 20 cm, 88%
 (`tests/benchmarks/region_evidence.py --displaced`)."""
-OFF_M = 0.10
-"""A limb is off where one of its joints is farther from its true place, metres."""
+OFF_M = SAME_POSE_M
+"""A limb is off where one of its joints is farther from its true place, metres: in another pose."""
 
 
 def acquired_sigma_m(joints_are_given: bool) -> float:

@@ -113,11 +113,9 @@ def record(found: list["Judgement"]) -> dict[str, Any]:
 
 
 def _format(found: list["Judgement"]) -> str:
-    from tracker.judging.judge import DOUBTED
-
     lines = []
     for own in found:
-        doubted = [d for d in own.worst if d.verdict.probability_off >= DOUBTED]
+        doubted = [d for d in own.worst if d.verdict.is_doubted]
         lines.append(f"{own.person}: {100 * own.share_in_order:.0f}% of {len(own.frames)} frames in order")
         lines += [f"  {sentence}" for sentence in own.sentences]
         for d in doubted[:_LISTED]:

@@ -30,7 +30,7 @@ from tracker.calibration.camera_correction import KINDS, in_units
 from tracker.calibration.findings import CameraFinding
 from tracker.formats.model_toml import PRESETS
 from tracker.geometry.arrays import Array
-from tracker.judging.judge import DOUBTED, Doubt
+from tracker.judging.judge import Doubt
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.methods import METHODS
 from tracker.posing.grab import minor_points
@@ -238,7 +238,7 @@ def observations(found: ObservationsState, people: Sequence[str]) -> observed.Ob
 
 
 def _is_off(doubt: Doubt) -> bool:
-    return doubt.verdict.probability_off >= DOUBTED
+    return doubt.verdict.is_doubted
 
 
 def _judged_limb(person: int, doubt: Doubt) -> observed.JudgedLimb:

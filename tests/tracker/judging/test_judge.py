@@ -9,7 +9,7 @@ from stored_motions import random_poses
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.formats.model_toml import load_model
-from tracker.judging.judge import DOUBTED, judge_person
+from tracker.judging.judge import judge_person
 from tracker.judging.verdicts import LIMBS
 from tracker.observations.body_points import BodyPoints
 from tracker.store.records import PoseRecord
@@ -50,7 +50,7 @@ def judged(joints, tracked):
 
 
 def doubts(judgement):
-    return {(k, limb) for k, own in judgement.frames.items() for limb, v in own.items() if v.probability_off >= DOUBTED}
+    return {(k, limb) for k, own in judgement.frames.items() for limb, v in own.items() if v.is_doubted}
 
 
 def test_nothing_is_off_where_nothing_is(joints, tracked):

@@ -10,8 +10,6 @@ from datetime import date
 from itertools import pairwise
 from typing import NamedTuple
 
-_REGULAR_SHARE = 0.5
-"""Share of equal steps between the numbers of pictures; they are times, hashes or the like if fewer are equal."""
 _DIGITS = re.compile(r"([0-9]{1,19})")
 """Digits of one number: as many as nanoseconds of Unix time have."""
 _TIME = re.compile(
@@ -91,7 +89,8 @@ def _usual_step(values: Sequence[int]) -> int:
     """Return the usual step between numbers in ascending order, of which all others are multiples; 0 if none is."""
     steps = Counter(b - a for a, b in pairwise(sorted(set(values))))
     step = min(steps, key=lambda s: (-steps[s], s))
-    return step if steps[step] >= _REGULAR_SHARE * steps.total() and not any(s % step for s in steps) else 0
+    # Numbers most of whose steps differ are times, hashes or the like.
+    return step if 2 * steps[step] >= steps.total() and not any(s % step for s in steps) else 0
 
 
 def _follows(values: Sequence[int], times: Sequence[float] | None) -> bool:
