@@ -95,7 +95,7 @@ def test_a_rate_that_contradicts_the_stamps(run, session, tmp_path):
     assert_refused(run("init", session, "--joints", path, "--frame", 30), ["DataRate 50", "Time", "--clock frames"])
     assert run("init", session, "--joints", path, "--frame", 30, "--clock", "frames")[0] == 0
     assert joints_of_frame(session, 30) == pytest.approx(true_wrist(30), abs=1e-6)
-    expected = ["--first-frame and --clock with a TRC file", "truth.csv"]
+    expected = ["--first-frame and --clock with joints, found poses", "truth.csv"]
     assert_refused(run("evaluate", session, "--reference", SAMPLE / "truth.csv", "--clock", "time"), expected)
 
 
