@@ -21,6 +21,8 @@ from app.runtime.memory import WORKER_BYTES, free_bytes, n_cores
 
 _EXTRAS = {
     "import": ("quadrille import of DeepLabCut HDF5, SLEAP and NWB", ("h5py", "sleap_io")),
+    "detect": ("quadrille detect", ("ai_edge_litert",)),
+    "detect-onnx": ("quadrille detect --detector onnx", ("onnxruntime",)),
     "export": ("quadrille export to C3D, movement and NWB", ("ezc3d", "h5netcdf", "ndx_pose", "pynwb", "xarray")),
     "dask": ("quadrille batch --dask", ("distributed",)),
 }
@@ -160,10 +162,11 @@ def _extras() -> list[Finding]:
 def _extensions() -> list[Finding]:
     from tracker.calibrations.calibration_layout import CalibrationLayout
     from tracker.compute.extensions import GROUPS, extensions, unread_packages
+    from tracker.detection.detector import DetectorKind
     from tracker.evaluation.metric import Metric
     from tracker.exports.export_format import ExportFormat
 
-    kinds = (ExportFormat, Metric, CalibrationLayout, None)
+    kinds = (ExportFormat, Metric, CalibrationLayout, DetectorKind, None)
     found = []
     for group, kind in zip(GROUPS, kinds, strict=True):
         for one in extensions(group, kind):

@@ -95,8 +95,8 @@
  * @typedef {{type: "find_people", action: "start" | "stop"}} FindPeople
  * @typedef {{type: "calibration_check", action: "start" | "stop" | "preview" | "leave" | "apply" | "track_again"}}
  *   CheckCalibration
- * @typedef {{type: "observations", action: "show" | "judge" | "take" | "track" | "track_contours" | "detect" | "stop" | "discard",
- *   name?: string}} UseObservations
+ * @typedef {{type: "observations", action: "show" | "judge" | "take" | "track" | "track_contours" | "detect" | "stop" |
+ *   "discard", name?: string}} UseObservations
  * @typedef {{type: "provenance", person: number | null, annotators?: boolean}} WatchProvenance
  * @typedef {{type: "other_copy", action: "keep" | "take" | "mean" | "leave", person?: number, frame?: number}} UseCopy
  * @typedef {{type: "other_copy", action: "tolerance", tolerance_mm: number}} SetCopyTolerance

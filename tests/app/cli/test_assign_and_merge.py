@@ -198,6 +198,7 @@ def test_what_is_no_copy_is_refused_and_nothing_is_written(run, session, tmp_pat
     copy, into = tmp_path / "copy", tmp_path / "into"
     shutil.copytree(session, copy)
     (copy / "annotations.sqlite").unlink()
+    (copy / "identity.txt").unlink()
     annotate(copy, 1.0, [0], "anna")
     assert_refused(run("merge", session, copy, "--into", into), ["without a common edit in their histories"])
     toml = copy / "session.toml"
