@@ -225,13 +225,6 @@ PHRASES = {
     "install_import": Phrases(
         "install it with: pip install 'quadrille[import]'", "install it with: pip install quadrille[import]"
     ),
-    "install_detect": Phrases(
-        "install it with: pip install 'quadrille[detect]'", "install it with: pip install quadrille[detect]"
-    ),
-    "install_detect_onnx": Phrases(
-        "install it with: pip install 'quadrille[detect-onnx]'",
-        "install it with: pip install quadrille[detect-onnx]",
-    ),
     "export_joints": Phrases("export poses with --format", "export poses in another format"),
     "get_models": Phrases(
         "fetch it with quadrille detect --get-models, or say --models FOLDER where it is",

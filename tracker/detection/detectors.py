@@ -5,30 +5,21 @@ from pathlib import Path
 from tracker.compute.extensions import Extended
 from tracker.detection.detector import Detector, DetectorKind
 from tracker.detection.model_files import model_file
-from tracker.errors import Remedy, TrackerError
+from tracker.errors import TrackerError
+from tracker.formats.interchange.optional_packages import require
 
 
 def _blazepose(model: str, folder: Path) -> Detector:
-    try:
-        import ai_edge_litert.interpreter  # noqa: F401  whether it is installed
+    from tracker.detection.blazepose import BlazePose
 
-        from tracker.detection.blazepose import BlazePose
-    except ImportError as error:
-        raise TrackerError(
-            "expected the package ai-edge-litert, which runs the networks, found none", Remedy("install_detect")
-        ) from error
+    require("ai_edge_litert", "BlazePose", "run", "ai-edge-litert")
     return BlazePose(model_file(folder, "pose_detection.tflite"), model_file(folder, f"pose_landmark_{model}.tflite"))
 
 
 def _onnx(model: str, folder: Path) -> Detector:
-    try:
-        import onnxruntime  # noqa: F401  whether it is installed
+    from tracker.detection.onnx_pose import OnnxPose
 
-        from tracker.detection.onnx_pose import OnnxPose
-    except ImportError as error:
-        raise TrackerError(
-            "expected the package onnxruntime, which runs ONNX files, found none", Remedy("install_detect_onnx")
-        ) from error
+    require("onnxruntime", "ONNX files", "run", "onnxruntime")
     return OnnxPose([path if (path := Path(name)).is_file() else folder / name for name in model.split(",")])
 
 

@@ -5,4 +5,4 @@ Callers use `c3d.write_c3d`, `gltf.write_glb`,
 `movement_netcdf.write_dataset`, `nwb.write_nwb` and `indexed_png.write_indexed_png`.
 """
 
-__all__ = ["c3d", "gltf", "indexed_png", "movement_netcdf", "nwb"]
+__all__ = ["c3d", "gltf", "indexed_png", "movement_netcdf", "nwb", "optional_packages"]

@@ -1,4 +1,4 @@
-"""Packages that only some formats need: the extra `export` of the program has them."""
+"""Packages that are installed only where something needs them, such as a format of the extra `export`."""
 
 from importlib import import_module
 from typing import Any
@@ -6,12 +6,14 @@ from typing import Any
 from tracker.errors import FormatError
 
 
-def require(package: str, title: str) -> Any:
-    """Import a package that a format needs.
+def require(package: str, title: str, use: str = "write", install: str = "'quadrille[export]'") -> Any:
+    """Import a package that a format or a detector needs.
 
     Args:
         package: its name in Python.
-        title: of the format, for messages.
+        title: of the format or the detector, for messages.
+        use: verb that says what for.
+        install: what pip installs.
 
     Raises:
         FormatError: it is not installed, or does not load.
@@ -21,6 +23,5 @@ def require(package: str, title: str) -> Any:
     except ImportError as error:
         found = "none" if isinstance(error, ModuleNotFoundError) else f"one that does not load ({error})"
         raise FormatError(
-            f"expected the package {package} to write {title}, found {found}; "
-            "install it with: pip install 'quadrille[export]'"
+            f"expected the package {package} to {use} {title}, found {found}; install it with: pip install {install}"
         ) from error
