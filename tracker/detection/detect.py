@@ -8,7 +8,7 @@ import numpy as np
 
 from tracker.compute.progress import Report, unreported
 from tracker.detection.detector import Detector
-from tracker.detection.people_in_views import PeopleInViews, Seen
+from tracker.detection.people_in_views import PeopleInViews, Seen, points_of
 from tracker.errors import TrackerError
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import JointMap, known_joint_maps
@@ -71,7 +71,8 @@ def detect_people(
     at = {marker: i for i, marker in enumerate(convention.points)}
     columns = {point: at[marker] for point, marker in convention.markers.items() if marker in at}
     cameras = [c.camera for c in session.cameras]
-    people = PeopleInViews(detector, columns, cameras, floor_plane(session.up, session.floor).normal, session.fps)
+    up = floor_plane(session.up, session.floor).normal
+    people = PeopleInViews(detector, columns, len(convention.points), cameras, up, session.fps)
     found = {} if before is None else people.recall(before)
     todo = [k for k in plan.frames if k not in found]
     try:
@@ -143,10 +144,8 @@ def _observations(
     n = max(len(own) for views in found.values() for own in views)
     shape = session.n_frames, len(names), n, len(convention.points)
     px, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
-    for k, views in found.items():
-        for v, own in enumerate(views):
-            for i, figure in enumerate(own):
-                px[k, v, i], confidence[k, v, i] = figure.points_px, figure.confidence
+    for k, seen in found.items():
+        px[k], confidence[k] = points_of(seen, len(convention.points), n)
     options = ("detector", plan.detector), ("frames", _text(plan.frames)), ("detected", _text(done))
     points = ObservedPoints(convention.points, tuple(names), px, confidence)
     rows: Array = np.array(sorted(found), dtype=np.float64)

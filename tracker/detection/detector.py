@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tracker.geometry.arrays import Array, Image
 
 SQUARE_M = 2.4
-"""Side of the square around the hips of a person, metres, in which a detector looks for the person's points: someone
-who stands fills 0.7 of it, and raised arms lie within."""
+"""Side of the square around the hips of a person, metres, in which a detector looks for the person's points: 1.25 times
+(BlazePose's model card) the circle through the soles of someone 1.8 m tall, whose hips are at 0.53 of the stature
+(R. Drillis and R. Contini 1966)."""
 
 
 class PictureSquare(NamedTuple):

@@ -12,15 +12,15 @@ import numpy as np
 
 from tracker.detection.detector import SQUARE_M, DetectedPerson, Detector, PictureSquare
 from tracker.geometry.arrays import Array, Image
-from tracker.geometry.cameras import Camera, viewed_point
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
 from tracker.observations.identities import SAME_PERSON_M, PersonTrack, follow_people, track_distance
 from tracker.observations.observed import ObservationSet
 from tracker.observations.triangulation import INLIER_M, Views
 
 _TORSO = ("left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _FIND_EVERY_S = 0.5
-"""Time between two searches of whole pictures for people who enter, seconds: someone walks 0.7 m meanwhile. A person
-who is lost is sought at the last place until then."""
+"""Time between two searches of whole pictures for people who enter, seconds: at 1.4 m/s (R. Bohannon 1997) someone
+walks 0.7 m meanwhile. A person who is lost is sought at the last place until then."""
 
 Seen: TypeAlias = list[list[DetectedPerson]]
 """The people whom each view sees on a frame."""
@@ -30,19 +30,21 @@ class PeopleInViews:
     """Finds people in the pictures of all cameras, and follows them."""
 
     def __init__(
-        self, detector: Detector, body_points: Mapping[str, int], cameras: Sequence[Camera], up: Array, fps: float
-    ) -> None:
+        self, detector: Detector, body_points: Mapping[str, int], n_points: int, cameras: Sequence[Camera], up: Array,
+        fps: float,
+    ) -> None:  # fmt: skip
         """Begin with nobody.
 
         Args:
             detector: sees a picture.
             body_points: index of the detector's point for points of the body, those of the torso among them.
+            n_points: number of the detector's points.
             cameras: of all views.
             up: unit vector that points up, (3,), world.
             fps: frames per second.
         """
         self._detector, self._views, self._up = detector, Views(cameras), up
-        self._torso = [body_points[name] for name in _TORSO]
+        self._torso, self._n_points = [body_points[name] for name in _TORSO], n_points
         self._every = max(1, round(_FIND_EVERY_S * fps))
         self._middle = viewed_point(cameras)
         self._last_search: int | None = None
@@ -66,7 +68,7 @@ class PeopleInViews:
         if is_time or not known or any(track.seen < frame - 1 for track in known):
             self._search(figures, pictures)
             self._last_search = frame
-        follow_people(self._views, *self._arrays(figures), frame, self.tracks)
+        follow_people(self._views, *self._undistorted(figures), frame, self.tracks)
         for track in self.tracks:
             if track.seen == frame:
                 self._complete(track, frame, figures, pictures)
@@ -85,7 +87,7 @@ class PeopleInViews:
                 ]
                 for v, own in enumerate(is_seen)
             ]
-            follow_people(self._views, *self._arrays(out[k]), k, self.tracks)
+            follow_people(self._views, *self._undistorted(out[k]), k, self.tracks)
         return out
 
     def _look_for(self, track: PersonTrack, figures: Seen, pictures: Sequence[Image | None]) -> None:
@@ -104,7 +106,7 @@ class PeopleInViews:
             self._add(figures[v], picture, square)
             if len(figures[v]) == before:
                 continue
-            px, confidence = self._undistorted(v, figures[v][-1])
+            px, confidence = (values[v, before] for values in self._undistorted(figures))
             if track_distance(self._views, v, track.last_world, px, confidence) < SAME_PERSON_M:
                 track.members[frame, v] = before
 
@@ -113,8 +115,7 @@ class PeopleInViews:
         for v, picture in enumerate(pictures):
             if picture is None:
                 continue
-            turn = self._turn(v, self._middle)
-            for part in _parts(picture.shape[:2], turn):
+            for part in _parts(picture.shape[:2], _turn(self._up_px(v, self._middle))):
                 for square in self._detector.find(picture, part):
                     if not any(self._is_around(square, figure) for figure in figures[v]):
                         self._add(figures[v], picture, square)
@@ -140,44 +141,50 @@ class PeopleInViews:
         camera = self._views.cameras[view]
         torso = track.last_world[self._torso]
         hips, shoulders = torso[2:].mean(axis=0), torso[:2].mean(axis=0)
-        depth = float(camera.depths(hips[None])[0])
-        if not np.isfinite(depth) or depth < 0.1:
+        (depth,) = camera.depths(hips[None])
+        if not depth > NEAR_PLANE_M:
             return None
-        center, above = camera.distort_points(camera.project(np.array([hips, hips + 0.1 * self._up])))
-        if not np.isfinite(center).all() or not (0 <= center[0] < camera.width and 0 <= center[1] < camera.height):
+        center, chest = camera.distort_points(camera.project(np.array([hips, shoulders])))
+        if not ((center >= 0) & (center < camera.size)).all():
             return None
         side = SQUARE_M * self._views.focal_px[view] / depth
-        axis = camera.distort_points(camera.project(shoulders[None]))[0] - center
         # From above or below the trunk has no direction in the picture.
-        up = axis if np.isfinite(axis).all() and np.hypot(*axis) > 0.1 * side else above - center
-        return PictureSquare(center, side, float(np.arctan2(up[0], -up[1])))
+        is_along = np.hypot(*(chest - center)) > 0.1 * side
+        return PictureSquare(center, side, _turn(chest - center if is_along else self._up_px(view, hips)))
 
-    def _turn(self, view: int, place_world: Array) -> float:
-        """Return the angle of the up direction in a picture, radians."""
-        camera = self._views.cameras[view]
-        a, b = camera.project(np.array([place_world, place_world + 0.2 * self._up]))
-        up = b - a
-        return float(np.arctan2(up[0], -up[1])) if np.isfinite(up).all() else 0.0
+    def _up_px(self, view: int, place_world: Array) -> Array:
+        """Return the way that a point goes in a picture if it rises by 20 cm, (2,), undistorted px; NaN if unknown."""
+        here, above = self._views.cameras[view].project(np.array([place_world, place_world + 0.2 * self._up]))
+        return above - here
 
-    def _undistorted(self, view: int, figure: DetectedPerson) -> tuple[Array, Array]:
-        px = np.full((1, len(self._views.cameras), *figure.points_px.shape), np.nan)
-        px[0, view] = figure.points_px
-        return self._views.undistorted(px)[0, view], figure.confidence
-
-    def _arrays(self, figures: Sequence[Sequence[DetectedPerson]]) -> tuple[Array, Array]:
-        """Return the points of all figures, (n_views, n_detections, n_points, 2), undistorted px, and confidences."""
-        return figure_arrays(self._views, figures)
+    def _undistorted(self, people: Seen) -> tuple[Array, Array]:
+        """Return the points of all, (n_views, n_detections, n_points, 2), undistorted px, and confidences."""
+        px, confidence = points_of(people, self._n_points)
+        return self._views.undistorted(px[None])[0], confidence
 
 
-def figure_arrays(views: Views, figures: Sequence[Sequence[DetectedPerson]]) -> tuple[Array, Array]:
-    """Return points, (n_views, n_detections, n_points, 2), undistorted px, and confidences of the same shape but 2."""
-    n = max((len(own) for own in figures), default=0)
-    n_points = next((len(f.confidence) for own in figures for f in own), 0)
-    px, confidence = np.full((len(figures), n, n_points, 2), np.nan), np.zeros((len(figures), n, n_points))
-    for v, own in enumerate(figures):
-        for i, figure in enumerate(own):
-            px[v, i], confidence[v, i] = figure.points_px, figure.confidence
-    return views.undistorted(px[None])[0] if n else px, confidence
+def points_of(people: Seen, n_points: int, n_detections: int | None = None) -> tuple[Array, Array]:
+    """Return the points of the people of a frame as arrays.
+
+    Args:
+        people: by view.
+        n_points: of a person.
+        n_detections: places for people in each view; as many as the most that one shows by default.
+
+    Returns:
+        Positions, (n_views, n_detections, n_points, 2), px of the pictures, NaN where absent; confidences, 0 there.
+    """
+    n = max(map(len, people)) if n_detections is None else n_detections
+    px, confidence = np.full((len(people), n, n_points, 2), np.nan), np.zeros((len(people), n, n_points))
+    for v, own in enumerate(people):
+        for i, person in enumerate(own):
+            px[v, i], confidence[v, i] = person.points_px, person.confidence
+    return px, confidence
+
+
+def _turn(up_px: Array) -> float:
+    """Return the angle of a direction from the picture's upward one, clockwise, radians; 0 if it is unknown."""
+    return float(np.arctan2(up_px[0], -up_px[1])) if np.isfinite(up_px).all() else 0.0
 
 
 def _parts(shape: tuple[int, int], turn_rad: float) -> list[PictureSquare]:
