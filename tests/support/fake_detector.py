@@ -30,7 +30,7 @@ class FakeDetector:
             center = (points[9, :2] + points[12, :2]) / 2
             is_within = np.abs(center - square.center_px).max() < square.side_px / 2
             if is_within and (picture[0, 0, 0], person) not in self.unfound:
-                out.append(PictureSquare(center, 2.4 * np.ptp(points[:, 1])))
+                out.append(PictureSquare(center, 2.4 * (np.nanmax(points[:, 1]) - np.nanmin(points[:, 1]))))
         return out
 
     def look(self, picture, square):

@@ -4,7 +4,6 @@ import logging
 import threading
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from app.remedies import page_text
 from app.state.observations import ObservedSet
 from tracker.compute.progress import Report
 from tracker.detection.detect import DetectionPlan, detect_people, open_name
-from tracker.detection.detector import Detector
 from tracker.detection.detectors import load_detector
 from tracker.detection.model_files import default_folder
 from tracker.errors import TrackerError
@@ -106,19 +104,14 @@ class Observing:
         """Begin to detect people by a network on all frames; what is found is shown and stored.
 
         Raises:
-            TrackerError: other work on observations is under way, or the networks are not there.
+            TrackerError: other work on observations is under way.
         """
         with self._session_state.lock:
             self._refuse_if_busy()
-            session = self._session_state.session
-            detector, text = load_detector("blazepose", None, default_folder())
-            plan = DetectionPlan(
-                open_name(session, _DETECTED, text, range(session.n_frames)), text, range(session.n_frames)
-            )
-            self._start(plan.name, partial(self._detect, detector, plan))
+            self._start(_DETECTED, self._detect)
 
     def stop(self) -> None:
-        """Stop the work; nothing of it is stored. The caller must not hold the lock."""
+        """Stop the work; only people who were detected by then are stored. The caller must not hold the lock."""
         self._stopping.set()
         if self._thread is not None:
             self._thread.join(30)
@@ -193,8 +186,11 @@ class Observing:
                 "expected no other work on observations under way, found some; stop it or wait for its end"
             )
 
-    def _detect(self, detector: Detector, plan: DetectionPlan, name: str) -> str:
+    def _detect(self, name: str) -> str:
         session, recording = self._session_state.session, self._session_state.frames.observer.recording
+        detector, text = load_detector("blazepose", None, default_folder())
+        frames = range(session.n_frames)
+        plan = DetectionPlan(open_name(session, name, text, frames), text, frames)
 
         def report(stage: str, share: float, text: str = "", /) -> None:
             try:
@@ -204,7 +200,7 @@ class Observing:
 
         found = detect_people(session, recording, detector, plan, report)
         self._list()
-        self._set(shown=load_observations(session, name))
+        self._set(shown=load_observations(session, plan.name))
         ended = "" if found.is_complete else "Stopped; what was found is kept, and Detect people goes on. "
         n = found.frames.stop - found.frames.start
         return ended + f"Detected people on {n} frames. {' '.join(f'Note: {note}.' for note in found.notes)}"

@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 import pytest
+from fake_detector import FakeDetector
 from gestures import drag, wait_for
 from mask_files import write_masks
 from observed_people import BODY_25, seen, true_motion, write_openpose
@@ -67,6 +68,55 @@ def test_files_are_previewed_and_then_stored(controller, request_of):
     assert (found.name, found.format, found.is_in_space) == ("openpose", "openpose", False)
     assert found.n_frames == controller.session.n_frames
     assert controller.state.observations.plan is None
+
+
+@pytest.fixture
+def detector(controller, monkeypatch):
+    """A detector that knows the truth takes the place of the network, and of the footage."""
+    fake = FakeDetector(seen(controller.session, [true_motion(controller.session)]))
+    detect = observing.detect_people
+    monkeypatch.setattr(observing, "load_detector", lambda *_: (fake, "fake own"))
+    monkeypatch.setattr(observing, "detect_people", lambda session, _, *more: detect(session, fake, *more))
+    return fake
+
+
+def test_detected_people_are_stored_and_shown(controller, detector):
+    n = controller.session.n_frames
+    for name in ("detected", "detected 2"):
+        controller.observing.detect()
+        found = at_rest(controller)
+        assert (found.message.strip(), found.failed) == (f"Detected people on {n} frames.", False)
+        assert found.shown.name == name
+    assert [s.name for s in found.sets] == ["detected", "detected 2"]
+
+
+def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller, detector):
+    stopped = threading.Event()
+
+    def look(picture, square, look=detector.look):
+        if detector.n_looks == 40 and not stopped.is_set():
+            stopped.set()
+            controller.observing._stopping.set()
+        return look(picture, square)
+
+    detector.look = look
+    controller.observing.detect()
+    found = at_rest(controller)
+    assert found.message.startswith("Stopped; what was found is kept")
+    (some,) = found.sets
+    assert 0 < some.n_frames < controller.session.n_frames
+    controller.observing.detect()
+    (whole,) = at_rest(controller).sets
+    assert (whole.name, whole.n_frames) == ("detected", controller.session.n_frames)
+
+
+def test_networks_that_are_missing_are_named_where_they_are_fetched(controller, monkeypatch, tmp_path):
+    pytest.importorskip("ai_edge_litert")
+    monkeypatch.setattr(observing, "default_folder", lambda: tmp_path)
+    controller.observing.detect()
+    found = at_rest(controller)
+    assert found.failed
+    assert "docs/observations.md" in found.message
 
 
 def test_points_are_drawn_where_they_are_in_undistorted_pixels(imported):
