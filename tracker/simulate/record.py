@@ -1,6 +1,5 @@
 """Make a session folder of a simulated recording, with the truth about it."""
 
-import hashlib
 import secrets
 import shutil
 from collections.abc import Callable, Sequence
@@ -34,6 +33,7 @@ from tracker.simulate.stage.camera_rig import make_cameras
 from tracker.simulate.stage.film import exposed, film, freeze
 from tracker.simulate.stage.rasterizer import Figure
 from tracker.simulate.stage.room import Backdrop, see_room
+from tracker.store.identities import derived_uid
 
 BodyKind = Literal["skinned", "model"]
 Progress = Callable[[int, int], None]
@@ -109,7 +109,7 @@ def simulate(out: str | Path, simulation: Simulation = _DEFAULT, progress: Progr
         _shoot(sources, backdrops, figures, poses, simulation, progress)
         _write_truth(temporary, cast, models, poses, fps)
         people = [Person(r.name, m, color) for r, m, color in zip(cast, presets, cycle(PALETTE), strict=False)]
-        uid = hashlib.sha256(repr(simulation).encode()).hexdigest()[:32]  # the same arguments, the same recording
+        uid = derived_uid(repr(simulation))  # the same arguments, the same recording
         save_session(Session(temporary, out.name, float(fps), n_frames, tuple(sources), tuple(people), uid=uid))
         if out.exists():
             out.rmdir()
