@@ -144,7 +144,7 @@ def name_points(names: tuple[str, ...], given: JointMap | None, source: str) -> 
     Raises:
         FormatError: no convention is known.
     """
-    if names[0] != "0" or not all(map(str.isdecimal, names)):
+    if names[:1] != ("0",) or not all(map(str.isdecimal, names)):
         return names, given or guess_joint_map(names, source)
     n_body = next((k for k, name in enumerate(names) if name != str(k)), len(names))
     if n_body in (75, 543, 553):  # MediaPipe's body, before hands and perhaps a face of 468 or 478 points
