@@ -227,7 +227,7 @@ PHRASES = {
     ),
     "export_joints": Phrases("export poses with --format", "export poses in another format"),
     "get_models": Phrases(
-        "fetch it with quadrille detect --get-models, or say --models FOLDER where it is",
+        "fetch it with quadrille detect --get-models, or name its folder to quadrille detect with --models FOLDER",
         "fetch the networks on the command line, as docs/observations.md describes",
     ),
     "name_people_of_files": Phrases("name them with --person", "give one file for each person"),

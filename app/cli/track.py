@@ -33,6 +33,9 @@ class TrackWords:
     init: Literal["auto"] | None = None
     """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
     directions."""
+    detect: bool = False
+    """with --init auto: detect people by a network first, as quadrille detect does, and track by their key points and
+    the contours; for footage without backgrounds."""
     of: OptionalName = None
     """name of imported observations: their key points show --init auto the people, and are the evidence that --evidence
     says."""
@@ -115,6 +118,8 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     ascending = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
     frames = ascending[::-1] if arguments.backward else ascending
     _check_chain(arguments)
+    if arguments.detect or (arguments.init is not None and arguments.of is None):
+        arguments = _with_detection(arguments, at.session)
     paper, settings = METHODS[arguments.method].paper, settings_of(arguments)
     if arguments.paper and paper is not None:
         paper.require_body({p.name: p.model for p in (at.session.people[i] for i in at.people)})
@@ -137,6 +142,22 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     print(format_json(found) if arguments.json else format_summary(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
+
+
+def _with_detection(arguments: TrackArguments, session: "Session") -> TrackArguments:
+    """Return arguments with the key points that are detected first, or say that they would help."""
+    from app.cli.observations.detect import detect_first
+
+    reporter = Reporter(silent=arguments.json)
+    if arguments.detect:
+        of = detect_first(session, arguments.of, parse_frames(arguments.frames, session), reporter)
+        return replace(arguments, of=of, evidence="both")
+    if not session.has_outlines:
+        reporter.say(
+            "note: no camera has a background or masks, so that only what moves shows the people; --detect finds them "
+            "by a network first"
+        )
+    return arguments
 
 
 def _track_keypoints(at: Target, frames: Sequence[int], arguments: TrackArguments) -> dict[str, Any]:
@@ -171,6 +192,11 @@ def _check_chain(arguments: TrackArguments) -> None:
     if arguments.evidence == "keypoints" and arguments.acquire:
         raise TrackerError(
             "expected --evidence both with --acquire, found keypoints: sizes are acquired from the contours"
+        )
+    if arguments.detect and (arguments.init is None or arguments.evidence == "keypoints"):
+        raise TrackerError(
+            "expected --detect with --init auto, and contours as evidence beside its key points; correct the options, "
+            "or run quadrille detect first"
         )
     others = ("init", "acquire", "backward")
     if arguments.between_keyframes and (any(getattr(arguments, o) for o in others) or arguments.stride != 1):

@@ -58,7 +58,7 @@ def session(session: Session, role: Role = "host", has_place: bool = True) -> wi
     people = tuple(_person(p) for p in session.people)
     return wire.SessionMessage(
         session.name, session.fps, session.n_frames, cameras, people, DOUBTFUL_FROM, LOST_FROM, _START, role,
-        has_place,
+        has_place, session.has_outlines,
     )  # fmt: skip
 
 

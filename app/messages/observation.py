@@ -16,9 +16,10 @@ class UseObservations(Command, frozen=True, tag="observations"):
     `POST observations/plan` reads files, and `POST observations/import` stores them: paths come by such requests alone.
     """
 
-    action: Literal["show", "judge", "take", "track", "track_contours", "detect", "stop", "discard"]
+    action: Literal["show", "judge", "take", "track", "track_contours", "detect", "detect_track", "stop", "discard"]
     """`track` finds who has no pose by the key points and tracks by contours and key points; `track_contours` tracks by
-    contours alone. `find_people` stops both. `discard` forgets files that were read and are not imported."""
+    contours alone. `detect_track` detects people by a network, unless that was done, and goes on as `track`.
+    `find_people` stops what tracks. `discard` forgets files that were read and are not imported."""
     name: Name = ""
     """Name of the set; with `show`, empty for none."""
 

@@ -112,6 +112,8 @@ class SessionMessage(Message, frozen=True, tag="session"):
     """Messages that the page may send; others are refused."""
     has_place: bool
     """Whether the page has a frame of its own; else it shows that of the host."""
+    has_outlines: bool
+    """Whether some camera has a background or masks; else only what moves shows the people."""
 
 
 # --- state ---------------------------------------------------------------------------------------------------------

@@ -104,6 +104,7 @@ def _observations(controller: Controller, _: int, message: UseObservations) -> N
         "take": lambda: observing.take(message.name),
         "track": lambda: observing.track(message.name, as_evidence=True),
         "detect": observing.detect,
+        "detect_track": lambda: observing.detect(then_track=True),
         "track_contours": lambda: observing.track(message.name, as_evidence=False),
         "stop": observing.stop,
         "discard": observing.discard,

@@ -2,7 +2,7 @@
 
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
-import { numberRow, textButton } from "./rows.js";
+import { numberRow, sectionNote, textButton } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").UseCopy["action"]} Action
@@ -31,14 +31,14 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
   holder.append(input);
   label.append(Object.assign(document.createElement("span"), { textContent: "Folder" }), holder);
   const open = Object.assign(document.createElement("button"), { type: "submit", textContent: "Compare", title: "Read the poses of this copy, and show where both differ; nothing is changed" });
-  const answer = note();
+  const answer = sectionNote();
   answer.setAttribute("role", "status");
   form.append(label, open);
   input.dataset.takes = "folder";
   paths.completes(input);
 
-  const summary = note();
-  const here = note();
+  const summary = sectionNote();
+  const here = sectionNote();
   const tolerance = numberRow({
     label: "Tolerance",
     title: "Distance of a joint up to which two poses count as one",
@@ -206,10 +206,6 @@ function differenceRow({ frame, joint, distance_mm }, who, isHere, visit) {
   if (isHere) go.setAttribute("aria-current", "true");
   row.append(go);
   return row;
-}
-
-function note() {
-  return Object.assign(document.createElement("p"), { className: "section-note" });
 }
 
 /** @param {HTMLElement[]} parts */

@@ -1,6 +1,6 @@
 /** Find people: one button from a new recording to a tracked one, its progress, and what was found. */
 
-import { textButton } from "./rows.js";
+import { sectionNote, textButton } from "./rows.js";
 
 /** Number of the latest sentences that are shown. */
 const SHOWN = 8;
@@ -14,14 +14,18 @@ export function findSection({ store, send }) {
   const start = textButton("Find people", "Find everybody whom nobody has placed, acquire their sizes and track them; one step to undo", () =>
     find("start"),
   );
-  start.className = "is-primary";
-  const stop = textButton("Stop", "Stop; what was found and tracked stays", () => find("stop"));
+  const network = (/** @type {"detect_track" | "stop"} */ action) => send({ type: "observations", action, name: "" });
+  const detect = textButton("Detect and track", "Let a network find the people in the pictures, then track them by its key points and the contours", () => {
+    isDetecting = true;
+    network("detect_track");
+  });
+  const offer = sectionNote("No camera has a background or masks: let a network find the people, or find them by what moves.");
+  const stop = textButton("Stop", "Stop; what was found and tracked stays", () => (store.facts.finding?.running ? find("stop") : network("stop")));
   const progress = document.createElement("progress");
   const work = document.createElement("div");
   work.className = "acquisition-work";
   work.append(progress, stop);
-  const status = document.createElement("p");
-  status.className = "section-note";
+  const status = sectionNote();
   status.setAttribute("role", "status");
   const notes = document.createElement("ul");
   notes.className = "find-notes";
@@ -29,18 +33,26 @@ export function findSection({ store, send }) {
   details.append(Object.assign(document.createElement("summary"), { textContent: "Details", title: "Each frame that was tried, and who was found" }), notes);
   const body = document.createElement("div");
   body.className = "acquisition";
-  body.append(start, work, status, details);
+  body.append(offer, detect, start, work, status, details);
 
+  /** Whether the last work that was begun here is that of a network. */
+  let isDetecting = false;
   let wasRunning = false;
   const show = () => {
-    const { finding } = store.facts;
-    const running = finding?.running ?? false;
-    start.hidden = running;
+    const { finding, observations, session } = store.facts;
+    if (finding?.running) isDetecting = false;
+    const now = isDetecting ? observations : finding;
+    const running = now?.running ?? false;
+    const hasOutlines = session?.has_outlines ?? true;
+    offer.hidden = running || hasOutlines;
+    start.hidden = detect.hidden = running;
+    start.classList.toggle("is-primary", hasOutlines);
+    detect.classList.toggle("is-primary", !hasOutlines);
     work.hidden = !running;
-    progress.value = finding?.share ?? 0;
-    status.textContent = !finding ? "" : running ? `${finding.stage} …` : finding.message;
+    progress.value = now?.share ?? 0;
+    status.textContent = !now ? "" : running ? `${now.stage} …` : now.message;
     status.hidden = !status.textContent;
-    status.classList.toggle("is-failed", finding?.failed ?? false);
+    status.classList.toggle("is-failed", now?.failed ?? false);
     details.hidden = !finding?.notes.length;
     if (running !== wasRunning) details.open = !running && !finding?.failed; // sentences on the people who were found
     wasRunning = running;
@@ -54,6 +66,6 @@ export function findSection({ store, send }) {
     title: "Find people",
     hint: "First poses, sizes and a track with nobody's help",
     body,
-    update: (changed) => changed.has("finding") && show(),
+    update: (changed) => (changed.has("finding") || changed.has("observations") || changed.has("session")) && show(),
   };
 }

@@ -56,8 +56,8 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
   ];
   const inspector = new Inspector(context.store, sections);
   const findPeople = () => {
-    inspector.reveal("find");
-    context.send({ type: "find_people", action: "start" });
+    inspector.reveal("find"); // which offers a network first where only what moves shows the people
+    if (context.store.facts.session?.has_outlines) context.send({ type: "find_people", action: "start" });
   };
   button("first-find", findPeople);
   button("show-reason", () => inspector.reveal("reason"));

@@ -4,7 +4,7 @@ import { download } from "../widgets/downloads.js";
 import { alt } from "../widgets/key_matching.js";
 import { capital, count, displayName, percent } from "../widgets/text.js";
 import { importForm } from "./import_form.js";
-import { textButton } from "./rows.js";
+import { sectionNote, textButton } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").ObservationsMessage} Observations
@@ -33,7 +33,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   };
 
   const list = Object.assign(document.createElement("ul"), { className: "observed-sets" });
-  const none = Object.assign(note(), { textContent: "Key points and joints of other programs: import them, see where they are wrong, and mend that." });
+  const none = sectionNote("Key points and joints of other programs: import them, see where they are wrong, and mend that.");
   const judge = textButton("Judge", "Track the people from these observations in the background, and say where the footage contradicts them", () => act("judge", current()));
   judge.className = "is-primary";
   const take = textButton("Take as poses", "Store them as poses that can be corrected; keyframes stay, and undo takes them back", () => act("take", current()));
@@ -52,7 +52,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   const stop = textButton("Stop", "Stop this work", () => (found()?.running ? act("stop") : send({ type: "find_people", action: "stop" })));
   const progress = document.createElement("progress");
   const work = group(progress, stop);
-  const status = note();
+  const status = sectionNote();
   status.setAttribute("role", "status");
   const verdict = document.createElement("div");
   const worst = Object.assign(document.createElement("ol"), { className: "observed-worst" });
@@ -133,7 +133,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
         const row = document.createElement("li");
         const what = set.problem || `${set.format}, ${set.is_in_space ? "joints" : "key points"} of ${set.people.join(", ")}, ${count(set.frames)} frames`;
         const text = document.createElement("span");
-        text.append(Object.assign(document.createElement("b"), { textContent: set.name }), Object.assign(note(), { textContent: what }));
+        text.append(Object.assign(document.createElement("b"), { textContent: set.name }), sectionNote(what));
         text.lastElementChild?.classList.toggle("is-failed", !!set.problem);
         const toggle = textButton("Show", `Draw the points of ${set.name} over the pictures (toggle)`, () => show(set.name));
         toggle.setAttribute("aria-pressed", String(set.name === shown));
@@ -259,11 +259,7 @@ function describe({ name, share_in_order, frames, sentences }, { people, judged,
   const who = people.length > 1 ? `${name} in ${judged}` : judged;
   const limbs = people.length > 1 ? "" : off ? `; ${count(off)} ${off === 1 ? "limb is" : "limbs are"} off` : "";
   const texts = [`${who}: ${percent(share_in_order)} of ${count(frames)} frames in order${limbs}.`, ...sentences.map((text) => `${capital(text)}.`)];
-  return texts.map((textContent) => Object.assign(note(), { textContent }));
-}
-
-function note() {
-  return Object.assign(document.createElement("p"), { className: "section-note" });
+  return texts.map(sectionNote);
 }
 
 /** @param {HTMLElement[]} parts */

@@ -230,3 +230,8 @@ function throttled(change) {
   send.isBusy = () => performance.now() < sentAt + 5 * SEND_MS;
   return send;
 }
+
+/** A paragraph of a section. */
+export function sectionNote(text = "") {
+  return Object.assign(document.createElement("p"), { className: "section-note", textContent: text });
+}

@@ -95,8 +95,8 @@
  * @typedef {{type: "find_people", action: "start" | "stop"}} FindPeople
  * @typedef {{type: "calibration_check", action: "start" | "stop" | "preview" | "leave" | "apply" | "track_again"}}
  *   CheckCalibration
- * @typedef {{type: "observations", action: "show" | "judge" | "take" | "track" | "track_contours" | "detect" | "stop" |
- *   "discard", name?: string}} UseObservations
+ * @typedef {{type: "observations", action: "show" | "judge" | "take" | "track" | "track_contours" | "detect" |
+ *   "detect_track" | "stop" | "discard", name?: string}} UseObservations
  * @typedef {{type: "provenance", person: number | null, annotators?: boolean}} WatchProvenance
  * @typedef {{type: "other_copy", action: "keep" | "take" | "mean" | "leave", person?: number, frame?: number}} UseCopy
  * @typedef {{type: "other_copy", action: "tolerance", tolerance_mm: number}} SetCopyTolerance
@@ -123,7 +123,7 @@
  *   number[]>, point_limbs: Record<string, Limb>}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people: PersonInfo[],
  *   doubtful_from: number, lost_from: number, start: string, role: "host" | "annotate" | "review" | "look", has_place:
- *   boolean}} SessionMessage
+ *   boolean, has_outlines: boolean}} SessionMessage
  * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job

@@ -136,6 +136,7 @@ class FakeEndpoint:
     """Answers pane sockets; one state for all of them."""
 
     n_people: int = 1
+    has_outlines: bool = True
     n_cameras: int = 4
     overlay_delay_s: float = 0.0
     """How long each overlay takes, to try what a slow program does."""
@@ -465,6 +466,7 @@ class FakeEndpoint:
         await socket.send_str(encoded({
             "type": "session", "name": self.name, "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start, "role": self.role,
+            "has_outlines": self.has_outlines,
             "has_place": self.role != "look" or bool(self.name_asked),
         }))  # fmt: skip
         for message in (self.state, self.settings, self.view_3d, self.body_sizes, self.presence):

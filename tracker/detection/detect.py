@@ -113,6 +113,19 @@ def _begun(session: Session, plan: DetectionPlan) -> ObservationSet | None:
     return stored
 
 
+def complete_detection(session: Session, detector: str, frames: range) -> str | None:
+    """Return the name of the stored observations by a detector on these frames; None if there are none.
+
+    Args:
+        session: the session.
+        detector: see `DetectionPlan`.
+        frames: see `DetectionPlan`.
+    """
+    options = {"detector": detector, "frames": _text(frames), "detected": _text(frames)}
+    stored = (load_observations(session, name) for name in list_observations(session))
+    return next((s.name for s in stored if s.format == FORMAT and dict(s.options) == options), None)
+
+
 def open_name(session: Session, name: str, detector: str, frames: range) -> str:
     """Return a name for a detection: one that is free, or that of one of the same plan that was stopped.
 

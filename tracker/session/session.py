@@ -84,6 +84,11 @@ class Session:
         return tuple(c.camera.name for c in self.cameras)
 
     @property
+    def has_outlines(self) -> bool:
+        """Whether some camera has a background or masks; else only what moves tells people from the scene."""
+        return any(c.background or c.masks for c in self.cameras)
+
+    @property
     def annotations_path(self) -> Path:
         """Path of the database of the session's poses."""
         return self.folder / ANNOTATIONS_FILE

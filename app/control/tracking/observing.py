@@ -14,7 +14,8 @@ from app.control.tracking.finding import FindingPeople
 from app.remedies import page_text
 from app.state.observations import ObservedSet
 from tracker.compute.progress import Report
-from tracker.detection.detect import DetectionPlan, detect_people, open_name
+from tracker.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
+from tracker.detection.detector import Detector
 from tracker.detection.detectors import load_detector
 from tracker.detection.model_files import default_folder
 from tracker.errors import TrackerError
@@ -100,15 +101,19 @@ class Observing:
             self._finding.start(of=name, as_evidence=as_evidence)
             self._set(shown=shown, plan=None, message="", failed=False)
 
-    def detect(self) -> None:
+    def detect(self, then_track: bool = False) -> None:
         """Begin to detect people by a network on all frames; what is found is shown and stored.
+
+        Args:
+            then_track: whether who has no pose is found by their key points afterwards, and everybody tracked; then
+                what was detected before is used. See `track`.
 
         Raises:
             TrackerError: other work on observations is under way.
         """
         with self._session_state.lock:
             self._refuse_if_busy()
-            self._start(_DETECTED, self._detect)
+            self._start(_DETECTED, self._detect_and_track if then_track else self._detect)
 
     def stop(self) -> None:
         """Stop the work; only people who were detected by then are stored. The caller must not hold the lock."""
@@ -187,8 +192,22 @@ class Observing:
             )
 
     def _detect(self, name: str) -> str:
-        session, recording = self._session_state.session, self._session_state.frames.observer.recording
         detector, text = load_detector("blazepose", None, default_folder())
+        return self._detected(name, detector, text)[0]
+
+    def _detect_and_track(self, name: str) -> str:
+        session = self._session_state.session
+        detector, text = load_detector("blazepose", None, default_folder())
+        message, of = "", complete_detection(session, text, range(session.n_frames))
+        if of is None:
+            message, of = self._detected(name, detector, text)
+        if of is not None:
+            self._finding.start(of=of, as_evidence=True)
+        return message
+
+    def _detected(self, name: str, detector: Detector, text: str) -> tuple[str, str | None]:
+        """Detect people; return a sentence on it, and the name of the observations, None if it was stopped."""
+        session, recording = self._session_state.session, self._session_state.frames.observer.recording
         frames = range(session.n_frames)
         plan = DetectionPlan(open_name(session, name, text, frames), text, frames)
 
@@ -203,7 +222,8 @@ class Observing:
         self._set(shown=load_observations(session, plan.name))
         ended = "" if found.is_complete else "Stopped; what was found is kept, and Detect people goes on. "
         n = found.frames.stop - found.frames.start
-        return ended + f"Detected people on {n} frames. {' '.join(f'Note: {note}.' for note in found.notes)}"
+        message = ended + f"Detected people on {n} frames. {' '.join(f'Note: {note}.' for note in found.notes)}"
+        return message.strip(), plan.name if found.is_complete else None
 
     def _work(self, name: str, work: Callable[[str], str]) -> None:
         try:

@@ -110,6 +110,16 @@ def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller,
     assert (whole.name, whole.n_frames) == ("detected", controller.session.n_frames)
 
 
+def test_people_are_detected_once_and_then_tracked(controller, detector, monkeypatch):
+    begun = []
+    monkeypatch.setattr(controller.observing._finding, "start", lambda **plan: begun.append(plan))
+    for _ in range(2):
+        controller.observing.detect(then_track=True)
+        assert not at_rest(controller).failed
+    assert begun == 2 * [{"of": "detected", "as_evidence": True}]
+    assert [s.name for s in controller.state.observations.sets] == ["detected"]
+
+
 def test_networks_that_are_missing_are_named_where_they_are_fetched(controller, monkeypatch, tmp_path):
     pytest.importorskip("ai_edge_litert")
     monkeypatch.setattr(observing, "default_folder", lambda: tmp_path)
