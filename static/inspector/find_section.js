@@ -9,7 +9,7 @@ const SHOWN = 8;
  * @param {import("../model/index.js").Context} context
  * @returns {import("./inspector.js").Section}
  */
-export function findSection({ store, send }) {
+export function findSection({ store, send, layers }) {
   const find = (/** @type {"start" | "stop"} */ action) => send({ type: "find_people", action });
   const start = textButton("Find people", "Find everybody whom nobody has placed, acquire their sizes and track them; one step to undo", () =>
     find("start"),
@@ -17,6 +17,7 @@ export function findSection({ store, send }) {
   const network = (/** @type {"detect_track" | "stop"} */ action) => send({ type: "observations", action, name: "" });
   const detect = textButton("Detect and track", "Let a network find the people in the pictures, then track them by its key points and the contours", () => {
     isDetecting = true;
+    layers.toggle(["imported"], true);
     network("detect_track");
   });
   const offer = sectionNote("No camera has a background or masks: let a network find the people, or find them by what moves.");

@@ -29,7 +29,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   const current = () => found()?.shown || found()?.sets.find(({ problem }) => !problem)?.name || "";
   const show = (/** @type {string} */ name) => {
     act("show", found()?.shown === name ? "" : name);
-    if (!store.facts.layers.shown.imported) layers.toggle(["imported"], true);
+    layers.toggle(["imported"], true);
   };
 
   const list = Object.assign(document.createElement("ul"), { className: "observed-sets" });
@@ -38,9 +38,10 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   judge.className = "is-primary";
   const take = textButton("Take as poses", "Store them as poses that can be corrected; keyframes stay, and undo takes them back", () => act("take", current()));
   const report = textButton("Write report", "Save the judgement as one HTML file with pictures of the worst frames", () => void writeReport());
-  const detect = textButton("Detect people", "Let a network find the key points of people on all frames, where no background shows them; docs/observations.md says how to get it", () =>
-    act("detect"),
-  );
+  const detect = textButton("Detect people", "Let a network find the key points of people on all frames, where no background shows them; docs/observations.md says how to get it", () => {
+    layers.toggle(["imported"], true);
+    act("detect");
+  });
   const detecting = group(detect);
   const buttons = group(judge, take, report);
   const evidence = document.createElement("select");

@@ -1,8 +1,9 @@
 """Detect the people of a session: the points of all figures in all views, stored as observations."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count
+from typing import TypeAlias
 
 import numpy as np
 
@@ -21,6 +22,10 @@ from tracker.session.session import Session
 
 FORMAT = "detection"
 """Format of observations that were detected here: they have no files."""
+
+
+Show: TypeAlias = Callable[[int, Callable[[], ObservationSet]], None]
+"""Is given each frame on which people were sought, and what returns the people of that frame as observations."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +55,9 @@ class Detected:
 
 
 def detect_people(
-    session: Session, recording: Recording, detector: Detector, plan: DetectionPlan, report: Report = unreported
-) -> Detected:
+    session: Session, recording: Recording, detector: Detector, plan: DetectionPlan, report: Report = unreported,
+    show: Show = lambda frame, found: None,
+) -> Detected:  # fmt: skip
     """Detect people on the frames of a plan, and store what was found; also if it is stopped.
 
     A detection that was stopped goes on where it ended.
@@ -62,6 +68,7 @@ def detect_people(
         detector: sees a picture.
         plan: what to detect.
         report: shows progress. A KeyboardInterrupt that it raises stops the work.
+        show: shows what is found.
 
     Raises:
         TrackerError: the name is taken by other observations, the footage cannot be read, or nobody is seen.
@@ -79,6 +86,8 @@ def detect_people(
         for i, k in enumerate(todo):
             report("detecting people", i / len(todo))
             found[k] = people.see(k, recording.read(k))
+            here, only = {k: found[k]}, range(k, k + 1)
+            show(k, lambda here=here, only=only: _observations(session, plan, convention, here, only, ()))
     except KeyboardInterrupt:
         pass
     if not any(own for views in found.values() for own in views):

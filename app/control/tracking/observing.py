@@ -4,6 +4,8 @@ import logging
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -40,6 +42,8 @@ _DETECTED = "detected"
 """Name of what is detected here."""
 _STEPS = 100
 """Progress is shown in so many steps."""
+_SHOWN_EVERY_S = 1.0
+"""Time between two frames that are shown while people are detected on them, seconds."""
 
 
 class _StoppedError(Exception):
@@ -217,7 +221,22 @@ class Observing:
             except _StoppedError:
                 raise KeyboardInterrupt from None
 
-        found = detect_people(session, recording, detector, plan, report)
+        shown, at_s = self._session_state.state.frame, -inf
+
+        def show(frame: int, seen: Callable[[], ObservationSet]) -> None:
+            nonlocal shown, at_s
+            with self._session_state.lock:
+                state = self._session_state.state
+                if state.frame != shown or state.drag is not None or monotonic() - at_s < _SHOWN_EVERY_S:
+                    return
+                shown, at_s = frame, monotonic()
+                self._session_state.show_frame(frame, observations=replace(state.observations, shown=seen()))
+
+        try:
+            found = detect_people(session, recording, detector, plan, report, show)
+        except TrackerError:
+            self._set(shown=None)  # nothing of it was stored
+            raise
         self._list()
         self._set(shown=load_observations(session, plan.name))
         ended = "" if found.is_complete else "Stopped; what was found is kept, and Detect people goes on. "

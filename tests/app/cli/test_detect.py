@@ -75,7 +75,7 @@ def test_people_are_detected_and_tracked_by_one_command(run, session, plans):
 
 
 def test_a_network_is_offered_where_only_what_moves_shows_the_people(run, session, plans):
-    status, _, errors = run("track", session, "--init", "auto")
+    _, _, errors = run("track", session, "--init", "auto")
     assert "no camera has a background or masks" in errors
     assert "--detect" in errors
     (plan,) = plans

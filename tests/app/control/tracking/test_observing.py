@@ -110,6 +110,26 @@ def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller,
     assert (whole.name, whole.n_frames) == ("detected", controller.session.n_frames)
 
 
+def test_what_is_detected_is_shown_as_it_comes_while_the_user_watches(controller, detector, monkeypatch):
+    monkeypatch.setattr(observing, "_SHOWN_EVERY_S", 0.0)
+    frames, n_drawn = [], []
+
+    def look(picture, square, look=detector.look):
+        if controller.state.frame != (frames or [0])[-1]:
+            frames.append(controller.state.frame)
+            n_drawn.append(len(kinds(controller, "imported")))
+        if len(frames) == 5:  # the user goes elsewhere, and stays there
+            controller.navigation.seek(0)
+        return look(picture, square)
+
+    detector.look = look
+    controller.observing.detect()
+    assert not at_rest(controller).failed
+    assert frames[:5] == [1, 2, 3, 4, 5]
+    assert n_drawn[:5] == 5 * [4]
+    assert controller.state.frame == 0
+
+
 def test_people_are_detected_once_and_then_tracked(controller, detector, monkeypatch):
     begun = []
     monkeypatch.setattr(controller.observing._finding, "start", lambda **plan: begun.append(plan))
