@@ -145,12 +145,10 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
 
 
 def _with_detection(arguments: TrackArguments, session: "Session") -> TrackArguments:
-    """Return arguments with the key points that are detected first, or say that they would help."""
-    from app.cli.observations.detect import detect_first
-
+    """Return arguments with key points that are detected first if they ask for it; else say where that would help."""
     reporter = Reporter(silent=arguments.json)
     if arguments.detect:
-        of = detect_first(session, arguments.of, parse_frames(arguments.frames, session), reporter)
+        of = _detected(arguments.of, session, parse_frames(arguments.frames, session), reporter)
         return replace(arguments, of=of, evidence="both")
     if not session.has_outlines:
         reporter.say(
@@ -158,6 +156,33 @@ def _with_detection(arguments: TrackArguments, session: "Session") -> TrackArgum
             "by a network first"
         )
     return arguments
+
+
+def _detected(name: str | None, session: "Session", frames: range, reporter: Reporter) -> str:
+    """Detect people unless that was done; return the name of the observations."""
+    from tracker.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
+    from tracker.detection.detectors import load_detector
+    from tracker.detection.model_files import default_folder
+    from tracker.footage.recording import Recording
+    from tracker.session.lock import SessionLock
+
+    detector, text = load_detector("blazepose", None, default_folder())
+    known = complete_detection(session, text, frames, name)
+    if known is not None:
+        return known
+    plan = DetectionPlan(name or open_name(session, "detected", text, frames), text, frames)
+    with (
+        SessionLock(session.folder),
+        Recording(session.cameras) as recording,
+        reporter.over(len(frames), "detecting people") as advance,
+    ):
+        found = detect_people(session, recording, detector, plan, lambda *_: advance())
+    for note in found.notes:
+        reporter.say(f"note: {note}")
+    if not found.is_complete:
+        print("stopped before tracking; what was detected is kept; run it again to go on", file=sys.stderr)
+        sys.exit(130)
+    return plan.name
 
 
 def _track_keypoints(at: Target, frames: Sequence[int], arguments: TrackArguments) -> dict[str, Any]:

@@ -47,7 +47,7 @@ def true_motion(session):
     out = np.full((session.n_frames, len(BODY_25.points), 3), np.nan)
     for point, marker in BODY_25.markers.items():
         if point in truth.names and marker in BODY_25.points:  # others are means of two
-            out[:, BODY_25.points.index(marker)] = truth.points[:, truth.names.index(point)]
+            out[:, BODY_25.points.index(marker)] = truth.points[: session.n_frames, truth.names.index(point)]
     return out
 
 

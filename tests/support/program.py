@@ -24,6 +24,7 @@ class Program:
         hears_errors: bool = False,
         has_token: bool = False,
         log: Path | None = None,
+        main: tuple[str, ...] = ("-m", "app"),
     ) -> None:
         """Prepare it.
 
@@ -33,10 +34,11 @@ class Program:
             hears_errors: keep its standard error in `errors` when it has ended.
             has_token: require the token.
             log: file that its standard error is written to.
+            main: how Python runs the command line.
         """
         self._hears_errors, self._log = hears_errors, log
         self.errors = ""
-        self._words = [sys.executable, "-m", "app", "open", *([str(session)] if session else []), "--no-browser"]
+        self._words = [sys.executable, *main, "open", *([str(session)] if session else []), "--no-browser"]
         self._words += options
         if not has_token:
             self._words.append("--no-token")
@@ -116,9 +118,9 @@ READY = "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== n
 
 
 @contextlib.asynccontextmanager
-async def started(session: Path, *options: str, has_token: bool = False) -> AsyncGenerator[Program, None]:
-    """A running program, killed in the end."""
-    program = Program(session, *options, has_token=has_token)
+async def started(session: Path, *options: str, **how) -> AsyncGenerator[Program, None]:
+    """A running program, killed in the end; `how` as `Program` takes it."""
+    program = Program(session, *options, **how)
     try:
         await program.start()
         yield program

@@ -122,16 +122,17 @@ def _begun(session: Session, plan: DetectionPlan) -> ObservationSet | None:
     return stored
 
 
-def complete_detection(session: Session, detector: str, frames: range) -> str | None:
-    """Return the name of the stored observations by a detector on these frames; None if there are none.
+def complete_detection(session: Session, detector: str, frames: range, name: str | None = None) -> str | None:
+    """Return the name of stored observations by a detector on these frames; None if there are none.
 
     Args:
         session: the session.
         detector: see `DetectionPlan`.
         frames: see `DetectionPlan`.
+        name: that they must have; None for any.
     """
     options = {"detector": detector, "frames": _text(frames), "detected": _text(frames)}
-    stored = (load_observations(session, name) for name in list_observations(session))
+    stored = (load_observations(session, own) for own in list_observations(session) if name in (None, own))
     return next((s.name for s in stored if s.format == FORMAT and dict(s.options) == options), None)
 
 

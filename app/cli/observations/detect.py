@@ -3,7 +3,7 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
 
@@ -12,11 +12,6 @@ from app.cli.target import parse_frames
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
-
-if TYPE_CHECKING:
-    from tracker.detection.detect import Detected, DetectionPlan
-    from tracker.detection.detector import Detector
-    from tracker.session.session import Session
 
 
 @dataclass(frozen=True)
@@ -68,64 +63,27 @@ def command(arguments: Annotated[DetectArguments, tyro.conf.arg(name="")]) -> No
 
 
 def _detect(arguments: DetectArguments, path: Path, folder: Path, reporter: Reporter) -> dict[str, Any]:
-    from tracker.detection.detect import DetectionPlan
+    from tracker.detection.detect import DetectionPlan, detect_people
     from tracker.detection.detectors import load_detector
+    from tracker.footage.recording import Recording
+    from tracker.session.lock import SessionLock
     from tracker.session.session import load_session
 
     session = load_session(path)
     frames = parse_frames(arguments.frames, session)
     detector, text = load_detector(arguments.detector, arguments.model, folder)
-    found = _run(session, detector, DetectionPlan(arguments.name, text, frames), reporter)
+    with (
+        SessionLock(session.folder),
+        Recording(session.cameras) as recording,
+        reporter.over(len(frames), "detecting people") as advance,
+    ):
+        plan = DetectionPlan(arguments.name, text, frames)
+        found = detect_people(session, recording, detector, plan, lambda *_: advance())
     pictures = {c.camera.name: n for c, n in zip(session.cameras, found.n_figures, strict=True)}
     return {
         "name": arguments.name, "detector": text, "frames": [found.frames.start, found.frames.stop],
         "complete": found.is_complete, "pictures": pictures, "notes": list(found.notes),
     }  # fmt: skip
-
-
-def _run(session: "Session", detector: "Detector", plan: "DetectionPlan", reporter: Reporter) -> "Detected":
-    from tracker.detection.detect import detect_people
-    from tracker.footage.recording import Recording
-    from tracker.session.lock import SessionLock
-
-    with (
-        SessionLock(session.folder),
-        Recording(session.cameras) as recording,
-        reporter.over(len(plan.frames), "detecting people") as advance,
-    ):
-        return detect_people(session, recording, detector, plan, lambda *_: advance())
-
-
-def detect_first(session: "Session", name: str | None, frames: range, reporter: Reporter) -> str:
-    """Detect the people of a session before they are tracked, unless that was done; return the observations' name.
-
-    Ctrl+C ends the program and keeps what was found.
-
-    Args:
-        session: the session.
-        name: of the observations; None for a name that is free.
-        frames: to detect people on.
-        reporter: shows how far it is.
-
-    Raises:
-        TrackerError: the networks or their package are missing, the name is taken, or nobody is seen.
-    """
-    from tracker.detection.detect import DetectionPlan, complete_detection, open_name
-    from tracker.detection.detectors import load_detector
-    from tracker.detection.model_files import default_folder
-
-    detector, text = load_detector("blazepose", None, default_folder())
-    known = complete_detection(session, text, frames)
-    if known is not None and name in (None, known):
-        return known
-    plan = DetectionPlan(name or open_name(session, "detected", text, frames), text, frames)
-    found = _run(session, detector, plan, reporter)
-    for note in found.notes:
-        reporter.say(f"note: {note}")
-    if not found.is_complete:
-        print("stopped before tracking; what was detected is kept; run it again to go on", file=sys.stderr)
-        sys.exit(130)
-    return plan.name
 
 
 def _format(found: dict[str, Any]) -> str:
