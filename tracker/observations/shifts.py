@@ -24,9 +24,10 @@ def view_shifts(
 ) -> dict[str, int]:
     """Return by how many frames the key points of views are late against most others, up to two seconds.
 
-    A shift is returned only if at least half of the views agree, and its view fits them better than without it, and
-    than at twice the shift, in each stretch of the recording. Each of them fits best at that shift too, within a frame.
-    If one view is not clear, none is returned. Views that are all shifted together agree, so that nothing shows it.
+    A shift is returned only if its view fits those that agree better than without it, and than at twice the shift, in
+    each stretch of the recording. Each of them fits best at that shift too, within a frame. If fewer than half of the
+    views agree, this must hold against all of them, and shifts are relative to one view. If one view is not clear, none
+    is returned. Views that are all shifted together agree, so that nothing shows it.
 
     Args:
         points: key points.
@@ -43,7 +44,10 @@ def view_shifts(
     late = _offsets(costs, known) - known
     late -= _most_common(late)
     agreeing, moved = np.flatnonzero(late == 0).tolist(), np.flatnonzero(late).tolist()
-    if 2 * len(agreeing) < len(late) or not all(_is_clear(v, agreeing, known + late, known, costs) for v in moved):
+    if 2 * len(agreeing) < len(late):
+        agreeing = [*range(len(late))]
+    others = {v: [u for u in agreeing if u != v] for v in moved}
+    if not all(_is_clear(v, others[v], known + late, known, costs) for v in moved):
         return {}
     return {points.cameras[v]: int(late[v]) for v in moved}
 

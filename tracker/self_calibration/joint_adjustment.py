@@ -13,7 +13,7 @@ from tracker.calibration.reprojection import Observations, Prior, Rig, RigFit, c
 from tracker.errors import CalibrationError
 from tracker.fitting.bundle import ArrowEquations
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import ROUNDING_PX2, Camera
 
 
 class AlikeLenses(PointProblem):
@@ -72,14 +72,14 @@ class AdjustedJoints:
     observed: Observations
     """Observations that took part; their groups are numbers of rows of `points_world`."""
     fit: RigFit
-    """Its covariance heeds that errors agree."""
+    """Its covariance heeds that errors agree, and that of rounding at least."""
     share: float
     """By how much errors of a joint in a camera agree from frame to frame, at least 1."""
 
     @property
     def sigma_px(self) -> float:
         """Standard deviation of a joint along each axis of a picture, px; at least that of rounding to whole pixels."""
-        return max(float(np.median(self.fit.sigmas_px)), 12**-0.5)
+        return max(float(np.median(self.fit.sigmas_px)), ROUNDING_PX2**0.5)
 
     @property
     def focal_sigmas(self) -> Array:
@@ -163,7 +163,9 @@ def _fitted(problem: PointProblem, rig: Rig, joints: IntArray) -> tuple[RigFit, 
     if share > 1 and any(0 < s < np.inf for s in np.concatenate(problem.prior.sigmas)):
         weaker = Prior(problem.prior.cameras, tuple(s / np.sqrt(share) for s in problem.prior.sigmas))
         fit = fit_rig(problem.with_prior(weaker), fit.rig)
-    return fit._replace(covariance=share * fit.covariance), share
+    errors = np.nan_to_num(fit.errors_px) * fit.weights[:, None]
+    exact = max(1.0, ROUNDING_PX2 / max(float(np.mean(errors**2)), np.finfo(float).tiny))
+    return fit._replace(covariance=share * exact * fit.covariance), share
 
 
 def _agreement(fit: RigFit, seen: Observations, joints: IntArray) -> float:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tracker.boards.board_calibration import FLAT_SHARE
 from tracker.boards.camera_graph import MIN_SHARED
 from tracker.boards.rig_fit import HELD_OUT_EVERY
 from tracker.boards.view_choice import MAX_FRAMES, MAX_LENS_VIEWS
@@ -15,6 +16,7 @@ from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservationSet
+from tracker.observations.shifts import view_shifts
 from tracker.self_calibration.identification import Statures, first_cameras
 from tracker.self_calibration.joint_adjustment import UnknownLenses
 from tracker.self_calibration.mirrored_views import require_unmirrored
@@ -46,6 +48,7 @@ def calibrate_by_person(
     statures_m: Statures = None,
     has_lenses: bool = False,
     report: Report = unreported,
+    fps: float = 25.0,
 ) -> PersonCalibration:
     """Calibrate cameras by key points of people who move before them.
 
@@ -55,12 +58,13 @@ def calibrate_by_person(
         statures_m: of the people by name, or of each, metres; None for those of typical adults.
         has_lenses: whether the lenses are known.
         report: receives the progress.
+        fps: frames per second; views may lag by up to two seconds.
 
     Raises:
         CalibrationError: the key points do not determine the cameras; the message says what is missing.
     """
     try:
-        return _calibrated(observations, cameras, statures_m, has_lenses, report)
+        return _calibrated(observations, cameras, statures_m, has_lenses, report, fps)
     except np.linalg.LinAlgError as error:
         raise CalibrationError(
             f"expected key points that determine the cameras, found none that do; {advice(len(cameras))}"
@@ -68,7 +72,12 @@ def calibrate_by_person(
 
 
 def _calibrated(
-    observations: ObservationSet, cameras: Sequence[Camera], statures_m: Statures, has_lenses: bool, report: Report
+    observations: ObservationSet,
+    cameras: Sequence[Camera],
+    statures_m: Statures,
+    has_lenses: bool,
+    report: Report,
+    fps: float,
 ) -> PersonCalibration:
     chaining, adjusting, checking = stages(report, "chain of cameras", "all cameras", "frames held out")
     cameras = [replace(c, T_world_camera=np.eye(4)) for c in cameras]
@@ -87,7 +96,9 @@ def _calibrated(
     joints = seen.by_joint(adjusted.points_world)
     scale = metres_per_unit(joints, seen.names, statures)
     volume = volume_error(adjusted, scale)
+    _require_in_step(observations, scaled_by(adjusted.cameras, scale), fps)
     require_determined(volume, adjusted, seen, scale)
+    _require_motion(scale * joints, float(np.nanmean(statures)))
     require_unmirrored(adjusted.cameras, adjusted.observed)
     require_one_solution(Solution(adjusted, gauge), first.rivals, seen, lenses)
     by_person = scale * joints.reshape(-1, len(seen.names), 3)
@@ -125,6 +136,32 @@ def _spread_over(frames: IntArray, is_alone: Mask) -> IntArray:
     n = min(len(alone), max(MAX_LENS_VIEWS, MAX_FRAMES * len(alone) // len(frames)))
     some = (alone[spread_indices(len(alone), n)], crowded[spread_indices(len(crowded), MAX_FRAMES - n)])
     return np.sort(np.concatenate(some))
+
+
+def _require_in_step(observations: ObservationSet, cameras: Sequence[Camera], fps: float) -> None:
+    """Refuse views that lag: cameras hide a lag, as they fit it at wrong places."""
+    assert observations.points is not None
+    if late := view_shifts(observations.points, cameras, fps):
+        found = ", ".join(
+            f"camera '{c}' with those of {abs(n)} {'later' if n > 0 else 'earlier'}" for c, n in late.items()
+        )
+        offsets = ", ".join(f"{n} for '{c}'" for c, n in late.items())
+        raise CalibrationError(
+            f"expected key points of all cameras to fit on the same frame, found that they fit best with other frames: "
+            f"{found}; start the videos at the same instant, or give these offsets: {offsets}"
+        )
+
+
+def _require_motion(joints: Array, stature_m: float) -> None:
+    """Refuse people who stand still, by their joints, (F, n, 3), metres: errors of a detector then stay the same."""
+    seen = joints[:, np.isfinite(joints).all(axis=2).any(axis=0)]
+    apart = np.linalg.norm(seen - np.nanmedian(seen, axis=0), axis=2)
+    moved_m = float(np.nanmedian(apart, axis=0).max())
+    if moved_m < FLAT_SHARE * stature_m:
+        raise CalibrationError(
+            f"expected a person in many places and postures, found that half of the time each joint is within "
+            f"{100 * moved_m:.1g} cm of one place; let the person walk through the volume, turn, and move arms and legs"
+        )
 
 
 def _people_notes(scales: Array) -> tuple[str, ...]:

@@ -89,7 +89,8 @@ def _calibrate(filmed: FilmedPerson, report: Report) -> PersonCalibration:
     plan = None if filmed.keypoints is None else _plan(session, filmed.keypoints, filmed.skeleton)
     if plan is not None and not isinstance(plan, MaskPlan):
         found = _keypoints(plan, filmed.keypoints, blanks)
-        result = calibrate_by_person(found.observations, cameras, filmed.stature_m, has_lenses, report)
+        fps = max(session.fps, 25.0)  # folders of images state none
+        result = calibrate_by_person(found.observations, cameras, filmed.stature_m, has_lenses, report, fps)
         if doubts := examine_keypoints(found.observations, result.world.cameras, session.fps):
             raise doubts[0]
         return result

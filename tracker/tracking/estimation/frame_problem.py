@@ -24,6 +24,7 @@ from tracker.fitting.hypothesis import SETTLED_M, Hypothesis, distance_m
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.fitting.keypoints import keypoint_blocks
 from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import ROUNDING_PX2
 from tracker.motion.prediction import PredictSettings
 from tracker.motion.shortest_step import shortest_step
 from tracker.tracking.confidence import PoseQuality
@@ -36,9 +37,6 @@ from tracker.tracking.estimation.settings import (
     trust,
 )
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
-
-_ROUNDING_PX2 = 1 / 12
-"""Variance of rounding to whole pixels, px^2."""
 
 Bodies = tuple[PosedBody, ...]
 """All people in their poses."""
@@ -272,7 +270,7 @@ def _variance_px2(costs: PartCosts) -> float:
     if length_px == 0:
         return 1.0
     mean_px = np.nansum(costs.forward_px * costs.length_px) / length_px
-    return float(max(np.pi / 2 * mean_px**2, _ROUNDING_PX2))
+    return float(max(np.pi / 2 * mean_px**2, ROUNDING_PX2))
 
 
 def with_body(bodies: Bodies, person: int, body: PosedBody) -> Bodies:
