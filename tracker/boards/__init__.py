@@ -5,6 +5,7 @@ Imports `calibration`, `footage` and `formats`; knows no session. Callers use `b
 """
 
 __all__ = [
+    "board_calibration",
     "board_description",
     "camera_graph",
     "expected_error",
