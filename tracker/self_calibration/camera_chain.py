@@ -96,17 +96,28 @@ def _resected(seen: SeenJoints, index: int, lens: Camera, joints: Array, sigma_p
             f"{n_frames}; film the person where they see it together"
         )
     rays = lens.rays(seen.px[:, index][at])
-    slopes, threshold = rays[:, :2] / rays[:, 2:], OUTLIER_SIGMAS * sigma_px / float(lens.K[0, 0])
-    ok, rotation, shift = False, np.zeros(3), np.zeros(3)
-    with suppress(cv2.error):  # joints of one place, all others apart from their rays
-        ok, rotation, shift, _ = cv2.solvePnPRansac(
-            joints[at], slopes, np.eye(3), None, reprojectionError=threshold, flags=cv2.SOLVEPNP_SQPNP
-        )
-    if not ok:
+    T_camera_world = pose_before_joints(joints[at], rays[:, :2] / rays[:, 2:], sigma_px / float(lens.K[0, 0]))
+    if T_camera_world is None:
         raise CalibrationError(
             f"expected camera '{lens.name}' to agree with the others on where the person is, found that it does not; "
             "check that its videos show the same instants"
         )
-    w, t = (np.asarray(v, dtype=np.float64).ravel() for v in (rotation, shift))
-    T_camera_world = rigid.transform(rigid.so3_exp(w), t)
     return replace(lens, T_world_camera=rigid.inverse(T_camera_world))
+
+
+def pose_before_joints(joints: Array, slopes: Array, sigma: float) -> Array | None:
+    """Return the pose of a camera, `T_camera_world`, by most of the joints that it sees; None where most disagree.
+
+    Args:
+        joints: (n, 3), metres; some of them are grossly wrong.
+        slopes: of their rays in the camera, (n, 2).
+        sigma: standard deviation of a slope.
+    """
+    threshold = OUTLIER_SIGMAS * sigma
+    ok, rotation, shift = False, np.zeros(3), np.zeros(3)
+    with suppress(cv2.error):  # joints of one place, all others apart from their rays
+        ok, rotation, shift, _ = cv2.solvePnPRansac(
+            joints, slopes, np.eye(3), None, reprojectionError=threshold, flags=cv2.SOLVEPNP_SQPNP
+        )
+    w, t = (np.asarray(v, dtype=np.float64).ravel() for v in (rotation, shift))
+    return rigid.transform(rigid.so3_exp(w), t) if ok else None

@@ -99,7 +99,7 @@ def _calibrated(
     _require_in_step(observations, scaled_by(adjusted.cameras, scale), fps)
     require_determined(volume, adjusted, seen, scale)
     _require_motion(scale * joints, float(np.nanmean(statures)))
-    require_unmirrored(adjusted.cameras, adjusted.observed)
+    require_unmirrored(adjusted.cameras, adjusted.observed, adjusted.sigma_px)
     require_one_solution(Solution(adjusted, gauge), first.rivals, seen, lenses)
     by_person = scale * joints.reshape(-1, len(seen.names), 3)
     world = upright(scaled_by(adjusted.cameras, scale), by_person, seen.names, float(np.nanmean(statures)))

@@ -3,17 +3,18 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from tracker.calibration.point_adjustment import triangulate_all
 from tracker.calibration.reprojection import Observations
 from tracker.errors import CalibrationError
+from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
+from tracker.self_calibration.camera_chain import pose_before_joints
 
 
-def require_unmirrored(cameras: Sequence[Camera], observed: Observations) -> None:
+def require_unmirrored(cameras: Sequence[Camera], observed: Observations, sigma_px: float) -> None:
     """Check that no view agrees better with the joints of the other cameras if it is mirrored.
 
     A person seen from the front looks much like one who is seen from behind in a mirrored picture. Left as it is, such
@@ -21,7 +22,8 @@ def require_unmirrored(cameras: Sequence[Camera], observed: Observations) -> Non
 
     Args:
         cameras: the calibrated cameras; of two, the other one alone finds no joints.
-        observed: places of joints.
+        observed: places of joints; some are grossly wrong.
+        sigma_px: standard deviation of the others.
 
     Raises:
         CalibrationError: there is one.
@@ -38,9 +40,9 @@ def require_unmirrored(cameras: Sequence[Camera], observed: Observations) -> Non
         own[own] = determined[observed.groups[own]]
         px, joints = observed.px[own], points[observed.groups[own]]
         turned = np.array([camera.width - 1, 0]) + px * np.array([-1, 1])
-        as_is, as_mirrored = (_misfit(camera, p, joints) for p in (px, turned))
-        # True views fit five times better as they are; mirrored ones spoil the joints of all, and gain a third.
-        if 1.25 * as_mirrored < as_is:
+        as_is, as_mirrored = (_misfit(camera, p, joints, sigma_px) for p in (px, turned))
+        # Mirrored views spoil the joints of all, and gain a fifth; true ones lose as much. From afar both fit to 4%.
+        if 1.1 * as_mirrored < as_is:
             mirrored.append(repr(camera.name))
     if mirrored:
         raise CalibrationError(
@@ -50,17 +52,14 @@ def require_unmirrored(cameras: Sequence[Camera], observed: Observations) -> Non
         )
 
 
-def _misfit(camera: Camera, px: Array, joints: Array) -> float:
-    """Return the median distance of joints from their rays, as slopes, at the best pose of a camera; NaN without."""
+def _misfit(camera: Camera, px: Array, joints: Array, sigma_px: float) -> float:
+    """Return the median distance of joints from their rays, as slopes, at the best pose of a camera; inf without."""
     rays = camera.rays(px) @ camera.T_world_camera[:3, :3]
     ahead = np.isfinite(rays).all(axis=1) & (rays[:, 2] > 0)
-    rays, joints = rays[ahead], np.ascontiguousarray(joints[ahead])
-    slopes = np.ascontiguousarray(rays[:, :2] / rays[:, 2:])
-    if len(slopes) < 6:
-        return np.nan
-    found, turn, shift = cv2.solvePnP(joints, slopes, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
-    if not found:
-        return np.nan
-    turn, shift = cv2.solvePnPRefineLM(joints, slopes, np.eye(3), None, turn, shift)
-    projected, _ = cv2.projectPoints(joints, turn, shift, np.eye(3), None)
-    return float(np.median(np.linalg.norm(projected[:, 0] - slopes, axis=1)))
+    rays, joints = rays[ahead], joints[ahead]
+    slopes = rays[:, :2] / rays[:, 2:]
+    T_camera_world = pose_before_joints(joints, slopes, sigma_px / float(camera.K[0, 0])) if len(joints) > 5 else None
+    if T_camera_world is None:
+        return np.inf
+    seen = rigid.apply(T_camera_world, joints)
+    return float(np.median(np.linalg.norm(seen[:, :2] / seen[:, 2:] - slopes, axis=1)))
