@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Generic, TypeVar
@@ -143,8 +144,36 @@ class Job(Generic[T]):
         return max(due + self._rest_s, time.monotonic() - self._rest_s)
 
 
+class _Waiting(Generic[T]):
+    """Values that wait for the thread of a worker, which does not keep the worker alive meanwhile."""
+
+    def __init__(self) -> None:
+        self._values: dict[object, T] = {}
+        self._condition = threading.Condition()
+        self._closed = False
+
+    def put(self, value: T, key: object) -> None:
+        with self._condition:
+            self._values[key] = value
+            self._condition.notify()
+
+    def take(self) -> tuple[T] | None:
+        """Return the value that waits for longest, after a while; None once it is closed."""
+        with self._condition:
+            self._condition.wait_for(lambda: self._values or self._closed)
+            return None if self._closed else (self._values.pop(next(iter(self._values))),)
+
+    def close(self) -> None:
+        with self._condition:
+            self._closed = True
+            self._condition.notify()
+
+
 class LatestWinsWorker(Generic[T]):
-    """Passes values to a slow consumer in its own thread; a newer value replaces a waiting one of the same key."""
+    """Passes values to a slow consumer in its own thread; a newer value replaces a waiting one of the same key.
+
+    The thread ends with `close`, or once nothing refers to the worker, as when the views of a session are dropped.
+    """
 
     def __init__(self, consume: Callable[[T], None], name: str, rest_s: float = 0.0) -> None:
         """Start the thread.
@@ -155,32 +184,29 @@ class LatestWinsWorker(Generic[T]):
             rest_s: minimum time between the end of one call and the start of the next, seconds.
         """
         self._consume, self._rest_s = consume, rest_s
-        self._waiting: dict[object, T] = {}
-        self._condition = threading.Condition()
-        self._closed = False
-        threading.Thread(target=self._work, name=name, daemon=True).start()
+        self._waiting = _Waiting[T]()
+        weakref.finalize(self, self._waiting.close)
+        threading.Thread(target=_work, args=(weakref.ref(self), self._waiting), name=name, daemon=True).start()
 
     def offer(self, value: T, key: object = None) -> None:
         """Queue a value, in place of a waiting one of the same key."""
-        with self._condition:
-            self._waiting[key] = value
-            self._condition.notify()
+        self._waiting.put(value, key)
 
     def close(self) -> None:
         """End the thread; waiting values are discarded."""
-        with self._condition:
-            self._closed = True
-            self._condition.notify()
+        self._waiting.close()
 
-    def _work(self) -> None:
-        while True:
-            with self._condition:
-                self._condition.wait_for(lambda: self._waiting or self._closed)
-                if self._closed:
-                    return
-                value = self._waiting.pop(next(iter(self._waiting)))
-            try:
-                self._consume(value)
-            except Exception:
-                _LOG.exception("a view failed")
-            time.sleep(self._rest_s)
+    def pass_on(self, value: T) -> float:
+        """Call the consumer, in the worker's thread; return the time to rest, seconds."""
+        try:
+            self._consume(value)
+        except Exception:
+            _LOG.exception("a view failed")
+        return self._rest_s
+
+
+def _work(worker: "weakref.ref[LatestWinsWorker[T]]", waiting: _Waiting[T]) -> None:
+    while (taken := waiting.take()) and (alive := worker()):
+        rest_s = alive.pass_on(*taken)
+        del taken, alive
+        time.sleep(rest_s)

@@ -7,7 +7,7 @@ import pytest
 from gestures import wait_for
 
 from app.runtime import jobs
-from app.runtime.jobs import Job
+from app.runtime.jobs import Job, LatestWinsWorker
 from tracker.errors import TrackerError
 
 
@@ -164,3 +164,27 @@ def test_a_job_that_is_over_frees_what_its_steps_held(ends_by):
         assert watched.ended == [] if ends_by.startswith("discarding") else len(watched.ended) == 1
         watched.job.run()
         assert not watched.job.running
+
+
+class View:
+    """A view that is subscribed to something and holds its worker, as those of a session do."""
+
+    def __init__(self, name):
+        self.shown, self.is_shown = [], threading.Event()
+        self.worker = LatestWinsWorker(self.show, name)
+        self.subscribers = [self.worker.offer]
+
+    def show(self, value):
+        self.shown.append(value)
+        self.is_shown.set()
+
+
+def test_the_thread_of_a_worker_ends_once_its_view_is_dropped():
+    view = View("view of a closed session")
+    view.worker.offer(1)
+    assert view.is_shown.wait(5)
+    (thread,) = (t for t in threading.enumerate() if t.name == "view of a closed session")
+    del view
+    gc.collect()
+    thread.join(5)
+    assert not thread.is_alive()
