@@ -19,10 +19,11 @@ The module that it names should import little, because help and menus load it. G
 
 import io
 import logging
+import os
 import sys
 import threading
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import redirect_stdout
+from collections.abc import Collection, Generator, Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from functools import cache, cached_property
 from importlib import metadata
 from textwrap import shorten
@@ -168,7 +169,7 @@ class _Loading(threading.Thread):
         """Return the object, and why it cannot be used."""
         with _LOCK:
             self._out = _OwnThreadOutput(self, sys.stdout)
-            with redirect_stdout(self._out):
+            with _no_direct_output(), redirect_stdout(self._out):
                 self.start()
                 self.join(self.LIMIT_S)
             if self.is_alive():
@@ -198,6 +199,27 @@ class _Loading(threading.Thread):
         return ""
 
 
+@contextmanager
+def _no_direct_output() -> Generator[None, None, None]:
+    """Send to standard error what is written to file 1 beside `sys.stdout`, as C libraries and child programs do."""
+    standard = sys.__stdout__
+    try:
+        kept = os.dup(1)
+    except OSError:  # a service without standard output
+        yield
+        return
+    try:
+        if standard is not None:
+            standard.flush()
+        os.dup2(2, 1)
+        yield
+        if standard is not None:
+            standard.flush()
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
 class _OwnThreadOutput:
     """Standard output without that of one thread, which is kept."""
 
@@ -212,6 +234,9 @@ class _OwnThreadOutput:
     def flush(self) -> None:
         """Flush the output of the others."""
         self._out.flush()
+
+    def close(self) -> None:
+        """Leave the output open: it is the program's."""
 
     def __getattr__(self, name: str) -> Any:
         """Return whatever else the output has."""

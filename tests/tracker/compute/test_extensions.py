@@ -71,6 +71,28 @@ def test_output_of_a_module_is_kept_from_that_of_the_program(package, capsys):
     assert capsys.readouterr().out == "of the program\n"
 
 
+DIRECT = """
+import os, sys
+os.write(1, b'raw')
+os.system('echo child')
+sys.__stdout__.write('original')
+sys.stdout.close()
+def start(): pass
+"""
+
+
+def test_output_beside_that_of_python_is_kept_from_that_of_the_program(package, capfd, monkeypatch):
+    with open(1, "w", closefd=False) as original:
+        monkeypatch.setattr(sys, "__stdout__", original)
+        package("direct", DIRECT)
+        assert only("direct").error == ""
+        print("of the program")
+        original.flush()
+    out, err = capfd.readouterr()
+    assert out == "of the program\n"
+    assert err == "rawchild\noriginal"
+
+
 def test_a_module_that_waits_is_given_up_and_prints_nothing_later(package, capsys, monkeypatch):
     monkeypatch.setattr(found._Loading, "LIMIT_S", 0.01)
     monkeypatch.setattr(sys, "stdout", sys.stdout)  # put back afterwards
