@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.mask_image import parts_of_mask
 from tracker.footage.recording import read_background, read_mask
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Region
@@ -111,8 +112,12 @@ class Foreground:
         u0, v0, u1, v1 = box
         empty = self.measure_empty_scene().result()
         if prepared.mask is not None:
-            inside = self.view.mask(prepared.mask, box)
-            return Changes(inside, inside)
+            people, unknown = parts_of_mask(prepared.mask)
+            inside = self.view.mask(people, box)
+            if unknown is None:
+                return Changes(inside, inside)
+            unsure = self.view.mask(unknown, box)
+            return Changes(inside, inside | unsure, unsure)
         if empty is None:
             return None
         background = background_subtraction.apply_gain(empty.smooth[v0:v1, u0:u1], prepared.gain)

@@ -293,9 +293,7 @@ class Observer:
             smooth, levels(prepared.strengths, restricted=changes is not None or with_static_edges), foreground
         )
         segments = link_edges(edges.found, edges.gradients, settings.max_segment_px)
-        silhouette = (
-            None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(filmed))
-        )
+        silhouette = None if changes is None else silhouette_evidence(changes, edges, 2 * default_theta_px(filmed))
         return RegionFeatures(
             camera, scale, box[:2], filmed.size, edges.found, segments, sample_segments(segments), smooth, silhouette,
             ahead,

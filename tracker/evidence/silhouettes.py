@@ -14,6 +14,7 @@ import numpy as np
 
 from tracker.errors import RecordingError, Remedy
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.mask_image import parts_of_mask
 from tracker.footage.recording import Recording, background_frames, read_mask
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Camera
@@ -35,12 +36,11 @@ from tracker.images.silhouette_cleaning import clean_silhouette
 from tracker.images.working_view import WorkingView
 
 SilhouetteSource = Literal["mask", "background", "recording", "none"]
-"""Source of a silhouette: the user's mask, an empty scene, the recording's own median, or a damaged frame."""
+"""Source of a silhouette: the user's mask, an empty scene, the recording's own median, or none: a damaged frame, or one
+without a mask where others have one and the view has no background."""
 
 N_LEARNED = 25
 """Number of frames from which the empty scene is learnt where the session has none."""
-_ANYONE = 255
-"""Value of a mask where it does not say which person it is."""
 
 
 class ViewSilhouette(NamedTuple):
@@ -55,7 +55,8 @@ class ViewSilhouette(NamedTuple):
     source: SilhouetteSource
     """Its source."""
     shadow: Mask | None = None
-    """Other changes, (H, W): shadows, highlights, and clothes that look like them. None for a user's mask."""
+    """Other changes, (H, W): shadows, highlights, and clothes that look like them. Of a user's mask what it leaves
+    unknown; None if that is nothing."""
 
     @property
     def is_empty(self) -> bool:
@@ -119,10 +120,10 @@ class SilhouetteFinder:
         camera = source.camera.scaled(view.scale)
         mask = read_mask(source, k)
         if mask is not None:
-            if person is not None:
-                mask = ((mask == _ANYONE) | (mask == person + 1)).astype(np.uint8)
-            return ViewSilhouette(view.mask(mask, view.whole), camera, 1.0, "mask")
-        if frame is None:
+            people, unknown = parts_of_mask(mask, person)
+            unsure = None if unknown is None else view.mask(unknown, view.whole)
+            return ViewSilhouette(view.mask(people, view.whole), camera, 1.0, "mask", unsure)
+        if frame is None or (source.masks is not None and source.background is None):
             return ViewSilhouette(np.zeros((camera.height, camera.width), bool), camera, 0.0, "none")
         model = self._models[i]
         changes = self._changes(self._smooth(i, frame), model)

@@ -16,6 +16,7 @@ from tracker.compute.jit import njit
 from tracker.evidence.keypoints import ViewKeypoints
 from tracker.geometry.arrays import FloatArray, Image, Mask
 from tracker.geometry.cameras import Camera, Region
+from tracker.images.background_subtraction import Changes
 from tracker.images.color_histogram import BINS, count_colors
 from tracker.images.distance_transform import distance_image
 from tracker.images.edge_segments import (
@@ -61,7 +62,7 @@ class Silhouette:
     """Silhouette of all people in a region of a view, from masks or a background."""
 
     inside: Mask
-    """The silhouette without shadows, (H, W)."""
+    """The silhouette without shadows, with what is unknown, (H, W)."""
     points_px: FloatArray
     """Thinned points of its contour, (N, 2), working px of the region."""
     normals: FloatArray
@@ -154,15 +155,17 @@ def _theta_px(size: tuple[int, int]) -> float:
     return 0.03 * max(size)
 
 
-def silhouette_evidence(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:
-    """Build the evidence of a silhouette.
+def silhouette_evidence(changes: Changes, edges: Edges, limit_px: float) -> Silhouette:
+    """Build the evidence of a silhouette. Next to unknown pixels it has no contour, and among them no outside.
 
     Args:
-        inside: the silhouette in a region, (H, W).
+        changes: the silhouette in a region.
         edges: edges of the same region.
         limit_px: largest distance to its contour, working px.
     """
-    contour = trace_silhouette(inside)
+    inside, contour = changes.inside, trace_silhouette(changes.inside)
+    if changes.unknown is not None:
+        contour, inside = contour.away_from(changes.unknown), changes.inside | changes.unknown
     first = thin_points(contour.points_px, *inside.shape)
     trust = contour_trust(contour, inside, edges)
     return Silhouette(inside, contour.points_px[first], contour.normals[first], trust, contour, limit_px)

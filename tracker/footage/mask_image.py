@@ -15,6 +15,11 @@ from tracker.footage.image_file import NO_HEADER, check_pixels, read_bytes, too_
 _BROKEN = (*NO_HEADER, zlib.error, EOFError, MemoryError)
 """The errors by which Pillow says that the pixels of an image are damaged."""
 
+ANYONE = np.iinfo(np.uint8).max
+"""Label of a pixel of a mask of footage that is of some person."""
+UNKNOWN = ANYONE - 1
+"""Label of a pixel that may be of a person: an object stands before it, or a network was not sure."""
+
 
 class LabelImage(NamedTuple):
     """An image of one value a pixel; 0 is background."""
@@ -81,3 +86,23 @@ def _check_background(image: Pillow.Image, where: str) -> None:
             f"{where}: expected black or transparent as colour 0 of the palette, the background, found {first}; "
             "export it as a grey image"
         )
+
+
+def parts_of_mask(
+    mask: NDArray[np.uint8], person: int | None = None
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
+    """Return the pixels of people, and those that are unknown, as `read_mask` labels them, (H, W) each, 0 elsewhere.
+
+    Args:
+        mask: of a picture of footage, (H, W).
+        person: index of a person in the session, whose own label counts beside `ANYONE`; None for everybody.
+
+    Returns:
+        Both; the second is None if nothing is unknown.
+    """
+    unknown = mask == UNKNOWN
+    if person is not None:
+        people = ((mask == ANYONE) | (mask == person + 1)).astype(np.uint8)
+    else:
+        people = np.where(unknown, np.uint8(0), mask)
+    return people, unknown.astype(np.uint8) if unknown.any() else None

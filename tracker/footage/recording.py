@@ -250,7 +250,9 @@ def background_frames(source: CameraSource) -> Iterator[Image]:
 
 
 def read_mask(source: CameraSource, k: int) -> NDArray[np.uint8] | None:
-    """Read the mask of frame k as filmed, (H, W): 0 background, 255 anyone, 1..K person K; None if there is none.
+    """Read the mask of frame k as filmed, (H, W); None if there is none.
+
+    Pixels are 0 for the background, k for person k, `mask_image.ANYONE` or `mask_image.UNKNOWN`.
 
     Raises:
         RecordingError: the file is not a gray 8-bit image, or of another size than the camera.

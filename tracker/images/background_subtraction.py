@@ -89,6 +89,8 @@ class Changes(NamedTuple):
     """Silhouette without shadows, with holes where colours agree, (H, W)."""
     anything: Mask
     """Silhouette with shadows, (H, W). It includes clothes that look like a shadow of what is behind them."""
+    unknown: Mask | None = None
+    """Pixels of which a mask does not say whether they are inside, (H, W); `anything` includes them. None without."""
 
 
 def subtract_background(

@@ -33,6 +33,12 @@ class SilhouetteContour(NamedTuple):
     normals: FloatArray
     """Unit normals pointing out of the silhouette, (N, 2)."""
 
+    def away_from(self, pixels: Mask) -> "SilhouetteContour":
+        """Return the part of the contour that is not next to some pixels, (H, W)."""
+        near = cv2.dilate(pixels.view(np.uint8), np.ones((3, 3), np.uint8))
+        kept = near[self.points_px[:, 1].astype(np.intp), self.points_px[:, 0].astype(np.intp)] == 0
+        return SilhouetteContour(self.points_px[kept], self.normals[kept])
+
 
 def trace_silhouette(silhouette: Mask) -> SilhouetteContour:
     """Trace the contours of a silhouette, (H, W), and of its holes, except along the border of the image."""

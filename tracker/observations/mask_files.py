@@ -7,12 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.footage.mask_image import LabelImage
+from tracker.footage.mask_image import ANYONE, LabelImage
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.observations.sources import FileGroup
-
-ANYONE = np.iinfo(np.uint8).max
-"""Label of a pixel of any person, as `tracker.footage.recording.read_mask` has it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,10 +33,10 @@ class MaskRules:
     is_matte: bool = False
     """Whether values are opacities, of which the upper half is a person; else each value but 0 is one."""
     people: Mapping[int, int] | None = None
-    """Number of a person in the session, from 1, by label in the files; None if no label is assigned to a person."""
+    """Number of a person in the session, from 1, or `UNKNOWN`, by label in the files; None if none is assigned."""
 
     def apply(self, labels: NDArray[Any]) -> NDArray[np.uint8]:
-        """Return a mask as footage has it, (H, W): 0 background, 255 anyone, k person k."""
+        """Return a mask as footage has it, (H, W); see `tracker.footage.recording.read_mask`."""
         out = np.where(_is_opaque(labels) if self.is_matte else labels > 0, ANYONE, 0).astype(np.uint8)
         for value, number in (self.people or {}).items():
             out[labels == value] = number
@@ -51,7 +48,7 @@ class MaskSurvey:
     """The content of all masks of a camera."""
 
     shares: Array
-    """Share of each picture that is not 0, (n,)."""
+    """Share of each picture that is neither 0 nor unknown, (n,)."""
     opaque_shares: Array
     """Share of each picture that is in the upper half of its values, (n,)."""
     values: frozenset[int]
@@ -71,13 +68,18 @@ class _Picture(NamedTuple):
     is_alpha: bool
 
 
-def survey(masks: MaskFiles, size: tuple[int, int]) -> MaskSurvey:
-    """Read all masks of a camera; `size` is the width and height that they must have, px.
+def survey(masks: MaskFiles, size: tuple[int, int], unknown: int = 0) -> MaskSurvey:
+    """Read all masks of a camera.
+
+    Args:
+        masks: the masks.
+        size: width and height that they must have, px.
+        unknown: value of pixels that may be of people, which do not count as theirs; 0 for none.
 
     Raises:
         TrackerError: one is damaged, malformed or of another size.
     """
-    found = [_picture(masks.read(i, size)) for i in range(len(masks.numbers))]
+    found = [_picture(masks.read(i, size), unknown) for i in range(len(masks.numbers))]
     return MaskSurvey(
         np.array([p.share for p in found]),
         np.array([p.opaque_share for p in found]),
@@ -86,10 +88,10 @@ def survey(masks: MaskFiles, size: tuple[int, int]) -> MaskSurvey:
     )
 
 
-def _picture(image: LabelImage) -> _Picture:
+def _picture(image: LabelImage, unknown: int) -> _Picture:
     labels = image.labels
     values = np.flatnonzero(np.bincount(labels.ravel()))
-    shares = (labels > 0).mean(), _is_opaque(labels).mean()
+    shares = ((labels > 0) & (labels != unknown)).mean(), _is_opaque(labels).mean()
     return _Picture(float(shares[0]), float(shares[1]), tuple(values[values > 0].tolist()), image.is_alpha)
 
 

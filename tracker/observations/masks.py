@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tracker.errors import FormatError, TrackerError
+from tracker.footage.mask_image import UNKNOWN
 from tracker.formats.keypoints.openpose import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.geometry.arrays import IntArray
@@ -18,6 +19,8 @@ from tracker.session.matching import check_names
 from tracker.session.session import Session
 
 _ABSENT = "such frames count as without a mask"
+_UNKNOWN = "unknown"
+"""Name of the value of pixels that may be of people, beside the names of people."""
 
 
 def plan_masks(session: Session, request: ImportRequest, format_name: str, files: list[Found]) -> MaskPlan:
@@ -37,11 +40,12 @@ def plan_masks(session: Session, request: ImportRequest, format_name: str, files
     tables = {name: PictureTable((), m.numbers, np.empty((len(m.numbers), 0, 0, 3))) for name, m in masks.items()}
     frames, wrong, notes = place_pictures(tables, session, request.first_frame, request.offsets, _ABSENT)
     surveys: dict[str, MaskSurvey] = {}
+    unknown = 0 if _UNKNOWN in {p.name for p in session.people} else request.values.get(_UNKNOWN, 0)
     for source in session.cameras:
         name = source.camera.name
         if name in masks:
             try:
-                surveys[name] = survey(masks[name], request.picture_size or source.camera.size)
+                surveys[name] = survey(masks[name], request.picture_size or source.camera.size, unknown)
             except TrackerError as error:
                 problems.append(FormatError(f"camera '{name}': {error}", error.remedy))
     problems += wrong
@@ -98,8 +102,8 @@ def _rules(
             )
         )
     given = dict(request.values)
-    check_names(given, [p.name for p in session.people], "person", "the values by person")
-    numbers = {p.name: i + 1 for i, p in enumerate(session.people)}
+    numbers = {_UNKNOWN: UNKNOWN, **{p.name: i + 1 for i, p in enumerate(session.people)}}
+    check_names(given, list(numbers), "person", "the values by person")
     for name, value in given.items():
         if surveys and (is_matte or value not in values):
             listed = "opacities" if is_matte else ", ".join(map(str, values[:10])) or "none"

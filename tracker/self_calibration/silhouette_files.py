@@ -6,6 +6,7 @@ import numpy as np
 
 from tracker.compute.progress import Report
 from tracker.evidence.silhouettes import SilhouetteFinder
+from tracker.footage.mask_image import parts_of_mask
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
@@ -40,7 +41,7 @@ def silhouettes_in_masks(
             if not plan.rules.is_matte and np.count_nonzero(labels) > 1:
                 out[k][v] = PersonSilhouette(flaw=Flaw.SEVERAL)
                 continue
-            out[k][v] = _measured(plan.mask(camera.name, i, source.camera.size) > 0, camera, 1.0)
+            out[k][v] = _measured(parts_of_mask(plan.mask(camera.name, i, source.camera.size))[0] > 0, camera, 1.0)
     return out
 
 

@@ -7,6 +7,7 @@ from fisheye import with_fisheye
 
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.mask_image import ANYONE, UNKNOWN
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
 from tracker.images.background_subtraction import SHADOWS
@@ -110,6 +111,19 @@ def test_masks_come_first_and_may_be_numbered(camera, tmp_path):
         (other,) = SilhouetteFinder([masked], recording).silhouettes(3)
     assert np.array_equal(second.mask, numbers >= 2)
     assert other.source == "background"
+    assert found(replace(masked, background=None), k=3).source == "none"  # not the recording's own background
+
+
+def test_what_a_mask_leaves_unknown_is_neither_a_person_nor_background(camera, tmp_path):
+    labels = np.zeros((H, W), np.uint8)
+    labels[10:30, 10:30], labels[50:70, 50:70], labels[30:50, 30:50] = 1, ANYONE, UNKNOWN
+    cv2.imwrite(str(tmp_path / "000004.png"), labels)
+    masked = replace(camera, masks=tmp_path)
+    for person, people in ((None, (1, ANYONE)), (0, (1, ANYONE)), (1, (ANYONE,))):
+        with Recording([masked]) as recording:
+            (silhouette,) = SilhouetteFinder([masked], recording).silhouettes(4, person)
+        assert np.array_equal(silhouette.mask, np.isin(labels, people))
+        assert np.array_equal(silhouette.shadow, labels == UNKNOWN)
 
 
 def test_an_empty_scene_has_no_silhouette(camera, tmp_path):

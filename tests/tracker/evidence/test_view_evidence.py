@@ -18,6 +18,7 @@ from tracker.evidence.view_evidence import (
     with_segments,
 )
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.mask_image import UNKNOWN
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
 from tracker.images.edge_segments import MAX_LENGTH, accept_segments, link_edges
@@ -210,6 +211,27 @@ def test_masks_go_before_the_background(sample, tmp_path, real_frame):
     without = Observer(session.cameras, recording).evidence(24)
     for a, b in zip(observer.evidence(24), without, strict=True):
         np.testing.assert_array_equal(a.points_px, b.points_px)
+
+
+def test_unknown_pixels_of_a_mask_show_neither_a_contour_nor_an_outside(sample, tmp_path):
+    session, recording = sample
+    view = WorkingView(session.cameras[0].camera)
+    seen = {}
+    for name, rows in (("whole", slice(0)), ("before", slice(240, 300))):  # a rail stands before the person
+        mask = np.zeros((480, 640), np.uint8)
+        mask[100:400, 260:380] = 1
+        mask[rows, 200:440] = UNKNOWN
+        (tmp_path / name).mkdir()
+        cv2.imwrite(str(tmp_path / name / "000025.png"), mask)
+        cameras = [replace(session.cameras[0], masks=tmp_path / name), *session.cameras[1:]]
+        seen[name] = Observer(cameras, recording).evidence(25)[0]
+        unknown = view.mask((mask == UNKNOWN).astype(np.uint8), view.whole)
+        u, v = seen[name].silhouette.points_px.astype(int).T
+        assert not unknown[v, u].any()
+        np.testing.assert_array_equal(seen[name].silhouette.inside, view.mask(mask, view.whole))
+    whole, before = (len(seen[name].silhouette.contour.points_px) for name in ("whole", "before"))
+    assert before < whole  # and no contour along the rail
+    assert len(seen["before"].points_px) > len(seen["whole"].points_px)  # edges of the rail may be the person's
 
 
 def test_an_empty_mask_says_that_nobody_is_there(sample, tmp_path):

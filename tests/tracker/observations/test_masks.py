@@ -11,6 +11,7 @@ from observed_people import make_session
 from PIL import Image
 
 from tracker.errors import FormatError, SessionError, TrackerError
+from tracker.footage.mask_image import UNKNOWN
 from tracker.footage.recording import read_mask
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.request import ImportRequest
@@ -85,6 +86,18 @@ def test_values_tell_people_apart(session, tmp_path):
     assert "people of values 20, 40, 60 are not told from each other" in plan.notes
     found = stored(session, folder, values={"bob": 20, "ann": 60})
     assert np.array_equal(read(found), np.select([masks == 20, masks == 40, masks == 60], [2, 255, 1]))
+
+
+def test_a_value_may_be_that_of_what_is_unknown(session, tmp_path):
+    masks = person_masks(N, 4, people=3) * 20
+    masks[:, :, :4][masks[:, :, :4] == 0] = 40
+    folder = write_masks(tmp_path / "m", session.camera_names, masks)
+    found = stored(session, folder, values={"bob": 20, "unknown": 40})
+    assert np.array_equal(read(found), np.select([masks == 20, masks == 40, masks == 60], [2, UNKNOWN, 255]))
+    masks[masks == 0] = 40  # nothing is known to be background
+    folder = write_masks(tmp_path / "n", session.camera_names, masks)
+    assert not problems(planned(session, folder, name="n", values={"unknown": 40}))
+    assert "expected background in each mask" in problems(planned(session, folder, name="n", values={"bob": 40}))
 
 
 @pytest.mark.parametrize(
