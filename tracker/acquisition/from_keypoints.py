@@ -95,10 +95,24 @@ class SeenBody(NamedTuple):
     sigmas: Array
     """Standard deviation of each at confidence 1, (N,), in normalized image coordinates."""
 
-    def keypoints(self, model: BodyModel, seen: BodyPoints) -> PersonKeypoints:
-        """Return the key points of a recording as evidence for a body; the variance falls with the confidence."""
+    def keypoints(self, model: BodyModel, seen: BodyPoints, cameras: Sequence[Camera]) -> PersonKeypoints:
+        """Return the key points of a recording as evidence for a body; the variance falls with the confidence.
+
+        A point on whose place the views of a frame disagree is no more certain than they agree (R. T. Birge 1932).
+
+        Args:
+            model: the body.
+            seen: the points on all frames.
+            cameras: of the session, in its order.
+        """
         parts, places = _places(model, seen, self.offsets_part)
-        return PersonKeypoints(parts, places, seen.seen, self.sigmas / np.sqrt(np.maximum(seen.confidence, _LEAST)))
+        sigmas = self.sigmas / np.sqrt(np.maximum(seen.confidence, _LEAST))
+        apart = np.array([_errors(X, own, cameras) for X, own in zip(seen.joints_world, seen.seen, strict=True)])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # a point that no view shows
+            usual = np.nanmedian((apart**2).sum(axis=-1), axis=1, keepdims=True)
+        # The squared length of two normal coordinates has the median 2 ln 2.
+        return PersonKeypoints(parts, places, seen.seen, np.fmax(sigmas, np.sqrt(usual / (2 * np.log(2)))))
 
     def costs(self, bodies: Mapping[int, PosedBody], seen: BodyPoints, cameras: Sequence[Camera]) -> dict[int, float]:
         """Return by frame the robust cost of the key points, nats, in which one that is absent counts as grossly off.
@@ -111,7 +125,7 @@ class SeenBody(NamedTuple):
         out = dict[int, float]()
         for k, body in bodies.items():
             parts, places = _places(body.model, seen, self.offsets_part)
-            errors = _errors(body, parts, places, seen.seen[k], cameras) / self.sigmas[:, None]
+            errors = _errors(_placed(body, parts, places), seen.seen[k], cameras) / self.sigmas[:, None]
             squares = np.nan_to_num(seen.confidence[k] * (errors**2).sum(axis=-1), nan=np.inf)
             out[k] = 0.5 * float(np.sum(GROSS_SIGMAS**2 / (1 + GROSS_SIGMAS**2 / np.maximum(squares, 1e-12))))
         return out
@@ -127,7 +141,7 @@ def learn_seen_body(bodies: Mapping[int, PosedBody], seen: BodyPoints, cameras: 
     """
     offsets = learn_offsets(bodies, seen)
     parts, places = _places(next(iter(bodies.values())).model, seen, offsets)
-    errors = np.array([_errors(body, parts, places, seen.seen[k], cameras) for k, body in bodies.items()])
+    errors = np.array([_errors(_placed(b, parts, places), seen.seen[k], cameras) for k, b in bodies.items()])
     errors *= np.sqrt(seen.confidence)[list(bodies), ..., None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a point that is never seen has no errors
@@ -145,13 +159,17 @@ def _places(model: BodyModel, seen: BodyPoints, offsets_part: Array) -> tuple[In
     return parts, joints + offsets_part
 
 
-def _errors(body: PosedBody, parts: IntArray, places: Array, seen: Array, cameras: Sequence[Camera]) -> Array:
-    """Return from the points of a body to where views have them, (V, N, 2), in normalized image coordinates."""
+def _placed(body: PosedBody, parts: IntArray, places: Array) -> Array:
+    """Return places in parts of a body, (N, 3), in the world."""
     T = body.kinematics.Ts_world_part[parts]
-    X = np.einsum("nij,nj->ni", T[:, :3, :3], places) + T[:, :3, 3]
+    return np.einsum("nij,nj->ni", T[:, :3, :3], places) + T[:, :3, 3]
+
+
+def _errors(points_world: Array, seen: Array, cameras: Sequence[Camera]) -> Array:
+    """Return from points, (N, 3), to where views have them, (V, N, 2), in normalized image coordinates."""
     out = np.full(seen.shape, np.nan)
     for v, camera in enumerate(cameras):
-        eye = rigid.apply(camera.T_camera_world, X)
+        eye = rigid.apply(camera.T_camera_world, points_world)
         in_front = eye[:, 2] > NEAR_PLANE_M
         out[v, in_front] = seen[v, in_front] - eye[in_front, :2] / eye[in_front, 2:]
     return out

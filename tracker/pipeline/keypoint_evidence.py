@@ -169,9 +169,10 @@ def keypoint_evidence(
         seen: how the detector sees each person, by index; people who are left out have no key points.
         views: names of the cameras of the run.
     """
-    names = [c.camera.name for c in session.cameras]
+    cameras = [c.camera for c in session.cameras]
+    names = [c.name for c in cameras]
     people = tuple(
-        seen[i].keypoints(p.model, points[i]) if i in seen and i in points else None
+        seen[i].keypoints(p.model, points[i], cameras) if i in seen and i in points else None
         for i, p in enumerate(session.people)
     )
     return KeypointEvidence(people).of_views([names.index(v) for v in views])

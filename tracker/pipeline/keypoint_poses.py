@@ -101,7 +101,7 @@ def keypoint_poses(
     first = fit_to_keypoints(model, points)
     if not first:
         return {}
-    seen = learn_seen_body(first, points, cameras).keypoints(model, points)
+    seen = learn_seen_body(first, points, cameras).keypoints(model, points, cameras)
     fits = dict[int, Fit]()
     for k, body in first.items():
         report("fitting poses to key points", len(fits) / len(first))

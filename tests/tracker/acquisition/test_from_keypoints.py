@@ -51,6 +51,21 @@ def test_offsets_and_noise_are_those_of_the_detector(recording):
     np.testing.assert_allclose(found.sigmas, SIGMA * np.sqrt(0.8), rtol=0.2)
 
 
+def test_a_point_on_which_the_views_of_a_frame_disagree_is_less_certain_there(recording):
+    bodies, points = recording
+    learnt = learn_seen_body(bodies, points, CAMERAS)
+    seen, knee = points.seen.copy(), NAMES.index("left_knee")
+    seen[5, :3, knee] += [[0.05, 0.0], [0.0, -0.05], [-0.05, 0.0]]  # saturated: each view is as sure as ever
+    seen[7, 0, knee] += 0.05  # one view alone contradicts: robust fits leave it out
+    usual, found = (
+        learnt.keypoints(MODEL, BodyPoints(NAMES, points.joints_world, s, points.confidence), CAMERAS).sigmas
+        for s in (points.seen, seen)
+    )
+    assert (found[5, :, knee] > 0.03).all()
+    assert (found[7, :, knee] < 0.02).all()
+    np.testing.assert_array_equal(np.delete(found, [5, 7], axis=0), np.delete(usual, [5, 7], axis=0))
+
+
 def test_a_frame_with_gross_errors_costs_more(recording):
     bodies, points = recording
     costs = learn_seen_body(bodies, points, CAMERAS).costs(bodies, points, CAMERAS)
