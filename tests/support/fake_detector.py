@@ -13,7 +13,7 @@ class FakeDetector:
     def __init__(self, points, unfound=(), unseen=()):
         """Args: points, (n_frames, n_views, n_people, n_points, 3), x, y, confidence; views and people not found by
         the search of whole pictures, and not seen at all, as pairs of view and person."""
-        self.points, self.unfound, self.unseen, self.n_finds, self.n_looks = points, unfound, unseen, 0, 0
+        self.points, self.unfound, self.unseen, self.n_finds, self.looks = points, unfound, unseen, 0, []
 
     def read(self, k):
         """Pictures of a frame, as a recording reads them."""
@@ -34,7 +34,7 @@ class FakeDetector:
         return out
 
     def look(self, picture, square):
-        self.n_looks += 1
+        self.looks.append(square)
         near = []
         for person, points in self._people(picture):
             if (picture[0, 0, 0], person) not in self.unseen:

@@ -1,6 +1,6 @@
 """Detect the people of a session: the points of all figures in all views, stored as observations."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
 from typing import TypeAlias
@@ -15,7 +15,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import JointMap, known_joint_maps
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.observations.identities import PersonTrack
+from tracker.observations.identities import most_seen_people
 from tracker.observations.observed import ObservationSet, ObservedPoints
 from tracker.observations.stored import list_observations, load_observations, save_observations
 from tracker.session.session import Session
@@ -50,6 +50,8 @@ class Detected:
     """Whether these are all frames of the plan."""
     n_figures: tuple[int, ...]
     """Pictures of each view that show a person, by view."""
+    n_people: int
+    """Number of people who are seen at once, to compare with that of the session."""
     notes: tuple[str, ...]
     """Sentences on what is remarkable."""
 
@@ -95,13 +97,19 @@ def detect_people(
             f"expected people in the pictures of frames {plan.frames.start} to {plan.frames.stop - 1}, found none; "
             "look at the footage, try another model, or place the bodies by hand"
         )
+    if not people.tracks:
+        alone = " and ".join(n for v, n in enumerate(people.names) if any(views[v] for views in found.values()))
+        raise TrackerError(
+            f"expected people whom two views show at one place, found those of {plan.detector} in {alone} at none; "
+            "check the calibration and the offsets of the views, or try another model"
+        )
     done = range(plan.frames.start, max(found) + 1)
-    notes = _notes(session, people.tracks, found)
+    notes = _notes(people, len(session.people), done)
     save_observations(
         session, _observations(session, plan, convention, found, done, notes), {}, replaces=before is not None
     )
     counts = tuple(sum(bool(views[v]) for views in found.values()) for v in range(len(cameras)))
-    return Detected(done, len(found) == len(plan.frames), counts, notes)
+    return Detected(done, len(found) == len(plan.frames), counts, people.number, notes)
 
 
 def _begun(session: Session, plan: DetectionPlan) -> ObservationSet | None:
@@ -176,12 +184,20 @@ def _observations(
     return ObservationSet(plan.name, FORMAT, people, convention, points, None, (rows,), (), notes, options)
 
 
-def _notes(session: Session, tracks: Sequence[PersonTrack], found: dict[int, Seen]) -> tuple[str, ...]:
-    """Say whether other people than those of the session are seen."""
-    n_seen = sum(len({k for k, _ in t.members}) > len(found) / 2 for t in tracks)
-    n = len(session.people)
-    if n_seen == n:
-        return ()
-    if n_seen > n:
-        return (f"{n_seen} people are seen in most frames, the session has {n}: those seen most are taken",)
-    return (f"{n_seen} of {n} people are seen in most frames",)
+def _notes(people: PeopleInViews, n: int, done: range) -> tuple[str, ...]:
+    """Say whether other people than the `n` of the session are seen, and who is not seen all the time."""
+    out, taken = [], most_seen_people(people.tracks, n)
+    if people.number != n:
+        end = ": those seen most are taken" if people.number > n else ""
+        out.append(f"{people.number} people are seen at once by three views or by all, the session has {n}{end}")
+    for tracks in taken:
+        frames = sorted({k for t in tracks for k, _ in t.members})
+        if frames[0] - done.start >= people.every or done.stop - frames[-1] > people.every:
+            out.append(f"a person is seen on frames {frames[0]} to {frames[-1]} alone")
+    known = {id(t) for tracks in taken for t in tracks}
+    for track in people.tracks:
+        if len({k for k, _ in track.members}) >= people.every and (track.is_flat or id(track) not in known):
+            who = "a flat picture of a person" if track.is_flat else "a further person"
+            names = " and ".join(people.names[v] for v in sorted({v for _, v in track.members}))
+            out.append(f"{who} is seen by {names}" + ", and left out" * (id(track) not in known))
+    return tuple(out)

@@ -10,10 +10,19 @@ from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array, Image
 
-SQUARE_M = 2.4
-"""Side of the square around the hips of a person, metres, in which a detector looks for the person's points: 1.25 times
-(BlazePose's model card) the circle through the soles of someone 1.8 m tall, whose hips are at 0.53 of the stature
-(R. Drillis and R. Contini 1966)."""
+
+class _Adult(NamedTuple):
+    """The person in whose sizes squares are given, metres."""
+
+    square_m: float
+    """Side of the square around the hips in which a detector looks for the person's points."""
+    leg_m: float
+    """From hip to ankle."""
+
+
+ADULT = _Adult(2.4, 0.88)
+"""Someone 1.8 m tall, whose hips are at 0.53 and whose ankles are at 0.039 of the stature (R. Drillis and R. Contini
+1966). The square is 1.25 times (BlazePose's model card) the circle through the soles."""
 
 
 class PictureSquare(NamedTuple):

@@ -4,13 +4,14 @@ Views know more together than each alone: where a person stands, and with which 
 every view around the place that the other views and the frame before show, and with the feet where the floor is.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
-from tracker.detection.detector import SQUARE_M, DetectedPerson, Detector, PictureSquare
+from tracker.detection.detector import ADULT, DetectedPerson, Detector, PictureSquare
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
 from tracker.observations.identities import SAME_PERSON_M, PersonTrack, follow_people, track_distance
@@ -18,6 +19,7 @@ from tracker.observations.observed import ObservationSet
 from tracker.observations.triangulation import INLIER_M, Views
 
 _TORSO = ("left_shoulder", "right_shoulder", "left_hip", "right_hip")
+_LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
 _FIND_EVERY_S = 0.5
 """Time between two searches of whole pictures for people who enter, seconds: at 1.4 m/s (R. Bohannon 1997) someone
 walks 0.7 m meanwhile. A person who is lost is sought at the last place until then."""
@@ -45,10 +47,26 @@ class PeopleInViews:
         """
         self._detector, self._views, self._up = detector, Views(cameras), up
         self._torso, self._n_points = [body_points[name] for name in _TORSO], n_points
-        self._every = max(1, round(_FIND_EVERY_S * fps))
+        self._legs = np.array([[body_points[name] for name in leg] for leg in _LEGS])
+        self.every = max(1, round(_FIND_EVERY_S * fps))
         self._middle = viewed_point(cameras)
         self._last_search: int | None = None
         self.tracks: list[PersonTrack] = []
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the views."""
+        return [c.name for c in self._views.cameras]
+
+    @property
+    def number(self) -> int:
+        """Number of people at once, each seen by three views or all, on as many frames as `every` at least."""
+        at_once = Counter[int]()
+        for track in self.tracks:
+            n_views = Counter(k for k, _ in track.members)
+            at_once.update(k for k, n in n_views.items() if n >= min(3, len(self.names)) and not track.is_flat)
+        counts = sorted(at_once.values(), reverse=True)
+        return counts[min(self.every, len(counts)) - 1] if counts else 0
 
     def see(self, frame: int, pictures: Sequence[Image | None]) -> Seen:
         """Find the people of a frame, who become members of `tracks`.
@@ -61,14 +79,14 @@ class PeopleInViews:
             The figures of each view, in which the tracks have their indices.
         """
         figures: Seen = [[] for _ in pictures]
-        known = [t for t in self.tracks if frame - t.seen <= self._every]
+        known = [t for t in self.tracks if frame - t.seen <= self.every]
         for track in known:
             self._look_for(track, figures, pictures)
-        is_time = self._last_search is None or frame - self._last_search >= self._every
+        is_time = self._last_search is None or frame - self._last_search >= self.every
         if is_time or not known or any(track.seen < frame - 1 for track in known):
             self._search(figures, pictures)
             self._last_search = frame
-        follow_people(self._views, *self._undistorted(figures), frame, self.tracks)
+        self._follow(figures, frame)
         for track in self.tracks:
             if track.seen == frame:
                 self._complete(track, frame, figures, pictures)
@@ -87,8 +105,16 @@ class PeopleInViews:
                 ]
                 for v, own in enumerate(is_seen)
             ]
-            follow_people(self._views, *self._undistorted(out[k]), k, self.tracks)
+            self._follow(out[k], k)
         return out
+
+    def _follow(self, figures: Seen, frame: int) -> None:
+        """Follow the people among the figures of a frame, and measure their legs."""
+        follow_people(self._views, *self._undistorted(figures), frame, self.tracks)
+        for track in self.tracks:
+            if track.seen == frame:
+                lengths = np.linalg.norm(np.diff(track.last_world[self._legs], axis=1), axis=-1).sum(axis=1)
+                track.legs_m += lengths[np.isfinite(lengths)].tolist()
 
     def _look_for(self, track: PersonTrack, figures: Seen, pictures: Sequence[Image | None]) -> None:
         """Look for a person in all views, around the last place."""
@@ -127,14 +153,14 @@ class PeopleInViews:
             return
         for other in figures:
             apart = np.linalg.norm(found.points_px - other.points_px, axis=1)
-            if np.nanmedian(apart) * SQUARE_M < INLIER_M * square.side_px:
+            if np.nanmedian(apart) * ADULT.square_m < INLIER_M * square.side_px:
                 return
         figures.append(replace(found, mask=None))  # masks of all frames would fill the memory
 
     def _is_around(self, square: PictureSquare, figure: DetectedPerson) -> bool:
         """Return whether a square is around the hips of a figure: others behind it are found by other views."""
         hips = figure.points_px[self._torso[2:]].mean(axis=0)
-        return bool(np.linalg.norm(hips - square.center_px) * SQUARE_M < 2 * INLIER_M * square.side_px)
+        return bool(np.linalg.norm(hips - square.center_px) * ADULT.square_m < 2 * INLIER_M * square.side_px)
 
     def _square(self, track: PersonTrack, view: int) -> PictureSquare | None:
         """Return the square of a view around the last place of a person; None where the view does not show it."""
@@ -147,7 +173,13 @@ class PeopleInViews:
         center, chest = camera.distort_points(camera.project(np.array([hips, shoulders])))
         if not ((center >= 0) & (center < camera.size)).all():
             return None
-        side = SQUARE_M * self._views.focal_px[view] / depth
+        side = (
+            ADULT.square_m
+            * float(np.median(track.legs_m or ADULT.leg_m))
+            / ADULT.leg_m
+            * self._views.focal_px[view]
+            / depth
+        )
         # From above or below the trunk has no direction in the picture.
         is_along = np.hypot(*(chest - center)) > 0.1 * side
         return PictureSquare(center, side, _turn(chest - center if is_along else self._up_px(view, hips)))

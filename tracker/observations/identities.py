@@ -4,7 +4,7 @@ Detections of two views are of one person if the rays of their points meet. From
 reprojected points of the frame before are nearest (the Hungarian method, in each view).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,7 +15,7 @@ SAME_PERSON_M = 0.4
 """Largest median distance, metres, of a detection's points from a person's a frame before: a person is as wide."""
 
 
-@dataclass
+@dataclass(eq=False)
 class PersonTrack:
     """A person who is followed, as long as enough views show the person."""
 
@@ -25,6 +25,15 @@ class PersonTrack:
     """Detection by frame and view."""
     seen: int = 0
     """Last frame with a detection."""
+    legs_m: list[float] = field(default_factory=list)
+    """Lengths of the legs from frame to frame, metres, where points of legs are known."""
+    thickness_m: list[float] = field(default_factory=list)
+    """Standard deviation of the points from their plane, from frame to frame, metres."""
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether the person is mostly thinner than a limb, whose points have this deviation: as on a poster."""
+        return bool(self.thickness_m) and float(np.quantile(self.thickness_m, 0.75)) < INLIER_M / 12**0.5
 
 
 def match_people(views: Views, points_px: Array, confidence: Array, n_people: int) -> IntArray:
@@ -96,6 +105,23 @@ def follow_people(views: Views, points_px: Array, confidence: Array, frame: int,
         found = triangulate_points(views, px[None], weights[None]).points_world[0]
         known = np.isfinite(found).all(axis=-1)
         tracks[t].last_world[known] = found[known]
+        if known.sum() > 3:
+            off = np.linalg.svd(found[known] - found[known].mean(axis=0), compute_uv=False)[-1]
+            tracks[t].thickness_m.append(float(off / np.sqrt(known.sum())))
+    for track in [t for t in tracks if t.seen == frame]:
+        double = next((t for t in tracks[: tracks.index(track)] if t.seen == frame and _is_same(t, track)), None)
+        if double is not None:
+            double.members = track.members | double.members
+            tracks.remove(track)
+
+
+def _is_same(one: PersonTrack, other: PersonTrack) -> bool:
+    """Return whether two people are at the place of one, and most pictures show one of them alone."""
+    apart = np.linalg.norm(one.last_world - other.last_world, axis=-1)
+    known = np.isfinite(apart)
+    is_near = known.any() and np.median(apart[known]) < SAME_PERSON_M
+    n_both, n_least = len(one.members.keys() & other.members), min(len(one.members), len(other.members))
+    return bool(is_near and 2 * n_both < n_least)
 
 
 def track_distance(views: Views, view: int, points_world: Array, points_px: Array, confidence: Array) -> float:
@@ -142,9 +168,12 @@ def _ray_distances(views: Views, a: int, b: int, u: Array, v: Array) -> Array:
 
 
 def most_seen_people(tracks: list[PersonTrack], n_people: int) -> list[list[PersonTrack]]:
-    """Join tracks that follow one another to people, those with most detections first; in order of appearance."""
+    """Join tracks that follow one another to people; in order of appearance.
+
+    A person with more detections comes first, a flat picture of one last.
+    """
     people: list[list[PersonTrack]] = []
-    for track in sorted(tracks, key=lambda t: -len(t.members)):
+    for track in sorted(tracks, key=lambda t: (t.is_flat, -len(t.members))):
         frames = {frame for frame, _ in track.members}
         free = [some for some in people if not any(frames & {f for f, _ in t.members} for t in some)]
         if len(people) < n_people:

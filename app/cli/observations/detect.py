@@ -82,7 +82,7 @@ def _detect(arguments: DetectArguments, path: Path, folder: Path, reporter: Repo
     pictures = {c.camera.name: n for c, n in zip(session.cameras, found.n_figures, strict=True)}
     return {
         "name": arguments.name, "detector": text, "frames": [found.frames.start, found.frames.stop],
-        "complete": found.is_complete, "pictures": pictures, "notes": list(found.notes),
+        "complete": found.is_complete, "people": found.n_people, "pictures": pictures, "notes": list(found.notes),
     }  # fmt: skip
 
 

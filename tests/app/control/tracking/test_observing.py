@@ -94,7 +94,7 @@ def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller,
     stopped = threading.Event()
 
     def look(picture, square, look=detector.look):
-        if detector.n_looks == 40 and not stopped.is_set():
+        if len(detector.looks) == 40 and not stopped.is_set():
             stopped.set()
             controller.observing._stopping.set()
         return look(picture, square)
