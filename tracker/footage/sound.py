@@ -83,7 +83,13 @@ def read_sound(path: Path, name: str, settings: SoundSettings | None = None) -> 
         ) from error
     if not pieces:
         return None
-    samples, late = np.concatenate(pieces), round(((first_s or 0.0) - begin_s) * rate)
+    samples = np.concatenate(pieces)
+    if not np.isfinite(samples).all():
+        raise RecordingError(
+            f"camera '{name}': expected sound of finite samples, found others in {path}; export the sound again, or "
+            "give offsets"
+        )
+    late = round(((first_s or 0.0) - begin_s) * rate)
     return np.concatenate([np.zeros(late, np.float32), samples]) if late > 0 else samples[-late:]
 
 

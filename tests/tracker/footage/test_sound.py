@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from clips import SIZE, picture
 
+from tracker.errors import RecordingError
 from tracker.footage.flash import flash_of, tiles
 from tracker.footage.sound import SoundSettings, read_sound, sound_delay
 
@@ -49,10 +50,10 @@ def test_short_sound_has_no_delay():
     assert sound_delay(one, other) is None
 
 
-def filmed(path, samples, rate=RATE):
+def filmed(path, samples, rate=RATE, codec="aac"):
     """Write a video with sound."""
     with av.open(str(path), "w") as container:
-        video, sound = container.add_stream("libx264", rate=30), container.add_stream("aac", rate=rate)
+        video, sound = container.add_stream("libx264", rate=30), container.add_stream(codec, rate=rate)
         video.width, video.height, video.pix_fmt = *SIZE, "yuv420p"
         sound.layout = "mono"
         for i in range(int(30 * len(samples) / rate)):
@@ -66,7 +67,6 @@ def filmed(path, samples, rate=RATE):
             container.mux(sound.encode(frame))
         container.mux(sound.encode())
     return path
-    return path
 
 
 def test_sound_of_videos(tmp_path):
@@ -75,6 +75,15 @@ def test_sound_of_videos(tmp_path):
     found = sound_delay(*read)
     assert found.is_clear
     assert found.delay_s == pytest.approx(0.0437, abs=1e-4)
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf])
+def test_sound_that_is_not_finite_is_refused(tmp_path, odd):
+    samples = np.zeros(RATE, np.float32)
+    samples[RATE // 2] = odd
+    path = filmed(tmp_path / "a.mkv", samples, codec="pcm_f32le")
+    with pytest.raises(RecordingError, match="camera 'a': expected sound of finite samples, found others in .*a.mkv"):
+        read_sound(path, "a")
 
 
 def lit(share_by_frame, before=60.0, after=120.0, seed=0):
