@@ -82,7 +82,7 @@ def test_sound_that_is_not_finite_is_refused(tmp_path, odd):
     samples = np.zeros(RATE, np.float32)
     samples[RATE // 2] = odd
     path = filmed(tmp_path / "a.mkv", samples, codec="pcm_f32le")
-    with pytest.raises(RecordingError, match="camera 'a': expected sound of finite samples, found others in .*a.mkv"):
+    with pytest.raises(RecordingError, match="camera 'a': expected sound of finite samples, found others"):
         read_sound(path, "a")
 
 
