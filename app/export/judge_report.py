@@ -124,8 +124,9 @@ def _cropped(canvas: Image, px: Array) -> Image:
     """Return the part of a picture around points, at the height of the report."""
     low, high = px.min(axis=0), px.max(axis=0)
     margin = _MARGIN * float((high - low).max())
-    u0, v0 = np.maximum(low - margin, 0).astype(int)
-    u1, v1 = np.minimum(high + margin, canvas.shape[1::-1]).astype(int)
+    size = np.array(canvas.shape[1::-1])
+    u0, v0 = np.clip(low - margin, 0, size - 1).astype(int)  # joints may lie beside the picture
+    u1, v1 = np.minimum(high + margin, size).astype(int)
     part = canvas[v0 : max(v1, v0 + 1), u0 : max(u1, u0 + 1)]
     scale = _HEIGHT_PX / part.shape[0]
     return np.asarray(cv2.resize(part, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), dtype=np.uint8)
