@@ -254,7 +254,9 @@ def _new_cells(columns: Sequence[_Column], changes: Changes) -> dict[int, dict[i
     names = list(dict.fromkeys(c.point for c in columns))
     new: dict[int, dict[int, float]] = {}
     for row, people in changes.items():
-        for person, values in _with_free_individuals(people, len(individuals)):
+        free = sorted({*range(len(individuals))} - {k for k, _ in people})
+        problem = f"expected columns for a person who was not found, found those of {len(individuals)} others alone"
+        for person, values in with_free_places(people, range(len(individuals)), free, problem):
             for i, column in enumerate(columns):
                 if column.coordinate not in _COORDINATES:
                     continue
@@ -266,17 +268,21 @@ def _new_cells(columns: Sequence[_Column], changes: Changes) -> dict[int, dict[i
     return new
 
 
-def _with_free_individuals(some: Sequence[tuple[int, Array]], n: int) -> list[tuple[int, Array]]:
-    """Give those who were not found the first columns that are free: a table has columns for each individual.
+def with_free_places(
+    people: Sequence[tuple[int, Array]], present: Sequence[int], free: Sequence[int], problem: str
+) -> list[tuple[int, Array]]:
+    """Give those who were not found the first places that are free; return all by place.
+
+    Args:
+        people: numbers among those present, or -1, and their points.
+        present: place of each who is there.
+        free: other places.
+        problem: sentence on too few of them.
 
     Raises:
-        FormatError: no columns are left.
+        FormatError: no places are left.
     """
-    taken = {k for k, _ in some}
-    left = [k for k in range(n) if k not in taken]
-    if sum(k < 0 for k, _ in some) > len(left):
-        raise FormatError(
-            f"expected columns for a person who was not found, found those of {n} others alone",
-            Remedy("export_other_format"),
-        )
-    return [(k if k >= 0 else left.pop(0), values) for k, values in some]
+    if sum(k < 0 for k, _ in people) > len(free):
+        raise FormatError(problem, Remedy("export_other_format"))
+    left = iter(free)
+    return [(present[k] if k >= 0 else next(left), values) for k, values in people]

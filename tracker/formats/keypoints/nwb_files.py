@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from tracker.errors import FormatError, Remedy
-from tracker.formats.keypoints.deeplabcut import Changes
+from tracker.errors import FormatError
+from tracker.formats.keypoints.deeplabcut import Changes, with_free_places
 from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray
@@ -69,13 +69,8 @@ def patch_nwb(path: Path, changes: Mapping[int, Changes]) -> None:
             for row, people in rows.items():
                 present = np.flatnonzero(found[row].any(axis=1)).tolist()
                 free = [k for k in range(found.shape[1]) if k not in present]
-                for person, values in people:
-                    if person < 0 and not free:
-                        raise FormatError(
-                            f"expected a free person for one who was not found in picture {pictures[row]}, found none",
-                            Remedy("export_other_format"),
-                        )
-                    k = present[person] if person >= 0 else free.pop(0)
+                problem = f"expected a free person for one who was not found in picture {pictures[row]}, found none"
+                for k, values in with_free_places(people, present, free, problem):
                     for node, (x, y, confidence) in enumerate(values.tolist()):
                         if not np.isnan(confidence):
                             _set(video, k, node, int(pictures[row]), (x, y, confidence))

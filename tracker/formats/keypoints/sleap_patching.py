@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.errors import FormatError, Remedy
-from tracker.formats.keypoints.deeplabcut import Changes
+from tracker.formats.keypoints.deeplabcut import Changes, with_free_places
 from tracker.geometry.arrays import Array
 
 _Rows = NDArray[np.void]
@@ -54,10 +53,8 @@ def patch_analysis(path: Path, changes: Changes) -> None:
         for row, people in changes.items():
             k = int(numbers[row])
             present, free = np.flatnonzero(seen[:, k]).tolist(), np.flatnonzero(~seen[:, k]).tolist()
-            for person, values in people:
-                if person < 0 and not free:
-                    raise _no_room(f"a track for a person who was not found on frame {k}")
-                track = present[person] if person >= 0 else free.pop(0)
+            problem = f"expected a track for a person who was not found on frame {k}, found none"
+            for track, values in with_free_places(people, present, free, problem):
                 stays, absent = np.isnan(values[:, 2]), values[:, 2] == 0
                 xy = np.where(absent[:, None], np.nan, values[:, :2])
                 points[track, :, ~stays, k] = xy[~stays]
@@ -151,7 +148,3 @@ def _replace(file: Any, name: str, rows: _Rows) -> None:
     attributes = dict(table.attrs)
     del file[name]
     file.create_dataset(name, data=rows).attrs.update(attributes)
-
-
-def _no_room(expected: str) -> FormatError:
-    return FormatError(f"expected {expected}, found none", Remedy("export_other_format"))
