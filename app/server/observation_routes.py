@@ -24,7 +24,7 @@ from app.session.path_choice import TypedPaths, typed_paths
 from tracker.errors import TrackerError
 from tracker.formats.file_names import identifier
 from tracker.formats.joint_maps import known_joint_maps
-from tracker.formats.trc import METRES_BY_WORD
+from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.observations.request import ImportRequest
 from tracker.validation import FileStem, Name
 

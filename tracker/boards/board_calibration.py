@@ -14,11 +14,11 @@ from tracker.boards.view_choice import MAX_LENS_VIEWS, choose_frames, choose_vie
 from tracker.calibration.camera_columns import FOCAL
 from tracker.calibration.reprojection import column_ends
 from tracker.calibration.solvable import check_apart, solvable
-from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
+from tracker.geometry.lengths import USUAL_SIZES
 
 MIN_LENS_VIEWS = 5
 """Fewest views of the board from which a lens is fitted. Each determines two of its nine numbers (Zhang 2000, Sect.

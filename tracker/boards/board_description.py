@@ -10,10 +10,10 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from tracker.calibrations.usual_sizes import check_usual
 from tracker.errors import CalibrationError
 from tracker.formats.camera_section import METRES
 from tracker.geometry.arrays import Array
+from tracker.geometry.lengths import check_usual
 from tracker.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.validation import check
 

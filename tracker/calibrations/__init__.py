@@ -4,4 +4,4 @@ Imports `geometry` and `formats`; knows no session. `reading.read_cameras` reads
 `pose_conventions` tests where the cameras look and stand.
 """
 
-__all__ = ["calibration_layout", "convention_names", "pose_conventions", "reading", "usual_sizes", "writing"]
+__all__ = ["calibration_layout", "convention_names", "pose_conventions", "reading", "writing"]

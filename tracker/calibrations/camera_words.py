@@ -31,10 +31,10 @@ from tracker.calibrations.lens_words import (
     names_lens,
     spelled,
 )
-from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.geometry.lengths import USUAL_SIZES
 from tracker.validation import quoted
 
 Section: TypeAlias = dict[str, Any]

@@ -21,9 +21,9 @@ from tracker.calibrations.units import check_focal_lengths, check_units
 from tracker.errors import CalibrationError, Remedy
 from tracker.files import paths_in
 from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
-from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.validation import quoted, same_form
 
 _SUFFIXES = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".csv", ".calibration")

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import METRES, CameraEntry, Units
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import MIN_APART_M, axes_point
 from tracker.geometry.cameras import MAX_PINHOLE_ANGLE
+from tracker.geometry.lengths import USUAL_SIZES
 from tracker.validation import quoted
 
 _DISTANCE, _FOCAL = USUAL_SIZES["distance"], USUAL_SIZES["focal length"]

@@ -11,7 +11,7 @@ import numpy as np
 from tracker.errors import RecordingError
 from tracker.files import paths_in
 from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_image_or_none
-from tracker.formats.keypoints.picture_numbers import PictureNumbers, picture_numbers
+from tracker.footage.picture_numbers import PictureNumbers, picture_numbers
 from tracker.geometry.arrays import Image, IntArray
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from msgspec import Meta
 
 from tracker.errors import CalibrationError
-from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
+from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.geometry.lenses import coefficient_counts, count_words
 from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
 

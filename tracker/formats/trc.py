@@ -20,21 +20,10 @@ from tracker.files import write_text_atomic
 from tracker.formats.exact_text import exact_text, replace_cells
 from tracker.formats.number_rows import MAX_NAMES, MAX_TIME, NumberRows, not_a_number
 from tracker.geometry.arrays import Array
+from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, FrameRate, check, quoted
 
-METRES_BY_WORD = {
-    word: metres
-    for words, metres in (
-        ("m meter meters metre metres", 1.0),
-        ("cm centimeter centimeters centimetre centimetres", 0.01),
-        ("mm millimeter millimeters millimetre millimetres", 0.001),
-        ("in inch inches", 0.0254),
-        ("ft foot feet", 0.3048),
-    )
-    for word in words.split()
-}
-"""Metres per unit, by the words that OpenSim (`Units`) and others write, in any case."""
 _KIND = TextKind("TRC file", TABLE_BYTES, FormatError, "export it again")
 _Line: TypeAlias = tuple[int, str]
 """Number of a line in its file, from 1, and its text with its end."""

@@ -1,7 +1,7 @@
-"""Space without people: rotations and rigid motions, cameras, planes, solid primitives, distances to line segments.
+"""Space without people: rotations and rigid motions, cameras, planes, solid primitives, distances, sizes.
 
 Imports `compute`. Callers use the modules: `arrays`, `rigid`, `cameras`, `ground_plane`, `shapes`, `segment_distance`,
-`triangulation`.
+`triangulation`, `lengths`.
 """
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "euler",
     "framing",
     "ground_plane",
+    "lengths",
     "lens_tables",
     "lenses",
     "rigid",

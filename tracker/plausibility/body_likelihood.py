@@ -13,9 +13,9 @@ from scipy.stats import norm
 from tracker.acquisition.segment_lengths import SEGMENTS
 from tracker.acquisition.size_parameters import SizePriors
 from tracker.acquisition.typical_body import typical_body
-from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
+from tracker.geometry.lengths import USUAL_SIZES
 
 
 class PeoplePriors(NamedTuple):

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.errors import FormatError, Remedy
 from tracker.formats.file_axes import axes_matrix, is_mirrored
 from tracker.formats.joint_maps import JointMap, joint_maps_of_size
@@ -14,6 +13,7 @@ from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import floor_plane
+from tracker.geometry.lengths import USUAL_SIZES
 from tracker.observations.importing import plan_import
 from tracker.observations.joints import triangulate_observations
 from tracker.observations.observed import ObservationSet

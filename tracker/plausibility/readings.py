@@ -9,12 +9,11 @@ from typing import Protocol
 import numpy as np
 
 from tracker.acquisition.size_parameters import SizePriors
-from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.formats.file_axes import axes_matrix, axis_conventions
 from tracker.formats.joint_maps import JointMap
-from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.lengths import METRES_BY_WORD, USUAL_SIZES
 from tracker.observations.shifts import SAMPLES, vertex
 from tracker.observations.triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import (

@@ -10,12 +10,12 @@ from tracker.boards.footage_calibration import footage_paths
 from tracker.boards.lens_fit import blank_camera
 from tracker.calibration.solvable import solvable
 from tracker.calibrations.reading import read_cameras
-from tracker.calibrations.usual_sizes import check_heights
 from tracker.compute.progress import Report, part_of
 from tracker.errors import CalibrationError
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.geometry.cameras import Camera
+from tracker.geometry.lengths import check_heights
 from tracker.observations.importing import plan_import
 from tracker.observations.observed import ObservationSet
 from tracker.observations.plans import ImportPlan, MaskPlan

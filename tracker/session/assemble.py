@@ -7,7 +7,6 @@ from typing import TypeVar
 
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import CalibratedCameras, read_cameras
-from tracker.calibrations.usual_sizes import check_heights
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
@@ -17,6 +16,7 @@ from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS
+from tracker.geometry.lengths import check_heights
 from tracker.session.footage_clocks import (
     ClockStarts,
     check_chapters,

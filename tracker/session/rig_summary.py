@@ -7,13 +7,13 @@ from itertools import combinations
 import numpy as np
 
 from tracker.calibrations.pose_conventions import FITS_DEG
-from tracker.calibrations.usual_sizes import USUAL_SIZES
 from tracker.formats.camera_section import MAX_OFFSET
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import MIN_APART_M, axes_point
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS
+from tracker.geometry.lengths import USUAL_SIZES
 
 _MIN_PERSON_SHARE = 0.04
 """Share of the picture's longer side that a person fills, below which no limb can be seen: 40 of 1000 pixels."""

@@ -79,7 +79,7 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
     imported masks as silhouettes; quadrille relink SESSION --no-masks goes back to their backgrounds.
     """
     from app.session.import_summary import import_summary
-    from tracker.formats.trc import METRES_BY_WORD
+    from tracker.geometry.lengths import METRES_BY_WORD
     from tracker.observations.importing import store_import
     from tracker.observations.request import ImportRequest
     from tracker.plausibility.examine import plan_examined_import

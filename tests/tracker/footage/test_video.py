@@ -11,8 +11,8 @@ from clips import SIZE, N, encode, encode_stamped, number, picture, write_images
 from tracker.errors import RecordingError
 from tracker.footage.frame_reader import FrameReader
 from tracker.footage.image_folder import ImageFolder, missing_numbers
+from tracker.footage.picture_numbers import picture_numbers
 from tracker.footage.video import VideoFile, open_footage
-from tracker.formats.keypoints.picture_numbers import picture_numbers
 
 
 def decode_all(path):

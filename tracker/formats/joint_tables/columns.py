@@ -12,7 +12,7 @@ from typing import TypeAlias
 from tracker.errors import FormatError
 from tracker.formats.delimited import Delimited, TableLine
 from tracker.formats.number_rows import MAX_NAMES
-from tracker.formats.trc import METRES_BY_WORD
+from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.validation import quoted
 
 Triple: TypeAlias = tuple[int, int, int]

@@ -12,8 +12,8 @@ from tracker.formats.joint_tables.columns import named_columns
 from tracker.formats.joint_tables.layouts import WIDE, find_layout
 from tracker.formats.joint_tables.table_reading import read_table
 from tracker.formats.observation_layout import Sample
-from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry.arrays import Array
+from tracker.geometry.lengths import METRES_BY_WORD
 
 
 def patch_table(path: Path, unit_m: float | None, changes: Mapping[int, Array]) -> bytes:

@@ -15,6 +15,5 @@ __all__ = [
     "hdf5",
     "openpose",
     "picture_names",
-    "picture_numbers",
     "picture_table",
 ]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.formats.keypoints.picture_numbers import picture_numbers
+from tracker.footage.picture_numbers import picture_numbers
 
 CLOCK = [f"20240311_14253{k // 30}" for k in range(90)]
 

@@ -1,4 +1,4 @@
-"""Usual sizes of things that are filmed: another size is one in another unit, unless the user says that it is right."""
+"""Units of lengths, and the sizes that things usually have: another size is likely one in another unit."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -6,7 +6,19 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.errors import Remedy, TrackerError
-from tracker.formats.trc import METRES_BY_WORD
+
+METRES_BY_WORD = {
+    word: metres
+    for words, metres in (
+        ("m meter meters metre metres", 1.0),
+        ("cm centimeter centimeters centimetre centimetres", 0.01),
+        ("mm millimeter millimeters millimetre millimetres", 0.001),
+        ("in inch inches", 0.0254),
+        ("ft foot feet", 0.3048),
+    )
+    for word in words.split()
+}
+"""Metres per unit, by the words that programs write for it, in any case."""
 
 
 class UsualSize(NamedTuple):
