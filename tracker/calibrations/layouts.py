@@ -97,12 +97,3 @@ def layouts() -> tuple[CalibrationLayout, ...]:
 def find_layout(document: Document) -> CalibrationLayout | None:
     """Return the layout of a file by its content; None if it is of none."""
     return next((layout for layout in layouts() if layout.recognizes(document)), None)
-
-
-def markdown_table() -> str:
-    """Return the table for documents."""
-    rows = ["| layout | recognized by | poses | unit |", "|---|---|---|---|"]
-    for layout in layouts():
-        poses = f"`{layout.poses}`" if "=" in layout.poses else layout.poses
-        rows.append(f"| {layout.name} | {layout.recognized_by} | {poses} | {layout.unit or 'given, else m'} |")
-    return "\n".join(rows) + "\n"

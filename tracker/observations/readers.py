@@ -168,6 +168,9 @@ def _is_scene(sample: Sample) -> bool:
     return sample.suffix == ".json" and find_layout(sample) in SCENES
 
 
+_VIDEOS = (".mp4", ".avi", ".mov")
+_is_array = _is_text(".json", lambda head: "".join(head).replace(" ", "").startswith("[[["))
+_is_min = _is_json(hand_labels.is_json_min)
 _CAMERA, _PICTURE = "for each camera", "for each picture, as `CAMERA/CAMERA_000012`"
 _ALL = "one `.json` for all cameras, or one for each"
 _IN_SPACE = "see [Joints in space](#joints-in-space)"
@@ -224,29 +227,16 @@ MASK_FORMATS: Mapping[str, ObservationLayout[list[MaskFiles]]] = {
 FORMATS: Mapping[str, ObservationLayout[Any]] = {**PICTURE_FORMATS, **SPACE_FORMATS, **MASK_FORMATS}
 """The layouts that are read, by the name that is stored."""
 _OF_UNREAD = (".mat", ".pkl", ".pickle", ".pt", ".pth", ".xlsx", ".xls", ".fbx", ".glb", ".parquet", ".tak")
+_ARRAY = "the joints in space by numpy.save, as an array (frames, joints, 3)"
 _UNREAD: Sequence[ObservationLayout[Any]] = (
     _unread("AlphaPose's formats of OpenPose", "its results in its own format, which is the default", "bodies"),
     _unread("LabelMe", "COCO", "shapes", "imagePath"),
     _unread("VGG Image Annotator", "COCO", "_via_img_metadata"),
     _unread("Datumaro", "COCO or CVAT's XML", "items", "categories"),
-    ObservationLayout(
-        "a plain array in JSON",
-        "`.json`",
-        "lists of numbers alone",
-        _is_text(".json", lambda head: "".join(head).replace(" ", "").startswith("[[[")),
-        instead="the joints in space by numpy.save, as an array (frames, joints, 3)",
-    ),
-    ObservationLayout(
-        "Label Studio's JSON-MIN",
-        "`.json`",
-        "a list with `annotation_id`",
-        _is_json(hand_labels.is_json_min),
-        instead="JSON",
-    ),
+    ObservationLayout("a plain array in JSON", "`.json`", "lists of numbers alone", _is_array, instead=_ARRAY),
+    ObservationLayout("Label Studio's JSON-MIN", "`.json`", "a list with `annotation_id`", _is_min, instead="JSON"),
     ObservationLayout("PyTorch", "`.pt`, `.pth`", _END, _ends(".pt", ".pth"), instead="CSV or JSON"),
-    ObservationLayout(
-        "a video", "`.mp4`, `.avi`, `.mov`", _END, _ends(".mp4", ".avi", ".mov"), instead="a detector's key points"
-    ),
+    ObservationLayout("a video", "`.mp4`, `.avi`, `.mov`", _END, _ends(*_VIDEOS), instead="a detector's key points"),
 )
 UNREAD = (*NOT_READ, *_UNREAD)
 """Layouts that are known and not read."""
@@ -335,23 +325,9 @@ def _not_read(sample: Sample, advice: str) -> FormatError:
             data = read_json(sample.path, _JSON)
         except FormatError as error:
             return error
-        is_group = isinstance(data, dict)
-        found = (
-            f"JSON with the keys {quoted(', '.join(map(str, data)))}"
-            if is_group and data
-            else f"JSON with {quoted(data)}"
-        )
+        keys = ", ".join(map(str, data)) if isinstance(data, dict) else ""
+        found = f"JSON with the keys {quoted(keys)}" if keys else f"JSON with {quoted(data)}"
     return FormatError(
         f"file {sample.path}: expected key points, joints or masks of a program that docs/observations.md lists, found "
         f"{found}; {advice}export it in one of its formats"
     )
-
-
-def markdown_table() -> str:
-    """Return the table for documents."""
-    rows = ["| program | files | recognized by |", "|---|---|---|"]
-    rows += [f"| {row.program} | {row.files} | {row.recognized_by} |" for row in FORMATS.values()]
-    rows += [
-        f"| {row.program} | {row.files} | {row.recognized_by}; not read: export {row.instead} |" for row in _UNREAD
-    ]
-    return "\n".join(rows) + "\n"

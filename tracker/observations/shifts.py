@@ -239,16 +239,3 @@ def _is_clear(
         if not (np.isfinite(gain).all() and (gain.mean(axis=1) > 0).all() and (gain.mean(axis=0) > 0).all()):
             return False
     return True
-
-
-def is_clear_minimum(costs: Array, shift: int, known: int) -> bool:
-    """Return whether costs are lower at a shift than at the known one and at twice the way, in each stretch.
-
-    Args:
-        costs: (2 margin + 1, n_stretches), those of shift 0 in the middle.
-        shift: of the lowest row.
-        known: the one that is expected.
-    """
-    margin = len(costs) // 2
-    others = np.clip([known, 2 * shift - known], -margin, margin)
-    return bool((costs[others + margin] > costs[shift + margin]).all())

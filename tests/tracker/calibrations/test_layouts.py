@@ -18,11 +18,12 @@ from calibration_files import (
     rig_for,
     to_json,
 )
+from program_tables import calibration_table
 from rigs import cameras, looking, ring
 from stated_poses import CONVENTIONS, stated
 
 from tracker.calibrations.document import read_document
-from tracker.calibrations.layouts import find_layout, layouts, markdown_table
+from tracker.calibrations.layouts import find_layout, layouts
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
@@ -179,7 +180,7 @@ def test_five_hundred_cameras(tmp_path):
 
 def test_the_document_lists_the_table():
     text = (Path(__file__).resolve().parents[3] / "docs" / "recordings.md").read_text("utf-8")
-    assert markdown_table() in text
+    assert calibration_table() in text
 
 
 def halves():

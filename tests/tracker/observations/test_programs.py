@@ -16,6 +16,7 @@ from program_files import (
     write_hand_labels,
     write_sleap_csv,
 )
+from program_tables import observation_table
 
 from tracker.errors import FormatError
 from tracker.formats.keypoints.coco_reading import read_coco
@@ -23,7 +24,7 @@ from tracker.formats.keypoints.detections import read_yolo
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints
 from tracker.observations.readers import FORMATS as FORMATS_BY_NAME
-from tracker.observations.readers import PICTURE_FORMATS, UNREAD, find_files, markdown_table
+from tracker.observations.readers import PICTURE_FORMATS, UNREAD, find_files
 from tracker.observations.request import ImportRequest
 from tracker.observations.sources import match_cameras, numbered_groups
 
@@ -356,7 +357,7 @@ def test_stored_observations_keep_their_formats():
 def test_the_documents_list_all_programs():
     from architecture import ROOT
 
-    assert markdown_table() in (ROOT / "docs" / "observations.md").read_text()
+    assert observation_table() in (ROOT / "docs" / "observations.md").read_text()
     assert all(row.instead for row in UNREAD)
 
 

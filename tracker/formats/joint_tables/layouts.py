@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
-from tracker.errors import FormatError
 from tracker.files import open_regular
 from tracker.formats.joint_tables import columns as head
 from tracker.formats.joint_tables.arrays import is_array, read_array
@@ -116,18 +115,6 @@ def find_layout(sample: Sample) -> JointLayout | None:
     return next((layout for layout in LAYOUTS if layout.recognizes(sample)), None)
 
 
-def refuse_unread(sample: Sample) -> None:
-    """Name a file that is known and not read.
-
-    Raises:
-        FormatError: it is one.
-    """
-    for layout in NOT_READ:
-        if layout.recognizes(sample):
-            found = f"{layout.program} in {sample.path}; export {layout.instead}"
-            raise FormatError(f"expected joints, key points or masks, found {found}")
-
-
 def read_joint_files(paths: Sequence[Path], unit_m: float | None, rate: float) -> Scenes:
     """Read files of joints in space; several are of one person each, or of one frame each.
 
@@ -139,11 +126,3 @@ def read_joint_files(paths: Sequence[Path], unit_m: float | None, rate: float) -
         return read_scenes(paths, unit_m, rate)
     layouts = [(path, find_layout(Sample(path)) or WIDE) for path in paths]
     return [found for path, layout in layouts for found in layout.read([path], unit_m, rate)]
-
-
-def markdown_table() -> str:
-    """Return the table for documents."""
-    rows = ["| program | files | recognized by |", "|---|---|---|"]
-    rows += [f"| {x.program} | {x.files} | {x.recognized_by} |" for x in LAYOUTS]
-    rows += [f"| {x.program} | {x.files} | not read: export {x.instead} |" for x in NOT_READ]
-    return "\n".join(rows) + "\n"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from joint_files import IN_CM, IN_MM, KINDS, NUMBERED, OF_PEOPLE, write_joints
 from observed_people import BODY_25, walking
+from program_tables import joint_table
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.c3d import read_c3d
@@ -14,13 +15,12 @@ from tracker.formats.joint_tables.layouts import (
     NOT_READ,
     SCENES,
     find_layout,
-    markdown_table,
     read_joint_files,
-    refuse_unread,
 )
 from tracker.formats.joint_tables.subjects import by_subject
 from tracker.formats.observation_layout import Sample
 from tracker.geometry.arrays import DAMAGED_ARRAYS
+from tracker.observations.readers import find_files
 
 N = 6
 ONE = walking(N)
@@ -255,22 +255,22 @@ def test_the_size_of_an_array_is_checked_before_it_is_read(tmp_path):
 
 def test_files_that_are_not_read_are_named(tmp_path):
     for name, begin, expected in (
-        ("a.fbx", b"", "FBX in .*; export BVH"),
+        ("a.fbx", b"", "FBX, .*; export BVH"),
         ("fits", b"\x80\x04", "Python pickle, as fits of SMPL"),
-        ("a.mat", b"MATLAB 5.0", "MATLAB file .* export a CSV"),
+        ("a.mat", b"MATLAB 5.0", "MATLAB file, .* export a CSV"),
         ("a.tak", b"", "a project of Motive"),
     ):
         (tmp_path / name).write_bytes(begin)
         with pytest.raises(FormatError, match=expected):
-            refuse_unread(Sample(tmp_path / name))
+            find_files([tmp_path / name])
     (tmp_path / "a.txt").write_text("words")
-    refuse_unread(Sample(tmp_path / "a.txt"))
-    refuse_unread(Sample(tmp_path / "missing"))
+    for name in ("a.txt", "missing"):
+        assert not any(layout.recognizes(Sample(tmp_path / name)) for layout in NOT_READ)
 
 
 def test_the_table_for_documents():
-    table = markdown_table().splitlines()
+    table = joint_table().splitlines()
     text = (Path(__file__).resolve().parents[4] / "docs" / "observations.md").read_text("utf-8")
-    assert markdown_table() in text
+    assert joint_table() in text
     assert len(table) == 2 + len(LAYOUTS) + len(NOT_READ)
     assert all(line.count("|") == 4 for line in table)
