@@ -6,6 +6,8 @@ the page phrase it each in their own words (`app.remedies`), so that no message 
 command line prints message and remedy and exits with status 1; the page shows them as a notice.
 """
 
+from typing import Self
+
 
 class Remedy:
     """A way out of an error or a warning, for a program to phrase."""
@@ -47,6 +49,20 @@ class TrackerError(Exception):
         super().__init__(message)
         self.remedy = remedy
         self.camera = camera
+
+    @classmethod
+    def mismatch(cls, where: object, expected: object, found: object, advice: str | Remedy = "export it again") -> Self:
+        """Return the error of input that is another than expected.
+
+        Args:
+            where: names the input; empty if `expected` does.
+            expected: what was expected.
+            found: what is there instead.
+            advice: what to do, or its remedy.
+        """
+        place = f"{where}: " if where else ""
+        message = f"{place}expected {expected}, found {found}"
+        return cls(message, advice) if isinstance(advice, Remedy) else cls(f"{message}; {advice}")
 
 
 class CalibrationError(TrackerError):

@@ -9,7 +9,8 @@ import numpy as np
 import tomli_w
 from scipy.spatial.transform import Rotation
 
-from tracker.calibrations.writing import anipose_section, anipose_text, caliscope_text
+from tracker.calibrations.writing import anipose_text, caliscope_text
+from tracker.formats.anipose import anipose_section
 from tracker.geometry import rigid
 
 

@@ -195,10 +195,24 @@ def posed(T_camera_world: Array | None) -> Section:
     return {"rotation": T_camera_world[:3, :3].tolist(), "translation": T_camera_world[:3, 3].tolist()}
 
 
-def pinhole(name: str | None, size: Sequence[float] | None, K: Any, distortions: Sequence[float], T: Array) -> Section:
-    """Return a camera whose lens is no fisheye, with its pose from world to camera, (4, 4)."""
-    lens = {"matrix": np.asarray(K).tolist(), "distortions": list(distortions), "fisheye": False}
-    return {"name": name, "size": size} | lens | posed(T)
+def plain_camera(
+    name: str | None, size: Sequence[float] | None, K: Any, lens: Sequence[float], T: Array, fisheye: bool = False
+) -> Section:
+    """Return a camera with the coefficients of its lens and its pose from world to camera, (4, 4)."""
+    words = {"matrix": np.asarray(K).tolist(), "distortions": list(lens), "fisheye": fisheye}
+    return {"name": name, "size": size} | words | posed(T)
+
+
+def unit_rotation(document: Document, camera: str, key: str, wxyz: Sequence[float] | Array) -> Array:
+    """Return the rotation, (3, 3), of a quaternion.
+
+    Raises:
+        CalibrationError: its length is not 1.
+    """
+    if (R := rotation_of_quaternion(wxyz)) is None:
+        found = f"a norm of {np.linalg.norm(wxyz):.3g}"
+        raise refuse(document, camera, f"a unit quaternion as {key}", found, "export the file again")
+    return R
 
 
 def each(camera: Callable[[Document, str, Mapping[str, Any]], Section]) -> Callable[[Document], dict[str, Section]]:
@@ -349,11 +363,9 @@ def _check_focal(matrix: Any, camera: str, document: Document) -> None:
     K = plain_array(matrix)
     # The principal point lies near the middle; of pictures that are cut at a side it is up to twice as far.
     if K.shape == (3, 3) and 0 < K[0, 0] < USUAL_SIZES["focal length"].low * K[0, 2]:
-        raise refuse(
-            document, camera, "a focal length in pixels",
-            f"{K[0, 0]:.4g} of pictures that are some {2 * K[0, 2]:.0f} pixels wide, as in millimetres",
-            "multiply it by the width of the pictures over that of the sensor",
-        )  # fmt: skip
+        found = f"{K[0, 0]:.4g} of pictures that are some {2 * K[0, 2]:.0f} pixels wide, as in millimetres"
+        advice = "multiply it by the width of the pictures over that of the sensor"
+        raise refuse(document, camera, "a focal length in pixels", found, advice)
 
 
 def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, document: Document) -> tuple[Any, Any]:

@@ -11,15 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tracker.calibrations.camera_matrices import homogeneous, is_transposed, plain_array
-from tracker.calibrations.camera_words import (
-    Section,
-    camera_groups,
-    known_values,
-    once,
-    plain_text,
-    posed,
-    section_of,
-)  # fmt: skip
+from tracker.calibrations.camera_words import Section, camera_groups, known_values, once, plain_text, posed, section_of
 from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -120,10 +112,8 @@ def read_mc_calib(document: Document) -> dict[str, Section]:
     cameras = {n: g for n, g in document.groups.items() if "camera_matrix" in g or "camera_pose_matrix" in g}
     groups = {plain_text(group.get("camera_group", 0)) for group in cameras.values()}
     if len(groups) > 1:
-        raise refuse(
-            document, None, "one group of cameras", f"{len(groups)} (camera_group), each with a world of its own",
-            "film the boards so that all cameras are connected",
-        )  # fmt: skip
+        seen = f"{len(groups)} (camera_group), each with a world of its own"
+        raise refuse(document, None, "one group of cameras", seen, "film the boards so that all cameras are connected")
     found = {}
     for name, group in cameras.items():
         T_world_camera = homogeneous(group.get("camera_pose_matrix"))

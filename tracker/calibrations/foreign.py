@@ -76,18 +76,14 @@ def refuse_program(path: Path, data: Any) -> None:
     if not isinstance(data, dict):
         return
     if {"camera_matrix", "distortion_model", "projection_matrix"} <= data.keys():
-        raise named(
-            path, "the lens of one camera as ROS writes it (camera_info), without its pose",
-            "calibrate the cameras together, by a board or by people",
-        )  # fmt: skip
+        found = "the lens of one camera as ROS writes it (camera_info), without its pose"
+        raise named(path, found, "calibrate the cameras together, by a board or by people")
     first = next(iter(data.values()), None)
     if isinstance(first, dict) and {"T_imu_cam", "intrinsics"} <= first.keys():
         raise named(path, "the cameras of Basalt, whose poses are those within one moving rig", _TO_JSON)
     if isinstance(first, dict) and {"input", "world"} <= first.keys():
-        raise named(
-            path, "the poses of ZED cameras without their lenses",
-            f"{_TO_JSON}, with the lenses of each camera's own file (SN*.conf)",
-        )  # fmt: skip
+        advice = f"{_TO_JSON}, with the lenses of each camera's own file (SN*.conf)"
+        raise named(path, "the poses of ZED cameras without their lenses", advice)
 
 
 def foreign(path: Path, data: Any) -> CalibrationError:
@@ -103,15 +99,11 @@ def foreign(path: Path, data: Any) -> CalibrationError:
         if isinstance(frames, list) and any(isinstance(f, dict) and "transform_matrix" in f for f in frames):
             return named(path, "a transforms.json of NeRF tools, whose scale is not known", "calibrate with a board")
         if {"M1", "D1", "M2", "D2"} <= data.keys() or {"R1", "R2", "P1", "P2"} <= data.keys():
-            return named(
-                path,
-                "one half of a stereo calibration of OpenCV",
-                "write both cameras to one file: K, distortion, R and t; R = I and t = 0 for the first",
-            )
+            advice = "write both cameras to one file: K, distortion, R and t; R = I and t = 0 for the first"
+            return named(path, "one half of a stereo calibration of OpenCV", advice)
         if "camera_count" in data or "charuco" in data:
-            return named(
-                path, "the settings of a Caliscope project without cameras", "give the camera_array.toml beside it"
-            )
+            found = "the settings of a Caliscope project without cameras"
+            return named(path, found, "give the camera_array.toml beside it")
     if isinstance(data, str):
         found = "another kind of file" if data.strip() else "an empty file"
         return named(path, found, "export the calibration again")

@@ -8,8 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tracker.calibrations.camera_matrices import rotation_of_quaternion
-from tracker.calibrations.camera_words import Section, pinhole, unusable
+from tracker.calibrations.camera_words import Section, plain_camera, unit_rotation, unusable
 from tracker.calibrations.document import Document, refuse
 from tracker.calibrations.pose_conventions import OPENGL
 from tracker.geometry import rigid
@@ -20,10 +19,8 @@ _SUBPIXELS = 64.0
 
 def is_qualisys(document: Document) -> bool:
     """Return whether the data are XML of QTM."""
-    root = document.data
-    return (
-        isinstance(root, ElementTree.Element) and root.tag == "calibration" and root.find("cameras/camera") is not None
-    )
+    root, at = document.data, "cameras/camera"
+    return isinstance(root, ElementTree.Element) and root.tag == "calibration" and root.find(at) is not None
 
 
 def read_qualisys(document: Document) -> dict[str, Section]:
@@ -45,29 +42,25 @@ def read_qualisys(document: Document) -> dict[str, Section]:
             found[name] = unusable(name)
             continue
         if camera.get("viewrotation") not in (None, "", "0", "none"):
-            found[name] = unusable(
-                name,
-                f"camera '{name}' is turned by {camera.get('viewrotation')} degrees in QTM, which says "
-                "nothing of its video; convert the calibration with Pose2Sim",
-            )
+            turned = f"is turned by {camera.get('viewrotation')} degrees in QTM, which says nothing of its video"
+            found[name] = unusable(name, f"camera '{name}' {turned}; convert the calibration with Pose2Sim")
             continue
         transform, intrinsic = (_Numbers(document, name, attributes[tag]) for tag in ("transform", "intrinsic"))
         view = _Numbers(document, name, _attributes(camera, "fov_video") or _attributes(camera, "fov_marker"))
         left, top = view["left"], view["top"]
         size = [view["right"] - left + 1, view["bottom"] - top + 1]
         subpixels = _subpixels(intrinsic, size, document, name)
-        fu, fv, cu, cv = (
-            intrinsic[k] / subpixels for k in ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV")
-        )
+        fu, fv, cu, cv = (intrinsic[k] / subpixels for k in _MATRIX)
         lens = np.array([intrinsic.get(k) for k in _LENS])
         R = OPENGL[:3, :3] @ np.array([[transform[f"r{i}{j}"] for j in (1, 2, 3)] for i in (1, 2, 3)])
         position = np.array([transform[k] for k in "xyz"])
         K = [[fu, 0.0, cu - left], [0.0, fv, cv - top], [0.0, 0.0, 1.0]]
         lens = lens / (_SUBPIXELS if by_pose2sim else 1.0)
-        found[name] = pinhole(name, size, K, lens.tolist(), rigid.transform(R, -R @ position))
+        found[name] = plain_camera(name, size, K, lens.tolist(), rigid.transform(R, -R @ position))
     return found
 
 
+_MATRIX = ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV")
 _LENS = (
     "radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2", "radialDistortion3",
 )  # fmt: skip
@@ -82,10 +75,11 @@ def _subpixels(intrinsic: "_Numbers", size: list[float], document: Document, nam
     for unit in (_SUBPIXELS, 1.0):
         if abs(ratio / unit - 1) < 0.02:
             return unit
-    raise refuse(
-        document, name, "a sensor as wide as the video in pixels or 64ths of them", f"{ratio:.3g} units per pixel",
+    expected, advice = (
+        "a sensor as wide as the video in pixels or 64ths",
         "export the calibration for the size of the video",
-    )  # fmt: skip
+    )
+    raise refuse(document, name, f"{expected} of them", f"{ratio:.3g} units per pixel", advice)
 
 
 def is_vicon(document: Document) -> bool:
@@ -105,22 +99,18 @@ def read_vicon(document: Document) -> dict[str, Section]:
             continue
         lens = _words(frame.get("VICON_RADIAL2"))[2:] + _words(frame.get("VICON_RADIAL"))
         if np.any(lens):
-            found[name] = unusable(
-                name,
-                f"camera '{name}' has Vicon's lens model, whose coefficients are not those of OpenCV; "
-                "undistort the footage, or convert the calibration with Pose2Sim (convert_from = 'vicon')",
-            )
+            other = "has Vicon's lens model, whose coefficients are not those of OpenCV"
+            advice = "undistort the footage, or convert the calibration with Pose2Sim (convert_from = 'vicon')"
+            found[name] = unusable(name, f"camera '{name}' {other}; {advice}")
             continue
         values = _Numbers(document, name, {**camera.attrib, **frame.attrib})
         quaternion = np.roll(values.row("ORIENTATION", 4), 1)
-        if (R := rotation_of_quaternion(quaternion)) is None:
-            expected, found_norm = "a unit quaternion as ORIENTATION", f"a norm of {np.linalg.norm(quaternion):.3g}"
-            raise refuse(document, name, expected, found_norm, "export the file again")
+        R = unit_rotation(document, name, "ORIENTATION", quaternion)
         (focal,), (cu, cv) = values.row("FOCAL_LENGTH", 1), values.row("PRINCIPAL_POINT", 2)
         ratio = values.get("PIXEL_ASPECT_RATIO") or 1.0
         K = [[focal, 0.0, cu], [0.0, focal / ratio, cv], [0.0, 0.0, 1.0]]
         T_camera_world = rigid.transform(R, -R @ np.array(values.row("POSITION", 3)))
-        found[name] = pinhole(name, values.row("SENSOR_SIZE", 2), K, [], T_camera_world)
+        found[name] = plain_camera(name, values.row("SENSOR_SIZE", 2), K, [], T_camera_world)
     return found
 
 

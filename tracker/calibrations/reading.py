@@ -28,6 +28,7 @@ from tracker.validation import quoted, same_form
 
 _SUFFIXES = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".csv", ".calibration")
 """Files of a folder that may hold a calibration; the others are not opened."""
+_CORRECT_POSE = "correct its pose, or remove the camera"
 _MAX_FILES = 1000
 """Most files of a folder that are looked at, which bounds time."""
 
@@ -173,9 +174,8 @@ def _sections(
         for name, section in layout.read(document).items():
             name = name or stem
             if name in found:
-                raise CalibrationError(
-                    f"{document.where}: camera '{name}' is in two files or twice; give each camera its own name"
-                )
+                twice = f"camera '{name}' is in two files or twice"
+                raise CalibrationError(f"{document.where}: {twice}; give each camera its own name")
             found[name] = section | {"name": same_form(plain_text(section.get("name") or name))}
     return layout, found
 
@@ -214,19 +214,17 @@ def _reason(section: Section) -> str | None:
 def _nothing_usable(sections: dict[str, Section], document: Document) -> CalibrationError:
     """Return the error of a file all of whose cameras lack the same."""
     if not sections:
-        return refuse(
-            document, None, "one section for each camera", "none", "export it in a layout that docs/recordings.md lists"
-        )
+        advice = "export it in a layout that docs/recordings.md lists"
+        return refuse(document, None, "one section for each camera", "none", advice)
     name, section = next(iter(sections.items()))
     if "refusal" in section:
         return CalibrationError(f"{document.where}: {section['refusal']}")
     if section["matrix"] is None:
         expected, advice = "its matrix under a key such as K or camera_matrix", "give the file of the intrinsics too"
         return refuse(document, name, expected, "none", f"{advice}, or one file with both")
-    return refuse(
-        document, name, "its pose under keys such as R and t (X_camera = R X_world + t)", "the lens alone",
-        "if its poses lie elsewhere, move them to the cameras; else calibrate the cameras together",
-    )  # fmt: skip
+    expected = "its pose under keys such as R and t (X_camera = R X_world + t)"
+    advice = "if its poses lie elsewhere, move them to the cameras; else calibrate the cameras together"
+    return refuse(document, name, expected, "the lens alone", advice)
 
 
 def _stated_metres(sections: dict[str, Section], where: str) -> float | None:
@@ -241,10 +239,8 @@ def _stated_metres(sections: dict[str, Section], where: str) -> float | None:
         return None
     if None in metres or len(metres) > 1:
         found = " and ".join(quoted(word) for word in sorted(words))
-        raise CalibrationError(
-            f"{where}: expected one unit of its translations such as m, cm, mm, in or ft, found {found}",
-            Remedy("scale_calibration", units=", ".join(METRES)),
-        )
+        expected = "one unit of its translations such as m, cm, mm, in or ft"
+        raise CalibrationError.mismatch(where, expected, found, Remedy("scale_calibration", units=", ".join(METRES)))
     return metres.pop()
 
 
@@ -279,22 +275,17 @@ def _with_convention(
         is_turned = not layout.has_opencv_poses
         words = (where, layout.poses_in_words, layout.by_program, is_turned)
         refuse_angles(sections, stated, where)
-        odd = odd_camera(stated)
+        odd, elsewhere = odd_camera(stated), "looks elsewhere than all others, which see one place"
         try:
             notes = [check_convention(stated, *words), check_turned([entry.T_world_camera for entry in entries], where)]
         except CalibrationError:
             _refuse_placeholder(entries, stated, words)
             if odd is not None:
-                raise CalibrationError(
-                    f"{where}, camera {quoted(entries[odd].name)}: expected its pose, found one by which it looks "
-                    "elsewhere than all others, which see one place; correct its pose, or remove the camera"
-                ) from None
+                place, found = f"{where}, camera {quoted(entries[odd].name)}", f"one by which it {elsewhere}"
+                raise CalibrationError.mismatch(place, "its pose", found, _CORRECT_POSE) from None
             raise
         if odd is not None:
-            notes.append(
-                f"Camera {quoted(entries[odd].name)} looks elsewhere than all others, which see one place: check its "
-                "pose."
-            )
+            notes.append(f"Camera {quoted(entries[odd].name)} {elsewhere}: check its pose.")
         return entries, [note for note in notes if note is not None]
     changed = [rigid.inverse(read_pose(T, poses)) for T in stated]
     return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), []
@@ -329,7 +320,5 @@ def _refuse_placeholder(
     except CalibrationError:
         return
     name = entries[unturned.index(True)].name
-    raise CalibrationError(
-        f"{words[0]}, camera {quoted(name)}: expected its pose, found no rotation, as of a camera that is not "
-        "calibrated, while the others see one place; correct its pose, or remove the camera"
-    )
+    found = "no rotation, as of a camera that is not calibrated, while the others see one place"
+    raise CalibrationError.mismatch(f"{words[0]}, camera {quoted(name)}", "its pose", found, _CORRECT_POSE)

@@ -56,11 +56,9 @@ def with_quaternions(sections: Mapping[str, Section], where: str, poses: PoseCon
     fits = {words: best_cost(rig, poses)[0] if n_cameras > 1 else 0.0 for words, rig in rigs.items()}
     chosen, other = sorted(_ORDERS, key=lambda words: fits[words])
     if not is_clearly_worse(fits[other], fits[chosen], n_cameras):
-        raise CalibrationError(
-            f"{where}: expected rotations as 3x3 matrices or rotation vectors, found quaternions whose numbers may be "
-            f"{' or '.join(_ORDERS)}",
-            Remedy("name_quaternion"),
-        )
+        found = f"quaternions whose numbers may be {' or '.join(_ORDERS)}"
+        expected = "rotations as 3x3 matrices or rotation vectors"
+        raise CalibrationError.mismatch(where, expected, found, Remedy("name_quaternion"))
     return {
         name: section | ({"rotation": turned[chosen][name].tolist()} if name in quaternions else {})
         for name, section in sections.items()
@@ -95,11 +93,9 @@ def refuse_angles(sections: Mapping[str, Section], Ts_stated: Sequence[Array], w
     cost, convention = fits[order]
     if is_clearly_worse(best_cost(Ts_stated)[0], cost, len(vectors)):
         product = " ".join(f"R{'xyz'[axis]}" for axis in order)
-        raise CalibrationError(
-            f"{where}: expected rotation vectors (Rodrigues), by which the cameras see no one place, found that they "
-            f"do if the numbers are angles about x, y and z (R = {product}, with {in_words(convention)}); rewrite the "
-            "rotations as 3x3 matrices"
-        )
+        found = f"that they do if the numbers are angles about x, y and z (R = {product}, with {in_words(convention)})"
+        expected = "rotation vectors (Rodrigues), by which the cameras see no one place"
+        raise CalibrationError.mismatch(where, expected, found, "rewrite the rotations as 3x3 matrices")
 
 
 def _by_angles(angles: Array, order: Sequence[int]) -> Array:
@@ -132,8 +128,5 @@ def check_turned(Ts_world_camera: Sequence[Array], where: str) -> str | None:
     along = max(reach[0], reach[1])
     if along > ROUNDING * np.abs(Ts[:, :3, 3]).max() and min(reach[0], reach[1]) + reach[2] <= _ALONG * along:
         return f"{found.capitalize()}: check that the cameras are parallel, as rectified ones are."
-    raise CalibrationError(
-        f"{where}: expected the rotation of each camera, found that {found}, while the cameras do not stand in a row "
-        "as rectified ones do",
-        Remedy("keep_rotations"),
-    )
+    seen = f"that {found}, while the cameras do not stand in a row as rectified ones do"
+    raise CalibrationError.mismatch(where, "the rotation of each camera", seen, Remedy("keep_rotations"))

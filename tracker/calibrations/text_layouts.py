@@ -12,8 +12,8 @@ from pathlib import PurePath
 
 import numpy as np
 
-from tracker.calibrations.camera_matrices import ProjectionError, rotation_of_quaternion, split_projection
-from tracker.calibrations.camera_words import Section, once, pinhole, unusable
+from tracker.calibrations.camera_matrices import ProjectionError, split_projection
+from tracker.calibrations.camera_words import Section, once, plain_camera, unit_rotation, unusable
 from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
 from tracker.geometry.camera_rig import axes_point
@@ -90,14 +90,13 @@ def _skeletool_camera(document: Document, values: Mapping[str, str]) -> tuple[st
         return name, unusable(name, f"camera '{name}' moves during the recording (animated); film with one that stands")
     lens = [key for key in values if key.startswith(_OF_FISHEYE)]
     if lens or any(_numbers(values.get("radial", "0"))):
+        found = f"Skeletool's lens model ({(lens or ['radial'])[0]}), whose coefficients are not those of OpenCV"
         return name, unusable(
-            name,
-            f"camera '{name}' has Skeletool's lens model ({(lens or ['radial'])[0]}), whose coefficients are not those "
-            "of OpenCV; undistort the footage, and set the coefficients to 0",
+            name, f"camera '{name}' has {found}; undistort the footage, and set the coefficients to 0"
         )
     K, T = (_row(document, name, key, values.get(key, ""), 16) for key in ("intrinsic", "extrinsic"))
     size = _row(document, name, "size", values.get("size", ""), 2)
-    return name, pinhole(name, size, np.reshape(K, (4, 4))[:3, :3], [], np.reshape(T, (4, 4)))
+    return name, plain_camera(name, size, np.reshape(K, (4, 4))[:3, :3], [], np.reshape(T, (4, 4)))
 
 
 # --- MayaCam --------------------------------------------------------------------------------------------------------
@@ -120,7 +119,7 @@ def read_mayacam2(document: Document) -> dict[str, Section]:
         for key, count in zip(_MAYACAM, (2, 9, 9, 3), strict=True)
     )
     T = rigid.transform(np.reshape(R, (3, 3)), np.array(t))
-    return {"": pinhole(None, size, np.reshape(K, (3, 3)), [], T)}
+    return {"": plain_camera(None, size, np.reshape(K, (3, 3)), [], T)}
 
 
 def is_mayacam1(document: Document) -> bool:
@@ -139,7 +138,7 @@ def read_mayacam1(document: Document) -> dict[str, Section]:
     x, y, turn = (rigid.so3_exp(np.radians(a) * axis) for a, axis in zip(angles, np.eye(3), strict=True))
     R = np.diag([1.0, -1.0, -1.0]) @ (turn @ y @ x).T
     K = np.array([[-z, 0.0, u0 - 1], [0.0, -z, height - v0], [0.0, 0.0, 1.0]])
-    return {"": pinhole(None, [width, height], K, [], rigid.transform(R, -R @ np.array(place)))}
+    return {"": plain_camera(None, [width, height], K, [], rigid.transform(R, -R @ np.array(place)))}
 
 
 # --- DLT ------------------------------------------------------------------------------------------------------------
@@ -166,14 +165,12 @@ def read_dlt(document: Document) -> dict[str, Section]:
             found[name] = unusable(name, f"camera '{name}': {error}; calibrate it again")
             continue
         Ts.append(rigid.inverse(T))
-        found[name] = pinhole(name, None, K, [], T)
+        found[name] = plain_camera(name, None, K, [], T)
     point = axes_point(Ts) if len(Ts) > 1 else None
     if point is not None and point.is_determined and point.angles_rad.min() > np.pi / 2:
-        raise refuse(
-            document, None, "cameras that look at what they film", "that all look away from it, as of coefficients "
-            "whose rows are counted from the bottom of the picture", "replace rows 5 to 8 by (height - 1) times rows "
-            "9, 10, 11 and 1, less rows 5 to 8",
-        )  # fmt: skip
+        found = "that all look away from it, as of coefficients whose rows are counted from the bottom of the picture"
+        advice = "replace rows 5 to 8 by (height - 1) times rows 9, 10, 11 and 1, less rows 5 to 8"
+        raise refuse(document, None, "cameras that look at what they film", found, advice)
     return found
 
 
@@ -209,20 +206,9 @@ def read_colmap(document: Document) -> dict[str, Section]:
     are_together = len({PurePath(row[9]).parent for row in pictures}) == 1
     if not pictures:
         return {f"camera {key}": _colmap_camera(document, f"camera {key}", row, None) for key, row in lenses.items()}
-    return once(
-        document,
-        (
-            (
-                name := _colmap_name(PurePath(row[9]), are_together),
-                _colmap_camera(document, name, lenses.get(row[8]), row[1:8]),
-            )
-            for row in pictures
-        ),
-    )
-
-
-def _colmap_name(picture: PurePath, are_together: bool) -> str:
-    return picture.stem if are_together else picture.parent.name or picture.stem
+    names = [p.stem if are_together else p.parent.name or p.stem for p in (PurePath(row[9]) for row in pictures)]
+    posed = zip(names, pictures, strict=True)
+    return once(document, ((n, _colmap_camera(document, n, lenses.get(row[8]), row[1:8])) for n, row in posed))
 
 
 def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, pose: Sequence[str] | None) -> Section:
@@ -232,23 +218,19 @@ def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, po
         return unusable(name, f"{name} has no pose; give the images.txt beside the cameras.txt")
     words = _COLMAP.get(lens[1], "").split()
     if not words:
-        return unusable(
-            name, f"camera '{name}' has COLMAP's lens {lens[1]}, which OpenCV does not know; undistort the pictures"
-        )
+        found = f"COLMAP's lens {lens[1]}, which OpenCV does not know"
+        return unusable(name, f"camera '{name}' has {found}; undistort the pictures")
     numbers = dict(zip(words, _row(document, name, lens[1], " ".join(lens[4:]), len(words)), strict=True))
     *quaternion, x, y, z = _row(document, name, "pose", " ".join(pose), 7)
-    if (R := rotation_of_quaternion(quaternion)) is None:
-        found = f"a norm of {np.linalg.norm(quaternion):.3g}"
-        raise refuse(document, name, "a unit quaternion", found, "export the file again")
+    R = unit_rotation(document, name, "pose", quaternion)
     fx, fy = (numbers.get(key, numbers.get("f", 0.0)) for key in ("fx", "fy"))
     # COLMAP's corner of the picture is at 0, 0, and the centre of its first pixel at 0.5, 0.5.
     K = np.array([[fx, 0.0, numbers["cx"] - 0.5], [0.0, fy, numbers["cy"] - 0.5], [0.0, 0.0, 1.0]])
     fisheye = lens[1].endswith("FISHEYE")
     order = _FISHEYE_ORDER if fisheye else _ORDER[: 8 if "k3" in numbers else 4]
     size = _row(document, name, "size", " ".join(lens[2:4]), 2)
-    lens_of = [numbers.get(key, 0.0) for key in order]
-    found = pinhole(name, size, K, lens_of, rigid.transform(R, np.array([x, y, z])))
-    return found | {"fisheye": fisheye}
+    T = rigid.transform(R, np.array([x, y, z]))
+    return plain_camera(name, size, K, [numbers.get(key, 0.0) for key in order], T, fisheye)
 
 
 # --- Ego-Exo4D ------------------------------------------------------------------------------------------------------
@@ -274,9 +256,7 @@ def _egoexo_camera(document: Document, row: Mapping[str, str | None]) -> tuple[s
         lens = quoted(row.get("intrinsics_type"))
         return name, unusable(name, f"camera '{name}' has the lens {lens}, not KANNALABRANDTK3; undistort the footage")
     fx, fy, cx, cy, *lens = numbers(*(f"intrinsics_{i}" for i in range(8)))
-    R = rotation_of_quaternion(numbers(*(f"q{axis}_world_cam" for axis in "wxyz")))
-    if R is None:
-        raise refuse(document, name, "a unit quaternion", "another length", "export the file again")
+    R = unit_rotation(document, name, "qw_world_cam", numbers(*(f"q{axis}_world_cam" for axis in "wxyz")))
     T = rigid.inverse(rigid.transform(R, np.array(numbers(*(f"t{axis}_world_cam" for axis in "xyz")))))
     K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-    return name, pinhole(name, numbers("image_width", "image_height"), K, lens, T) | {"fisheye": True}
+    return name, plain_camera(name, numbers("image_width", "image_height"), K, lens, T, fisheye=True)

@@ -27,16 +27,14 @@ def read_caliscope(document: Document) -> dict[str, Section]:
 
 def is_pyxy3d(document: Document) -> bool:
     """Return whether numbered cameras lie beside other sections at the top."""
-    return document.syntax == "toml" and any(
-        is_camera(group) and any(number in group for number in _CALISCOPE_NUMBERS) for group in document.groups.values()
-    )
+    cameras = filter(is_camera, document.groups.values())
+    return document.syntax == "toml" and any(number in camera for camera in cameras for number in _CALISCOPE_NUMBERS)
 
 
 def is_freemocap(document: Document) -> bool:
     """Return whether the metadata are those of FreeMoCap."""
-    return is_anipose(document) and any(
-        spelled(key).startswith("charuco") for key in document.groups.get("metadata", {})
-    )
+    metadata = document.groups.get("metadata", {})
+    return is_anipose(document) and any(spelled(key).startswith("charuco") for key in metadata)
 
 
 def is_anipose(document: Document) -> bool:
@@ -50,21 +48,11 @@ def read_top_sections(document: Document) -> dict[str, Section]:
     Raises:
         CalibrationError: a key or value that changes the meaning is not understood.
     """
-    if lone := next(
-        (
-            key
-            for key, v in document.data.items()
-            if not isinstance(v, dict) and not is_understood(key, v) and is_unknown(key, v)
-        ),
-        None,
-    ):
-        raise refuse(document, None, "known keys of a lens or a convention", quoted(lone), "remove it")
-    groups = {
-        key: group
-        for key, group in document.groups.items()
-        if key.lower() != "metadata" and (_CAMERA_KEYS & group.keys())
-    }
-    return _sections(groups, document)
+    for key, value in document.data.items():
+        if not isinstance(value, dict) and not is_understood(key, value) and is_unknown(key, value):
+            raise refuse(document, None, "known keys of a lens or a convention", quoted(key), "remove it")
+    groups = document.groups.items()
+    return _sections({k: g for k, g in groups if k.lower() != "metadata" and _CAMERA_KEYS & g.keys()}, document)
 
 
 def _sections(groups: Mapping[str, Mapping[str, Any]], document: Document) -> dict[str, Section]:

@@ -72,11 +72,10 @@ def check_focal_lengths(entries: Sequence[CameraEntry], where: str) -> None:
         # Pictures of a fisheye that a program has undistorted are wider than those of any lens without distortion.
         low = _FOCAL.low if np.any(entry.distortion) else round(0.5 / np.tan(MAX_PINHOLE_ANGLE), 2)
         if share > _FOCAL.high or (share < low and not entry.fisheye):
-            raise CalibrationError(
-                f"{where}, camera {quoted(entry.name)}: expected a focal length of {low:g} to {_FOCAL.high:g} "
-                f"times the longer side of the picture, found {share:.2g} times ({entry.K[0, 0]:.5g} px of {side:.0f})",
-                Remedy("any_size"),
-            )
+            expected = f"a focal length of {low:g} to {_FOCAL.high:g} times the longer side of the picture"
+            found = f"{share:.2g} times ({entry.K[0, 0]:.5g} px of {side:.0f})"
+            here = f"{where}, camera {quoted(entry.name)}"
+            raise CalibrationError.mismatch(here, expected, found, Remedy("any_size"))
 
 
 def _distance(entries: Sequence[CameraEntry]) -> tuple[float, str, bool]:

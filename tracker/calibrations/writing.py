@@ -10,20 +10,8 @@ import numpy as np
 import tomli_w
 
 from tracker.files import write_text_atomic
-from tracker.formats.anipose import format_calibration
-from tracker.geometry import rigid
+from tracker.formats.anipose import anipose_section, format_calibration
 from tracker.geometry.cameras import Camera
-
-
-def anipose_section(camera: Camera) -> dict[str, Any]:
-    """Return a camera in anipose's keys."""
-    return {
-        "size": list(camera.size),
-        "matrix": camera.K.tolist(),
-        "distortions": camera.distortion.tolist(),
-        "rotation": rigid.so3_log(camera.T_camera_world[:3, :3]).tolist(),
-        "translation": camera.T_camera_world[:3, 3].tolist(),
-    }
 
 
 def anipose_text(cameras: Sequence[Camera], metadata: Mapping[str, Any] | None = None) -> str:

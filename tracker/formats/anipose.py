@@ -49,17 +49,20 @@ def format_calibration(cameras: Sequence[Camera]) -> str:
     """Format cameras as `write_calibration` writes them."""
     data: dict[str, Any] = {}
     for c in cameras:
-        data[c.name] = {
-            "name": c.name,
-            "size": [float(c.width), float(c.height)],
-            "matrix": c.K.tolist(),
-            "distortions": c.distortion.tolist(),
-            "rotation": rigid.so3_log(c.T_camera_world[:3, :3]).tolist(),
-            "translation": c.T_camera_world[:3, 3].tolist(),
-            "fisheye": c.fisheye,
-        }
-    data["metadata"] = {"adjusted": False, "error": 0.0}
-    return tomli_w.dumps(data)
+        size = [float(side) for side in c.size]
+        data[c.name] = {"name": c.name, **anipose_section(c), "size": size, "fisheye": c.fisheye}
+    return tomli_w.dumps({**data, "metadata": {"adjusted": False, "error": 0.0}})
+
+
+def anipose_section(camera: Camera) -> dict[str, Any]:
+    """Return a camera in anipose's keys."""
+    return {
+        "size": list(camera.size),
+        "matrix": camera.K.tolist(),
+        "distortions": camera.distortion.tolist(),
+        "rotation": rigid.so3_log(camera.T_camera_world[:3, :3]).tolist(),
+        "translation": camera.T_camera_world[:3, 3].tolist(),
+    }
 
 
 def _sections(data: dict[str, Any], where: str) -> dict[str, Any]:
@@ -70,13 +73,9 @@ def _sections(data: dict[str, Any], where: str) -> dict[str, Any]:
     """
     sections = {name: section for name, section in data.items() if name.lower() != "metadata"}
     if not sections:
-        raise CalibrationError(
-            f"{where}: expected one section per camera, such as [cam01], found none; "
-            "export it in the anipose or Pose2Sim layout"
-        )
+        advice = "export it in the anipose or Pose2Sim layout"
+        raise CalibrationError.mismatch(where, "one section per camera, such as [cam01]", "none", advice)
     for name, section in sections.items():
         if not isinstance(section, dict):
-            raise CalibrationError(
-                f"{where}: expected sections of cameras, found the lone key {quoted(name)}; remove it"
-            )
+            raise CalibrationError.mismatch(where, "sections of cameras", f"the lone key {quoted(name)}", "remove it")
     return sections

@@ -143,10 +143,8 @@ def _channels(words: list[str], where: str) -> tuple[str, ...]:
     channels = tuple(w.capitalize() for w in words[1:])
     wrong = [c for c in channels if c not in _CHANNELS]
     if wrong or not words or words[0] != str(len(channels)) or len(set(channels)) < len(channels):
-        raise FormatError(
-            f"{where}: expected the number of channels and {', '.join(_CHANNELS)}, found {quoted(' '.join(words))}; "
-            "correct it"
-        )
+        expected = f"the number of channels and {', '.join(_CHANNELS)}"
+        raise FormatError.mismatch(where, expected, quoted(" ".join(words)), "correct it")
     return channels
 
 

@@ -154,10 +154,8 @@ def _layout(data: bytes, where: str) -> _Layout:
     (block,) = struct.unpack_from(f"{whole}H", data, 16)
     scale, rate = (float(_reals(data[at : at + 4], order)[0]) for at in (12, 20))
     if not 1 <= n_points <= MAX_NAMES or last < first or not block >= 1 or not 0 < abs(scale) <= MAX_NUMBER:
-        raise FormatError(
-            f"{where}: expected 1 to {MAX_NAMES} points in frames that rise, found {n_points} points in frames {first} "
-            f"to {last}; export it again"
-        )
+        found = f"{n_points} points in frames {first} to {last}"
+        raise FormatError.mismatch(where, f"1 to {MAX_NAMES} points in frames that rise", found)
     check(rate, FrameRate, f"{where}, frame rate", FormatError)
     texts = dict(_texts(data, parameters_at + 4, whole))
     return _Layout(
@@ -211,10 +209,8 @@ def _names(found: _Layout, where: str) -> tuple[str, ...]:
         n_part += 1
     names = tuple(labels[: found.n_points])
     if len(set(names)) != found.n_points or not all(n and n.isprintable() and "\ufffd" not in n for n in names):
-        raise FormatError(
-            f"{where}: expected a name for each of {found.n_points} points, each once, found {quoted(list(names))}; "
-            "label them"
-        )
+        expected = f"a name for each of {found.n_points} points, each once"
+        raise FormatError.mismatch(where, expected, quoted(list(names)), "label them")
     return names
 
 

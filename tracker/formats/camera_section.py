@@ -96,10 +96,9 @@ class CameraEntry:
         """
         size = self.size or footage_size
         if size is None:
-            raise CalibrationError(
-                f"camera '{self.name}': expected the key 'size' in the calibration, found none; add the width and "
-                "height of the pictures"
-            )
+            advice = "add the width and height of the pictures"
+            expected = "the key 'size' in the calibration"
+            raise CalibrationError.mismatch(f"camera '{self.name}'", expected, "none", advice)
         if self.size is None and self.eccentricity(size) > MAX_OFFSET:
             raise CalibrationError(
                 f"camera '{self.name}': the calibration states no image size, and its principal point "
@@ -139,18 +138,16 @@ def _rotation(value: list[Any], where: str) -> Array:
     )
     if rotation.shape == (3,):
         if (angle := float(np.linalg.norm(rotation))) > _MAX_TURN_RAD:
-            raise CalibrationError(
-                f"{where}: expected a Rodrigues vector in radians, found one of length {angle:.4g}, more than a turn "
-                "(6.28), as of degrees or of angles about x, y and z; rewrite the rotations as 3x3 matrices"
-            )
+            found = f"one of length {angle:.4g}, more than a turn (6.28), as of degrees or of angles about x, y and z"
+            advice = "rewrite the rotations as 3x3 matrices"
+            raise CalibrationError.mismatch(where, "a Rodrigues vector in radians", found, advice)
         return rigid.so3_exp(rotation)
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     determinant = float(np.linalg.det(rotation))
     if error > FOUR_DIGITS or determinant < 0:
-        raise CalibrationError(
-            f"{where}: 'rotation' is not a rotation: expected orthonormal rows and determinant 1, "
-            f"found rows off by {error:.2g} and determinant {determinant:.3g}; calibrate again"
-        )
+        found = f"rows off by {error:.2g} and determinant {determinant:.3g}"
+        here = f"{where}: 'rotation' is not a rotation"
+        raise CalibrationError.mismatch(here, "orthonormal rows and determinant 1", found, "calibrate again")
     # Use the nearest rotation: a rounded matrix would shear what it maps.
     U, _, V = np.linalg.svd(rotation)
     return U @ V

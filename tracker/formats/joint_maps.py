@@ -126,10 +126,8 @@ def joint_map_of_size(n_points: int, source: str) -> JointMap:
     if found := joint_maps_of_size(n_points):
         return found[0]
     sizes = ", ".join(f"{len(m.points)} ({m.name})" for m in known_joint_maps() if m.points)
-    raise FormatError(
-        f"{source}: expected the number of points of a known skeleton, {sizes}, found {n_points}",
-        Remedy("give_point_order", n=n_points),
-    )
+    expected = f"the number of points of a known skeleton, {sizes}"
+    raise FormatError.mismatch(source, expected, n_points, Remedy("give_point_order", n=n_points))
 
 
 def _quoted(marker: str) -> str:
@@ -171,10 +169,8 @@ def parse_joint_map(name: str, data: object, source: str) -> JointMap:
     means = {marker: tuple(points) for marker, points in found["means"].items()}
     for marker, points in means.items():
         if unknown := [p for p in points if p not in _BODY_POINTS] or (["nothing"] if not points else []):
-            raise FormatError(
-                f"joint map {source}: expected '{marker}' to be a mean of {', '.join(_BODY_POINTS)}, found "
-                f"{unknown[0]}; correct it"
-            )
+            expected = f"'{marker}' to be a mean of {', '.join(_BODY_POINTS)}"
+            raise FormatError.mismatch(f"joint map {source}", expected, unknown[0], "correct it")
     points = tuple(found["points"])
     if len(set(points)) < len(points):
         raise FormatError(f"joint map {source}: expected each of 'points' once, found one twice; correct it")

@@ -71,18 +71,15 @@ class NumberRows:
 
     def _append(self, row: list[float], line: int) -> None:
         if not (row[0].is_integer() and abs(row[0]) <= MAX_FRAMES):
-            raise FormatError(
-                f"{self._where}, line {line}: expected a whole frame number of at most {MAX_FRAMES} first, "
-                f"found {row[0]:g}; correct it"
-            )
+            expected = f"a whole frame number of at most {MAX_FRAMES} first"
+            raise FormatError.mismatch(f"{self._where}, line {line}", expected, f"{row[0]:g}", "correct it")
         self._values.frombytes(np.array(row).tobytes())
         self._lines.append(line)
 
     def _check_size(self, line: int) -> None:
         if len(self._values) + self._n_columns > MAX_VALUES:
-            raise FormatError(
-                f"{self._where}, line {line}: expected at most {MAX_VALUES} values, found more; cut it in pieces"
-            )
+            expected = f"at most {MAX_VALUES} values"
+            raise FormatError.mismatch(f"{self._where}, line {line}", expected, "more", "cut it in pieces")
 
     def _complete_row(self, text: str) -> list[float] | None:
         """Parse a row without blanks, twice as fast as `_row`; None if it needs a closer look."""
@@ -124,10 +121,9 @@ class NumberRows:
         falls = np.flatnonzero(np.diff(frames) <= 0)
         if len(falls):
             row = int(falls[0]) + 1
-            raise FormatError(
-                f"{self.place(row)}: expected frame numbers that rise from row to row, found {frames[row]} after "
-                f"{frames[row - 1]}; give each person or take a file of its own"
-            )
+            advice = "give each person or take a file of its own"
+            expected = "frame numbers that rise from row to row"
+            raise FormatError.mismatch(self.place(row), expected, f"{frames[row]} after {frames[row - 1]}", advice)
         return frames, values
 
     def place(self, row: int) -> str:
@@ -155,10 +151,8 @@ class NumberRows:
                 wrong &= ~np.isnan(column)
             if wrong.any():
                 row = int(np.argmax(wrong))
-                raise FormatError(
-                    f"{self.place(row)}, column {i}: expected a finite number within {most:g}, "
-                    f"found {column[row]:g}; correct it"
-                )
+                expected = f"a finite number within {most:g}"
+                raise FormatError.mismatch(f"{self.place(row)}, column {i}", expected, f"{column[row]:g}", "correct it")
         return frames, values
 
 

@@ -169,7 +169,5 @@ def _read_columns(columns: Sequence[str], where: str) -> tuple[tuple[str, ...], 
         names.append(column.removesuffix(unit) if unit.startswith("_") else column)
         factors.append(_FACTORS[unit])
     if not 1 <= len(names) <= MAX_NAMES or len(set(names)) < len(names):
-        raise FormatError(
-            f"{where}: expected 1 to {MAX_NAMES} columns of values, each once, found {quoted(names)}; export it again"
-        )
+        raise FormatError.mismatch(where, f"1 to {MAX_NAMES} columns of values, each once", quoted(names))
     return tuple(names), factors

@@ -164,9 +164,8 @@ def _names(line: str, where: str) -> tuple[str, ...]:
     if LOST in line:  # in the first line there is a path, which nobody needs
         refuse_lost(list(names), where, _KIND)
     if not 1 <= len(names) <= MAX_NAMES or len(set(names)) != len(names):
-        raise FormatError(
-            f"{where}: expected 1 to {MAX_NAMES} point names, each once, found {quoted(list(names))}; rename them"
-        )
+        expected = f"1 to {MAX_NAMES} point names, each once"
+        raise FormatError.mismatch(where, expected, quoted(list(names)), "rename them")
     return names
 
 
@@ -222,10 +221,8 @@ def _is_row(line: str) -> bool:
 def _scale(header: dict[str, str], where: str) -> float:
     units = header.get("units", "").strip()
     if units.lower() not in METRES_BY_WORD:
-        raise FormatError(
-            f"{where}: expected Units to be m, cm, mm, in, ft or a whole word such as millimeters, found "
-            f"{quoted(units)}; correct it"
-        )
+        expected = "Units to be m, cm, mm, in, ft or a whole word such as millimeters"
+        raise FormatError.mismatch(where, expected, quoted(units), "correct it")
     return METRES_BY_WORD[units.lower()]
 
 

@@ -27,13 +27,9 @@ def picture_problems(tables: Mapping[str, PictureTable], cameras: Mapping[str, C
         if table.size is not None and table.size != size:
             problems.append(_other_size(name, size, f"{table.size[0]}x{table.size[1]} in the file", table.size))
         elif len(points) and np.abs(points[:, :2]).max() <= _MAX_NORMALIZED < min(size) / 4:
-            problems.append(
-                FormatError(
-                    f"camera '{name}': expected pixels of the {size[0]}x{size[1]} footage, found coordinates up to "
-                    f"{np.abs(points[:, :2]).max():.3g}, which are normalized",
-                    Remedy("scale_normalized"),
-                )
-            )
+            seen = f"coordinates up to {np.abs(points[:, :2]).max():.3g}, which are normalized"
+            expected = f"pixels of the {size[0]}x{size[1]} footage"
+            problems.append(FormatError.mismatch(f"camera '{name}'", expected, seen, Remedy("scale_normalized")))
         elif len(points):
             outside = ((points[:, :2] < -0.5) | (points[:, :2] > np.array(size) - 0.5)).any(axis=-1)
             if 2 * outside.sum() > len(points):  # a person who is cut off has some there
@@ -41,11 +37,8 @@ def picture_problems(tables: Mapping[str, PictureTable], cameras: Mapping[str, C
                 found = f"{outside.mean():.0%} of the points outside of it, as far as {reach[0]:.0f}, {reach[1]:.0f}"
                 problems.append(_other_size(name, size, found, None))
         if not table.has_confidence:
-            problems.append(
-                FormatError(
-                    f"camera '{name}': expected a confidence for each point, found none", Remedy("say_confidence")
-                )
-            )
+            expected = "a confidence for each point"
+            problems.append(FormatError.mismatch(f"camera '{name}'", expected, "none", Remedy("say_confidence")))
     return problems
 
 
@@ -55,10 +48,8 @@ _MAX_NORMALIZED = 2.0
 
 def _other_size(name: str, size: tuple[int, int], found: str, given: tuple[int, int] | None) -> FormatError:
     text = f"{given[0]}x{given[1]}" if given else "WIDTHxHEIGHT"
-    return FormatError(
-        f"camera '{name}': expected key points of the {size[0]}x{size[1]} footage, found {found}",
-        Remedy("give_picture_size", size=text),
-    )
+    expected = f"key points of the {size[0]}x{size[1]} footage"
+    return FormatError.mismatch(f"camera '{name}'", expected, found, Remedy("give_picture_size", size=text))
 
 
 def agreement_m(points: ObservedPoints, cameras: Sequence[Camera], scale: float = 1.0) -> float:
@@ -114,11 +105,8 @@ def agreement_problem(points: ObservedPoints, cameras: Sequence[Camera]) -> Form
             if exchanged < INLIER_M / 2:
                 hint = f"; with {points.cameras[a]} and {points.cameras[b]} exchanged by {100 * exchanged:.0f} cm"
                 break
-    return FormatError(
-        f"expected the viewing rays of a point in two views to meet, found that half of them pass each other by over "
-        f"{100 * found:.0f} cm{hint}",
-        Remedy("check_views"),
-    )
+    seen = f"that half of them pass each other by over {100 * found:.0f} cm{hint}"
+    return FormatError.mismatch("", "the viewing rays of a point in two views to meet", seen, Remedy("check_views"))
 
 
 def timing_problems(

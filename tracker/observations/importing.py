@@ -153,10 +153,8 @@ def _skeleton(
         (one, n), (two, m) = ((filled[x].names, filled[x].points.shape[2]) for x in (first, other))
         begins = [", ".join(found[:3])[:60] for found in (one, two)]
         if one != two or n != m:
-            raise FormatError(
-                f"expected the same points in all views, found {n} ({begins[0]}...) for camera '{first}' and "
-                f"{m} ({begins[1]}...) for camera '{other}'; import files of one skeleton"
-            )
+            seen = f"{n} ({begins[0]}...) for camera '{first}' and {m} ({begins[1]}...) for camera '{other}'"
+            raise FormatError.mismatch("", "the same points in all views", seen, "import files of one skeleton")
     names, n_points = filled[first].names, filled[first].points.shape[2]
     where = f"the files of camera '{first}'"
     check(list(names), list[Name], where, FormatError)

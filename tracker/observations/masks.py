@@ -95,21 +95,16 @@ def _rules(
     is_matte, problems = len(values) > MAX_PEOPLE, list[FormatError]()
     kinds = {bool(k) for seen in surveys.values() for k in seen.is_alpha}
     if len(kinds) > 1:
-        problems.append(
-            FormatError(
-                "expected masks of one kind, found some by the opacity of a picture and others by its values; import "
-                "them apart"
-            )
-        )
+        found = "some by the opacity of a picture and others by its values"
+        problems.append(FormatError.mismatch("", "masks of one kind", found, "import them apart"))
     given = dict(request.values)
     numbers = {_UNKNOWN: UNKNOWN, **{p.name: i + 1 for i, p in enumerate(session.people)}}
     check_names(given, list(numbers), "person", "the values by person")
     for name, value in given.items():
         if surveys and (is_matte or value not in values):
             listed = "opacities" if is_matte else ", ".join(map(str, values[:10])) or "none"
-            problems.append(
-                FormatError(f"expected masks with the value {value} for '{name}', found {listed}; correct the values")
-            )
+            expected = f"masks with the value {value} for '{name}'"
+            problems.append(FormatError.mismatch("", expected, listed, "correct the values"))
     if len(set(given.values())) < len(given):
         problems.append(FormatError("expected another value for each person, found one twice; correct the values"))
     return MaskRules(is_matte, {value: numbers[name] for name, value in given.items()} or None), problems

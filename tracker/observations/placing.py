@@ -44,13 +44,10 @@ def place_pictures(
     notes: list[str] = []
     for name, table in tables.items():
         if table.rate is not None and not same_clock(table.rate, session.fps):
-            problems.append(
-                FormatError(
-                    f"camera '{name}': expected pictures at the {session.fps:g} per second of the session, found "
-                    f"{table.rate:g} per second in the file",
-                    Remedy("export_at_rate", fps=f"{session.fps:g}"),
-                )
-            )
+            wanted = f"pictures at the {session.fps:g} per second of the session"
+            found = f"{table.rate:g} per second in the file"
+            here = f"camera '{name}'"
+            problems.append(FormatError.mismatch(here, wanted, found, Remedy("export_at_rate", fps=f"{session.fps:g}")))
     if first_frame is not None:
         frames = {name: table.numbers - lowest + first_frame for name, table in tables.items()}
         notes.append(f"picture {lowest} of the files was placed at frame {first_frame}, as chosen")
@@ -76,12 +73,8 @@ def place_pictures(
         if (first_frame is not None or late.get(name)) and not inside.all():
             notes.append(f"camera '{name}': {(~inside).sum()} pictures lie outside of the session and were left out")
         if not inside.any():
-            problems.append(
-                FormatError(
-                    f"camera '{name}': expected pictures of frames 0 to {session.n_frames - 1}, found none",
-                    Remedy("place_first_picture"),
-                )
-            )
+            expected = f"pictures of frames 0 to {session.n_frames - 1}"
+            problems.append(FormatError.mismatch(f"camera '{name}'", expected, "none", Remedy("place_first_picture")))
     return frames, problems, notes
 
 
@@ -118,13 +111,9 @@ def _wrong_lengths(tables: Mapping[str, PictureTable], session: Session, base: i
         end = base + lengths[name] - 1
         if (first, last) == (base, end) or ((table.is_by_hand or table.is_of_video) and base <= first <= last <= end):
             continue
-        problems.append(
-            FormatError(
-                f"camera '{name}': expected the {lengths[name]} pictures of the footage, numbers {base} to "
-                f"{base + lengths[name] - 1}, found numbers {first} to {last} ({len(table.numbers)} pictures)",
-                Remedy("place_first_picture"),
-            )
-        )
+        expected = f"the {lengths[name]} pictures of the footage, numbers {base} to {base + lengths[name] - 1}"
+        found = f"numbers {first} to {last} ({len(table.numbers)} pictures)"
+        problems.append(FormatError.mismatch(f"camera '{name}'", expected, found, Remedy("place_first_picture")))
     return problems
 
 

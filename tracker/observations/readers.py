@@ -273,14 +273,11 @@ def find_files(paths: Sequence[Path], masks: bool = False) -> tuple[str, list[Fo
     (name, files), *others = found.items()
     if others:
         listed = " and ".join(f"{some[0][0].name} ({FORMATS[n].program})" for n, some in ((name, files), *others[:1]))
-        raise FormatError(
-            f"expected files of one format, found {listed}; import them one after the other, or leave out those that "
-            "hold no points"
-        )
+        advice = "import them one after the other, or leave out those that hold no points"
+        raise FormatError.mismatch("", "files of one format", listed, advice)
     if masks and name not in MASK_FORMATS:
-        raise FormatError(
-            f"expected masks among the files, found {FORMATS[name].program}; export PNG files or COCO segmentations"
-        )
+        advice = "export PNG files or COCO segmentations"
+        raise FormatError.mismatch("", "masks among the files", FORMATS[name].program, advice)
     return name, files
 
 
@@ -327,7 +324,5 @@ def _not_read(sample: Sample, advice: str) -> FormatError:
             return error
         keys = ", ".join(map(str, data)) if isinstance(data, dict) else ""
         found = f"JSON with the keys {quoted(keys)}" if keys else f"JSON with {quoted(data)}"
-    return FormatError(
-        f"file {sample.path}: expected key points, joints or masks of a program that docs/observations.md lists, found "
-        f"{found}; {advice}export it in one of its formats"
-    )
+    expected = "key points, joints or masks of a program that docs/observations.md lists"
+    return FormatError.mismatch(f"file {sample.path}", expected, found, f"{advice}export it in one of its formats")

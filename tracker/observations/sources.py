@@ -61,10 +61,8 @@ def list_files(paths: Sequence[Path], suffixes: Sequence[str]) -> list[Found]:
         else:
             raise FormatError(f"expected a file or folder of observations, found none at {path}; check the path")
     if not found:
-        raise FormatError(
-            f"expected files that end in {', '.join(suffixes)}, found none in {', '.join(map(str, paths))}; "
-            "check the folder"
-        )
+        expected = f"files that end in {', '.join(suffixes)}"
+        raise FormatError.mismatch("", expected, f"none in {', '.join(map(str, paths))}", "check the folder")
     return found
 
 
@@ -88,19 +86,16 @@ def numbered_groups(files: Sequence[Found], cameras: Sequence[str]) -> list[File
         names = picture_names([path.stem.removesuffix("_keypoints") for path, _ in some])
         for (path, root), name in zip(some, names, strict=True):
             if name is None:
-                raise FormatError(
-                    f"expected the number of the picture in the file's name, as in CAMERA_000000000012_keypoints.json, "
-                    f"found {path.name}; rename it or leave it out"
-                )
+                expected = "the number of the picture in the file's name, as in CAMERA_000000000012_keypoints.json"
+                raise FormatError.mismatch("", expected, path.name, "rename it or leave it out")
             folder = path.parent
             if _is_object(folder, cameras):
                 folder, name = folder.parent, PictureName(f"{folder.name} {name.label}".strip(), name.number)
             camera = _camera_of(_picture_labels([name], path, root, cameras), cameras)
             group = groups.setdefault((folder, camera or name.label), {})
             if name in group:
-                raise FormatError(
-                    f"expected one file for each picture, found {group[name][0].name} and {path.name}; leave one out"
-                )
+                found = f"{group[name][0].name} and {path.name}"
+                raise FormatError.mismatch("", "one file for each picture", found, "leave one out")
             group[name] = (path, root)
     out = []
     for group in groups.values():
@@ -178,14 +173,11 @@ def match_cameras(
         if found.count(name) > 1:
             both = [str(places[i]) for i, n in enumerate(found) if n == name]
             if len(set(both)) < len(both):
-                raise FormatError(
-                    f"{both[0]}: expected the pictures of camera '{name}' once, found those of several videos of its "
-                    "name; export those of this session alone"
-                )
-            raise FormatError(
-                f"expected one file or folder for camera '{name}', found {' and '.join(both[:2])}",
-                Remedy("name_observed_camera", camera=name),
-            )
+                expected = f"the pictures of camera '{name}' once"
+                seen = "those of several videos of its name"
+                raise FormatError.mismatch(both[0], expected, seen, "export those of this session alone")
+            wanted = f"one file or folder for camera '{name}'"
+            raise FormatError.mismatch("", wanted, " and ".join(both[:2]), Remedy("name_observed_camera", camera=name))
     return found
 
 

@@ -154,9 +154,8 @@ def load_observations(session: Session, name: str) -> ObservationSet:
     folder = session.folder / FOLDER / name
     if name not in (known := list_observations(session)):
         listed = ", ".join(known) or "none"
-        raise SessionError(
-            f"expected the name of imported observations, found '{name}'; the session has {listed}: import some"
-        )
+        advice = f"the session has {listed}: import some"
+        raise SessionError.mismatch("", "the name of imported observations", f"'{name}'", advice)
     where = f"observations {folder / _FILE}"
     data = read_toml(folder / _FILE, KIND)
     check_version(data, VERSION, where, SessionError)

@@ -42,10 +42,8 @@ def write_c3d(
     """
     n = len(points)
     if first_frame + n > MAX_FRAME:
-        raise FormatError(
-            f"expected frame numbers up to {MAX_FRAME:,}, as C3D has, found {first_frame + n:,}",
-            Remedy("fewer_frames"),
-        )
+        expected = f"frame numbers up to {MAX_FRAME:,}, as C3D has"
+        raise FormatError.mismatch("", expected, f"{first_frame + n:,}", Remedy("fewer_frames"))
     scale = 1000.0 if units == "mm" else 1.0
     values = np.full((4, len(names), n), 1.0)
     values[:3] = scale * points.transpose(2, 1, 0)

@@ -22,6 +22,5 @@ def require(package: str, title: str, use: str = "write", install: str = "'quadr
         return import_module(package)
     except ImportError as error:
         found = "none" if isinstance(error, ModuleNotFoundError) else f"one that does not load ({error})"
-        raise FormatError(
-            f"expected the package {package} to {use} {title}, found {found}; install it with: pip install {install}"
-        ) from error
+        expected = f"the package {package} to {use} {title}"
+        raise FormatError.mismatch("", expected, found, f"install it with: pip install {install}") from error

@@ -55,9 +55,8 @@ def _joints(path: Path, where: str) -> Array:
         joints = [name for name, shape in shapes.items() if shape]
         if len(joints) != 1:
             found = f"{', '.join(joints)}" if joints else f"none in {quoted([*shapes])}"
-            raise FormatError(
-                f"{where}: expected {_EXPECTED}, found {found}; save the joints in space as the only one of this shape"
-            )
+            advice = "save the joints in space as the only one of this shape"
+            raise FormatError.mismatch(where, _EXPECTED, found, advice)
         check_size(shapes[joints[0]], where)
         with _members(path) as members:
             return next(npy.read_array(stream, allow_pickle=False) for name, stream in members if name == joints[0])

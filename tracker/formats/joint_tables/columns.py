@@ -81,10 +81,9 @@ def named_columns(table: Delimited) -> Columns:
     points = _triples(((("", m["name"] or ""), m["axis"], i) for i, m in found), cells, where)
     units = {(m["unit"] or "").lower() for _, m in found}
     if not points or len(units) != 1:
-        raise FormatError(
-            f"{where}: expected columns NAME_x, NAME_y, NAME_z of 1 to {MAX_NAMES} points in one unit, found "
-            f"{quoted(cells[:4])}; export positions of joints as one of the tables that docs/observations.md lists"
-        )
+        advice = "export positions of joints as one of the tables that docs/observations.md lists"
+        expected = f"columns NAME_x, NAME_y, NAME_z of 1 to {MAX_NAMES} points in one unit"
+        raise FormatError.mismatch(where, expected, quoted(cells[:4]), advice)
     others = {c: i for i, c in reversed([*enumerate(lower)]) if i not in dict(found)}
     time, unit = next(((i, m["unit"]) for c, i in others.items() if (m := _TIME.fullmatch(c))), (None, None))
     frame, person = (next((others[c] for c in names if c in others), None) for names in (_FRAMES, _PEOPLE))
@@ -129,10 +128,9 @@ def motive_columns(table: Delimited) -> Columns:
     ]
     found = [kind for kind in dict.fromkeys(kinds) if kind not in ("", "Type", "Marker", "Bone")]
     if not any(chosen):
-        raise FormatError(
-            f"{table.where}: expected positions of labelled markers or bones, found {', '.join(found)[:60] or 'none'}; "
-            "export markers or the bones of a skeleton from Motive"
-        )
+        advice = "export markers or the bones of a skeleton from Motive"
+        expected = "positions of labelled markers or bones"
+        raise FormatError.mismatch(table.where, expected, ", ".join(found)[:60] or "none", advice)
     facts = dict(zip(rows[0].cells[::2], rows[0].cells[1::2], strict=False))
     rate = facts.get("Export Frame Rate") or facts.get("Capture Frame Rate", "")
     points = _stacked_points(names, [a if c else "" for a, c in zip(axes, chosen, strict=False)], where)
@@ -149,10 +147,8 @@ def nexus_columns(table: Delimited) -> Columns:
     rows, _ = _head(table, lambda cells: cells[0] == "Trajectories")
     if rows[-1].cells[0] != "Trajectories":
         sections = [row.cells[0] for row in rows if row.cells[0][:1].isalpha() and not any(row.cells[1:])]
-        raise FormatError(
-            f"{table.where}: expected the section Trajectories, found {', '.join(sections)[:60]}; export the "
-            "trajectories from Nexus"
-        )
+        advice = "export the trajectories from Nexus"
+        raise FormatError.mismatch(table.where, "the section Trajectories", ", ".join(sections)[:60], advice)
     rate, names, axes, units = [*islice(table.filled, 4), *[TableLine(0, [""])] * 4][:4]
     found = {unit for axis, unit in zip(axes.cells, units.cells, strict=False) if axis in ("X", "Y", "Z")}
     points = _stacked_points(names.cells, axes.cells, f"{table.where}, line {axes.line}")
@@ -169,10 +165,8 @@ def qualisys_columns(table: Delimited) -> Columns:
     facts = {cells[0]: cells[1:] for _, cells in rows[:-1]}
     names = [name for name in facts.get("MARKER_NAMES", ()) if name]
     if not names:
-        raise FormatError(
-            f"{table.where}: expected MARKER_NAMES and rows of 3D data, found {', '.join(facts)[:60]}; export the 3D "
-            "data of labelled markers from Qualisys Track Manager"
-        )
+        advice = "export the 3D data of labelled markers from Qualisys Track Manager"
+        raise FormatError.mismatch(table.where, "MARKER_NAMES and rows of 3D data", ", ".join(facts)[:60], advice)
     is_head = rows[-1].cells[0] == "Frame"
     start = 2 if is_head or len(rows[-1].cells) >= 3 * len(names) + 2 else 0
     axes = ["", ""][:start] + ["x", "y", "z"] * len(names)

@@ -103,9 +103,7 @@ def _people(path: Path) -> list[_Person]:
 def _points(person: _Person, path: Path) -> Array:
     """Return x, y, z and confidence of the points of a person, (n_points, 4)."""
     if not person.keypoints3d and not person.joints19:
-        raise FormatError(
-            f"{path}: expected 19 joints of CMU Panoptic, found none; take the folder hdPose3d_stage1_coco19"
-        )
+        raise FormatError.mismatch(path, "19 joints of CMU Panoptic", "none", "take the folder hdPose3d_stage1_coco19")
     rows = person.keypoints3d or [person.joints19[i : i + 4] for i in range(0, len(person.joints19), 4)]
     if {*map(len, rows)} not in ({3}, {4}):
         raise FormatError(f"{path}: expected x, y, z and confidence of each point, found other rows; export it again")

@@ -139,10 +139,9 @@ def _placed(series: Series, frames: IntArray, points: Array, numbers: NumberRows
         _, once = np.unique(frames[at], return_index=True)
         if len(once) < len(at):
             row = int(np.setdiff1d(at, at[once])[0])
-            raise FormatError(
-                f"{numbers.place(row)}: expected one row of {quoted(name)} in each frame, found two in frame "
-                f"{frames[row]}; tell people apart by a column 'person'"
-            )
+            expected = f"one row of {quoted(name)} in each frame"
+            advice = "tell people apart by a column 'person'"
+            raise FormatError.mismatch(numbers.place(row), expected, f"two in frame {frames[row]}", advice)
         out[np.searchsorted(found, frames[at]), i] = points[at, number]
     return found, rows[first], out
 
@@ -166,8 +165,6 @@ def _timed(frames: IntArray, times: Array, second: float | None, rate: float, wh
         return times, rate
     step, mean = float(np.median(spans)), float(times[-1] - times[0]) / int(frames[-1] - frames[0])
     if step > 1:
-        raise FormatError(
-            f"{where}: expected times in seconds, found steps of {step:g} from frame to frame; name their unit, such "
-            "as time_ms"
-        )
+        found = f"steps of {step:g} from frame to frame"
+        raise FormatError.mismatch(where, "times in seconds", found, "name their unit, such as time_ms")
     return times, 1 / (mean if abs(mean / step - 1) < 0.01 else step)  # the mean is exact, but of a gap in the times

@@ -138,10 +138,9 @@ def images_by_camera(images: Sequence[CocoPicture], where: str) -> dict[tuple[st
     for image, (labels, number) in zip(images, _places(images, where), strict=True):
         taken = by_camera.setdefault(labels, {})
         if number in taken:
-            raise FormatError(
-                f"{where}: expected one image for each picture of a camera, found {quoted_images(taken[number], image)}"
-                "; give the images numbers or folders of their cameras"
-            )
+            advice = "give the images numbers or folders of their cameras"
+            expected = "one image for each picture of a camera"
+            raise FormatError.mismatch(where, expected, quoted_images(taken[number], image), advice)
         taken[number] = image
     return by_camera
 
@@ -238,10 +237,8 @@ def _people(found: KeypointDataset, where: str) -> dict[int | str, list[PictureP
     n_points = len(found.names) or len(chosen[0].keypoints) // 3
     wrong = next((a for a in chosen if len(a.keypoints) != 3 * n_points), None)
     if wrong is not None:
-        raise FormatError(
-            f"{where}: expected {3 * n_points} numbers for {n_points} key points, found "
-            f"{len(wrong.keypoints)} of the person in image {wrong.image_id}; export it again"
-        )
+        seen = f"{len(wrong.keypoints)} of the person in image {wrong.image_id}"
+        raise FormatError.mismatch(where, f"{3 * n_points} numbers for {n_points} key points", seen)
     check_size((len(chosen), n_points, 3), where)
     values = np.array([a.keypoints for a in chosen]).reshape(len(chosen), n_points, 3)
     absent = (values[..., 2] == 0) | (values[..., :2] == 0).all(axis=-1)

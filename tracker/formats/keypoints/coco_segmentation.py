@@ -83,9 +83,8 @@ def read_segmentations(path: Path) -> list[SegmentedPictures]:
     of_people = {c.id for c in dataset.categories if _PERSON in (c.name.casefold(), c.supercategory.casefold())}
     if len(used) > 1 and not used & of_people:
         listed = ", ".join(quoted(named[i].name) if i in named else str(i) for i in sorted(used)[:5])
-        raise FormatError(
-            f"{where}: expected a category named '{_PERSON}' among several, found {listed}; rename that of the people"
-        )
+        expected = f"a category named '{_PERSON}' among several"
+        raise FormatError.mismatch(where, expected, listed, "rename that of the people")
     taken = used & of_people or used
     notes = ()
     if others := [quoted(named[i].name) if i in named else str(i) for i in sorted(used - taken)]:
@@ -104,10 +103,9 @@ def check_mask_size(found: tuple[int, int], size: tuple[int, int], where: str) -
         FormatError: it has another size.
     """
     if found != size:
-        raise FormatError(
-            f"{where}: expected a mask of {size[0]}x{size[1]} pixels, found {found[0]}x{found[1]}",
-            Remedy("give_picture_size", size=f"{found[0]}x{found[1]}"),
-        )
+        expected = f"a mask of {size[0]}x{size[1]} pixels"
+        seen = f"{found[0]}x{found[1]}"
+        raise FormatError.mismatch(where, expected, seen, Remedy("give_picture_size", size=f"{found[0]}x{found[1]}"))
 
 
 def _fill(out: NDArray[np.uint8], polygon: list[float], where: str) -> None:

@@ -56,9 +56,7 @@ def read_deeplabcut_csv(path: Path) -> PictureTable:
     while row is not None:
         line, cells = row
         if len(cells) != n_index + len(columns):
-            raise FormatError(
-                f"{where}, line {line}: expected {n_index + len(columns)} columns, found {len(cells)}; export it again"
-            )
+            raise FormatError.mismatch(f"{where}, line {line}", f"{n_index + len(columns)} columns", len(cells))
         number = _picture_number(cells[:n_index], f"{where}, line {line}")
         is_of_names = is_of_names or not _NUMBER.fullmatch(cells[n_index - 1])
         rows.add_cells([str(number), *cells[n_index:]], line)
@@ -137,10 +135,9 @@ def _read_head(lines: Iterator[TableLine], where: str) -> tuple[list[_Column], i
         row = next(lines, None)
     if not {"bodyparts", "coords"} <= head.keys() or len({len(cells) for cells in head.values()}) != 1:
         instead = "semicolons between cells" if row is not None and ";" in row[1][0] else "none"
-        raise FormatError(
-            f"{where}: expected the rows scorer, bodyparts and coords of equal length at its start, found "
-            f"{', '.join(head) or instead}; export it again, with commas between cells"
-        )
+        expected = "the rows scorer, bodyparts and coords of equal length at its start"
+        advice = "export it again, with commas between cells"
+        raise FormatError.mismatch(where, expected, ", ".join(head) or instead, advice)
     n_index = 1
     while n_index < len(head["coords"]) and not head["coords"][n_index]:
         n_index += 1  # labels of pictures have folder and file in columns of their own
@@ -186,9 +183,7 @@ def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: 
     others = list(dict.fromkeys(c.coordinate for c in columns if c.coordinate not in _COORDINATES))
     if "z" in others or not own or len(set(columns)) < len(columns):
         found = "z" if "z" in others else others[0] if others else "a column twice"
-        raise FormatError(
-            f"{where}: expected each x, y and likelihood once, found {quoted(found)}; import key points in 2-D"
-        )
+        raise FormatError.mismatch(where, "each x, y and likelihood once", quoted(found), "import key points in 2-D")
     individuals, names = (
         list(dict.fromkeys(c.individual for c in columns)),
         list(dict.fromkeys(c.point for c in columns)),

@@ -118,10 +118,8 @@ def read_yolo(path: Path) -> list[PicturePerson]:
             where = f"YOLO file {path}, line {number}"
             values = parse_numbers(line.split(), where)
             if not 0 < (len(values) - len(_BOX)) // 3 <= MAX_NAMES or len(found) >= MAX_PEOPLE:
-                raise FormatError(
-                    f"{where}: expected a box and x, y, visibility of each point, of up to {MAX_PEOPLE} people, found "
-                    f"{len(values)} numbers; export key points"
-                )
+                expected = f"a box and x, y, visibility of each point, of up to {MAX_PEOPLE} people"
+                raise FormatError.mismatch(where, expected, f"{len(values)} numbers", "export key points")
             found.append(PicturePerson(_yolo_points(np.array(values), where)))
     return found
 
@@ -134,10 +132,9 @@ def _yolo_points(values: Array, where: str) -> Array:
     inside = [np.mean(np.abs(p[:, :2] - box[:2]) <= box[2:] / 2) for p in (with_, without)]
     if joint_maps_of_size(n_without) and inside[1] >= inside[0] and values.any():
         if inside[1] == inside[0] and joint_maps_of_size(n_with):
-            raise FormatError(
-                f"{where}: expected numbers of one known skeleton, found those of {n_with} points with a visibility or "
-                f"{n_without} without; export visibilities, and boxes that are around the points"
-            )
+            found = f"those of {n_with} points with a visibility or {n_without} without"
+            advice = "export visibilities, and boxes that are around the points"
+            raise FormatError.mismatch(where, "numbers of one known skeleton", found, advice)
         return triples(without.tolist(), np.ones(n_without).tolist())
     return triples(with_.tolist())
 
@@ -165,10 +162,8 @@ def read_sleap_csv(path: Path) -> PictureTable:
     names = tuple(cell.removesuffix(".x") for cell in head if cell.endswith(".x"))
     columns = [f"{name}{part}" for name in names for part in (".x", ".y", ".score")]
     if not 0 < len(names) <= MAX_NAMES or len(set(head)) < len(head) or {*columns, "track", "frame_idx"} - set(head):
-        raise FormatError(
-            f"{where}: expected track, frame_idx and NAME.x, NAME.y, NAME.score of each point, each once, found "
-            f"{', '.join(head)[:60]}; export it again"
-        )
+        expected = "track, frame_idx and NAME.x, NAME.y, NAME.score of each point, each once"
+        raise FormatError.mismatch(where, expected, ", ".join(head)[:60])
     at = [head.index(c) for c in ("frame_idx", *columns)]
     people: dict[int, list[PicturePerson]] = {}
     for number, cells in lines:
@@ -193,10 +188,8 @@ def is_sleap_csv(head: Sequence[str]) -> bool:
 
 def _mmpose_person(person: _Instance, where: str) -> PicturePerson:
     if len(person.keypoints) != len(person.keypoint_scores):
-        raise FormatError(
-            f"{where}: expected a score for each of {len(person.keypoints)} points, found "
-            f"{len(person.keypoint_scores)}; export it again"
-        )
+        expected = f"a score for each of {len(person.keypoints)} points"
+        raise FormatError.mismatch(where, expected, len(person.keypoint_scores))
     return PicturePerson(triples(person.keypoints, person.keypoint_scores))
 
 

@@ -128,10 +128,8 @@ def _add_shape(people: dict[str, _Points], shape: ElementTree.Element, person: s
 
 def _add(points: _Points, name: str, place: tuple[float, float], where: str) -> None:
     if name in points:
-        raise FormatError(
-            f"{where}: expected each point of a person once, found {quoted(name)} twice in a picture; label several "
-            "people as skeletons or in boxes"
-        )
+        advice = "label several people as skeletons or in boxes"
+        raise FormatError.mismatch(where, "each point of a person once", f"{quoted(name)} twice in a picture", advice)
     points[name] = place
 
 
@@ -154,10 +152,9 @@ def _tables(images: Sequence[CocoPicture], people: Mapping[int, Mapping[str, _Po
     names = tuple(dict.fromkeys(n for some in people.values() for points in some.values() for n in points))
     most = max(map(len, people.values()), default=0)
     if not names or len(names) > MAX_NAMES or most > MAX_PEOPLE or not all(names):
-        raise FormatError(
-            f"{where}: expected points with names of up to {MAX_PEOPLE} people in a picture, found "
-            f"{f'{most} people' if names else 'none'}; label key points or skeletons"
-        )
+        expected = f"points with names of up to {MAX_PEOPLE} people in a picture"
+        advice = "label key points or skeletons"
+        raise FormatError.mismatch(where, expected, f"{most} people" if names else "none", advice)
     check_size((len(people), most, len(names), 3), where)
     out = []
     for labels, own in images_by_camera([i for i in images if people.get(int(i.id))], where).items():

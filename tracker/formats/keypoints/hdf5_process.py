@@ -83,9 +83,7 @@ def check_datasets(path: Path) -> None:
                 raise FormatError(f"{where}: expected data packed by gzip or LZF, found {quoted(name)} in another way")
             elsewhere += [name] * bool(item.is_virtual or item.external)
     if elsewhere := [name for name in elsewhere if not _PICTURES.fullmatch(name)]:
-        raise FormatError(
-            f"{where}: expected all data in one file, found {quoted(elsewhere[0])} in another; export it again"
-        )
+        raise FormatError.mismatch(where, "all data in one file", f"{quoted(elsewhere[0])} in another")
 
 
 def limit_memory() -> None:
@@ -121,11 +119,8 @@ def _change(path: Path, folder: Path) -> None:
     elif suffix == ".nwb":
         patch_nwb(copy, changes)
     else:
-        raise FormatError(
-            "expected a project or an analysis of SLEAP, or a table of DeepLabCut, to replace points in, found another "
-            f"kind of file: {path}",
-            Remedy("export_other_format"),
-        )
+        expected = "a project or an analysis of SLEAP, or a table of DeepLabCut, to replace points in"
+        raise FormatError.mismatch("", expected, f"another kind of file: {path}", Remedy("export_other_format"))
     _check(read_hdf5(path), read_hdf5(copy), changes, path)
 
 
@@ -144,10 +139,8 @@ def _check(before: Tables, after: Tables, changes: Changes, path: Path) -> None:
         )
         wanted = [(new.points[row], values) for row, people in rows.items() for _, values in people]
         if not is_same or not all(_holds(people, values) for people, values in wanted):
-            raise FormatError(
-                f"expected the points of file {path} in their usual order, found another one; nothing is changed",
-                Remedy("export_other_format"),
-            )
+            expected = f"the points of file {path} in their usual order"
+            raise FormatError.mismatch("", expected, "another one; nothing is changed", Remedy("export_other_format"))
 
 
 def _holds(people: Array, values: Array) -> bool:

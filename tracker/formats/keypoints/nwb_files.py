@@ -130,10 +130,8 @@ def _series(group: Any, name: str, path: Path) -> Any:
     series = group[name]
     data = series["data"]
     if data.ndim != 2 or data.shape[1] != 2:
-        raise FormatError(
-            f"file {path}: expected places in pictures, two numbers for '{name}', found {data.shape}; export the key "
-            "points of each view"
-        )
+        expected = f"places in pictures, two numbers for '{name}'"
+        raise FormatError.mismatch(f"file {path}", expected, data.shape, "export the key points of each view")
     return series
 
 

@@ -52,10 +52,8 @@ def read_openpose(path: Path) -> list[PicturePerson]:
     found = []
     for person in check(data, _Picture, where, FormatError).people:
         if len(person.pose_keypoints_2d) % 3:
-            raise FormatError(
-                f"{where}: expected x, y and confidence of each point in 'pose_keypoints_2d', found "
-                f"{len(person.pose_keypoints_2d)} numbers; export it again"
-            )
+            expected = "x, y and confidence of each point in 'pose_keypoints_2d'"
+            raise FormatError.mismatch(where, expected, f"{len(person.pose_keypoints_2d)} numbers")
         values = np.array(person.pose_keypoints_2d, dtype=np.float64).reshape(-1, 3)
         values[(values[:, :2] == 0).all(axis=1)] = (np.nan, np.nan, 0.0)
         found.append(PicturePerson(values, person.track))

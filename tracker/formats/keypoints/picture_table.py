@@ -108,10 +108,8 @@ def table_of_people(
     sizes = {len(p.points): number for number, found in kept.items() for p in found}
     if len(sizes) > 1:
         (n, one), (m, other) = list(sizes.items())[:2]
-        raise FormatError(
-            f"{where}: expected one skeleton, found {n} points in picture {one} and {m} in picture {other}; import "
-            "them apart"
-        )
+        seen = f"{n} points in picture {one} and {m} in picture {other}"
+        raise FormatError.mismatch(where, "one skeleton", seen, "import them apart")
     n_points = next(iter(sizes), len(names))
     if names and len(names) != n_points:
         raise FormatError(f"{where}: expected {len(names)} points, as many as names, found {n_points}; export it again")
