@@ -68,11 +68,7 @@ def agreement_m(points: ObservedPoints, cameras: Sequence[Camera], scale: float 
     rays = point_rays(views, chosen, known)
     gaps = []
     for a, b in combinations(range(len(cameras)), 2):
-        across = np.cross(rays[:, a, :, None], rays[:, b, None])  # (frames, detections, detections, points, 3)
-        length = np.linalg.norm(across, axis=-1)
-        baseline = views.centers[b] - views.centers[a]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            apart = np.where(length > 1e-6, np.abs(across @ baseline) / length, np.nan)
+        apart = views.ray_distances(a, b, rays[:, a, :, None], rays[:, b, None])  # of each pair of detections
         by_pair = apart.reshape(len(apart), -1, apart.shape[-1])
         medians = np.array([[_median(row) for row in frame] for frame in by_pair])
         best = np.where(np.isfinite(medians), medians, np.inf).argmin(axis=1)

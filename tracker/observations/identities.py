@@ -143,7 +143,8 @@ def _groups(
             if v == w:
                 continue
             both = (confidence[v, d] > 0) & (confidence[w, e] > 0)
-            apart = _ray_distances(views, v, w, rays[v, d][both], rays[w, e][both])
+            apart = views.ray_distances(v, w, rays[v, d][both], rays[w, e][both])
+            apart = apart[np.isfinite(apart)]
             if len(apart) and np.median(apart) < INLIER_M:
                 pairs.append((float(np.median(apart)), (v, d), (w, e)))
     groups = {at: {at[0]: at[1]} for at in detections}
@@ -155,16 +156,6 @@ def _groups(
                 groups[at] = a
     unique = {id(g): g for g in groups.values() if len(g) > 1}
     return list(unique.values())
-
-
-def _ray_distances(views: Views, a: int, b: int, u: Array, v: Array) -> Array:
-    """Return the distances between rays of two views, (n,), metres; NaN left out."""
-    across = np.cross(u, v)
-    length = np.linalg.norm(across, axis=-1)
-    known = length > 1e-6
-    baseline = views.centers[b] - views.centers[a]
-    apart = np.abs(across[known] @ baseline) / length[known]
-    return apart[np.isfinite(apart)]
 
 
 def most_seen_people(tracks: list[PersonTrack], n_people: int) -> list[list[PersonTrack]]:

@@ -81,20 +81,11 @@ def triangulate_observations(
         positions.append(own_px)
         confidences.append(own_confidence)
         exchanged.append(flags)
+    world, covariances, residuals_px, is_inlier = (np.stack(part, axis=1) for part in zip(*found, strict=True))
+    joints = ObservedJoints(points.names, people, world, covariances)
+    is_exchanged, positions_px, confidence = (np.stack(part, axis=1) for part in (exchanged, positions, confidences))
     return TriangulatedObservations(
-        ObservedJoints(
-            points.names,
-            people,
-            np.stack([t.points_world for t in found], axis=1),
-            np.stack([t.covariances for t in found], axis=1),
-        ),
-        identities,
-        detections,
-        np.stack(exchanged, axis=1),
-        np.stack([t.is_inlier for t in found], axis=1),
-        np.stack([t.residuals_px for t in found], axis=1),
-        np.stack(positions, axis=1),
-        np.stack(confidences, axis=1),
+        joints, identities, detections, is_exchanged, is_inlier, residuals_px, positions_px, confidence
     )
 
 

@@ -127,20 +127,13 @@ def _value_notes(rules: MaskRules, surveys: Mapping[str, MaskSurvey]) -> list[st
 
 def _extremes(name: str, shares: np.ndarray, frames: IntArray) -> list[FormatError]:
     """Return that the masks of a camera are all empty, or cover whole pictures."""
+    where = f"camera '{name}'"
     if len(shares) and not shares.any():
-        return [
-            FormatError(
-                f"camera '{name}': expected people in the masks, found nobody in all {len(shares)}; export them again, "
-                "or leave this camera out"
-            )
-        ]
+        found, advice = f"nobody in all {len(shares)}", "export them again, or leave this camera out"
+        return [FormatError.mismatch(where, "people in the masks", found, advice)]
     if (shares == 1).any():
-        return [
-            FormatError(
-                f"camera '{name}': expected background in each mask, found none on frames "
-                f"{short_list(frames[shares == 1])}, where people cover the whole picture; export them again"
-            )
-        ]
+        found = f"none on frames {short_list(frames[shares == 1])}, where people cover the whole picture"
+        return [FormatError.mismatch(where, "background in each mask", found, "export them again")]
     return []
 
 
@@ -155,6 +148,5 @@ def _preview(
     shares = seen.shares_by(rules)
     placed = frames[name][shares > 0]
     span = (int(placed[0]), int(placed[-1])) if len(placed) else None
-    return ViewPreview(
-        name, masks.group.place, n, span, share=float(np.median(shares[shares > 0])) if len(placed) else np.nan
-    )
+    share = float(np.median(shares[shares > 0])) if len(placed) else np.nan
+    return ViewPreview(name, masks.group.place, n, span, share=share)

@@ -3,7 +3,9 @@
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -76,14 +78,13 @@ def checksum(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-@dataclass(frozen=True, eq=False)
-class SourceFile:
+class SourceFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A file that was imported, kept as it came."""
 
-    path: str
+    path: Annotated[str, msgspec.Meta(min_length=1, max_length=1000, description="the path of a file")]
     """Path among the files of its observations, with slashes."""
-    sha256: str
-    """Checksum of its bytes, 64 hexadecimal digits."""
+    sha256: Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}\Z", description="64 hexadecimal digits")]
+    """Checksum of its bytes."""
     camera: str = ""
     """Camera of the session that it is of; empty for a file of several cameras or of points in space."""
 

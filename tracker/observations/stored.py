@@ -15,7 +15,7 @@ import zipfile
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -40,28 +40,50 @@ VERSION = 1
 KIND = TextKind("observations", TABLE_BYTES, SessionError)
 
 
-class SourceRow(msgspec.Struct, forbid_unknown_fields=True):
-    """A file that was imported."""
-
-    path: Annotated[str, msgspec.Meta(min_length=1, max_length=1000, description="the path of a file")]
-    sha256: Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}\Z", description="64 hexadecimal digits")]
-    camera: str = ""
+_People = Annotated[tuple[Name, ...], msgspec.Meta(min_length=1, description="the people of whom they are")]
+_Points = Annotated[
+    tuple[Name, ...], msgspec.Meta(min_length=1, max_length=MAX_NAMES, description="the names of the points")
+]
 
 
-class _Content(msgspec.Struct, forbid_unknown_fields=True):
+class Description(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """The file that says what was imported under a name."""
+
+    version: int = VERSION
     name: FileStem
     format: Name
-    people: Annotated[tuple[Name, ...], msgspec.Meta(min_length=1, description="the people of whom they are")]
-    points: Annotated[
-        tuple[Name, ...], msgspec.Meta(min_length=1, max_length=MAX_NAMES, description="the names of the points")
-    ]
-    skeleton: Name
-    joint_map: dict[str, Any]
-    version: int = VERSION
-    cameras: tuple[Name, ...] = ()
     notes: tuple[str, ...] = ()
     options: dict[str, str] = {}
-    sources: tuple[SourceRow, ...] = ()
+    sources: tuple[SourceFile, ...] = ()
+
+
+class _Content(Description, forbid_unknown_fields=True, kw_only=True):
+    people: _People
+    points: _Points
+    cameras: tuple[Name, ...] = ()
+    skeleton: Name
+    joint_map: dict[str, Any]
+
+
+_D = TypeVar("_D", bound=Description)
+
+
+def read_description(path: Path, where: str, kind: type[_D]) -> _D:
+    """Read what was imported; `where` names the file in messages.
+
+    Raises:
+        SessionError: the file is missing, damaged or newer.
+    """
+    data = read_toml(path, KIND)
+    check_version(data, VERSION, where, SessionError)
+    return check(data, kind, where, SessionError)
+
+
+def write_description(path: Path, where: str, content: Description) -> None:
+    """Write what was imported. Raises SessionError where a name cannot be stored."""
+    data = msgspec.to_builtins(content)
+    check(data, type(content), where, SessionError)
+    write_text_atomic(path, tomli_w.dumps(data))
 
 
 def list_observations(session: Session) -> list[str]:
@@ -100,7 +122,7 @@ def save_observations(
             _copy(files[source.path], temporary / _FILES / source.path, source.sha256)
         with (temporary / _POINTS).open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **_arrays(observations))
-        write_text_atomic(temporary / _FILE, tomli_w.dumps(_content(observations)))
+        write_description(temporary / _FILE, f"observations {observations.name}", _content(observations))
 
 
 def new_folder(session: Session, name: str) -> Path:
@@ -157,9 +179,7 @@ def load_observations(session: Session, name: str) -> ObservationSet:
         advice = f"the session has {listed}: import some"
         raise SessionError.mismatch("", "the name of imported observations", f"'{name}'", advice)
     where = f"observations {folder / _FILE}"
-    data = read_toml(folder / _FILE, KIND)
-    check_version(data, VERSION, where, SessionError)
-    row = check(data, _Content, where, SessionError)
+    row = read_description(folder / _FILE, where, _Content)
     unknown = [p for p in row.people if p not in {person.name for person in session.people}]
     if unknown:
         raise SessionError(f"{where}: expected people of the session, found '{unknown[0]}'; import them again")
@@ -169,7 +189,6 @@ def load_observations(session: Session, name: str) -> ObservationSet:
             raise SessionError(f"{where}: expected the path of a file within, found {quoted(source.path)}; correct it")
     arrays = _read_arrays(folder / _POINTS)
     joint_map = parse_joint_map(row.skeleton, row.joint_map, str(folder / _FILE))
-    sources = tuple(SourceFile(s.path, s.sha256, s.camera) for s in row.sources)
     try:
         points, joints, rows = _from_arrays(row, arrays, session)
     except (KeyError, ValueError, AssertionError) as error:
@@ -178,28 +197,25 @@ def load_observations(session: Session, name: str) -> ObservationSet:
             "import them again"
         ) from error
     return ObservationSet(
-        row.name, row.format, row.people, joint_map, points, joints, rows, sources, row.notes,
+        row.name, row.format, row.people, joint_map, points, joints, rows, row.sources, row.notes,
         tuple(row.options.items()),
     )  # fmt: skip
 
 
-def _content(observations: ObservationSet) -> dict[str, Any]:
+def _content(observations: ObservationSet) -> _Content:
     points = observations.points
-    data = {
-        "version": VERSION,
-        "name": observations.name,
-        "format": observations.format,
-        "people": list(observations.people),
-        "cameras": list(points.cameras) if points is not None else [],
-        "points": list(observations.point_names),
-        "skeleton": observations.joint_map.name,
-        "notes": list(observations.notes),
-        "joint_map": format_joint_map(observations.joint_map),
-        "options": dict(observations.options),
-        "sources": [{"path": s.path, "sha256": s.sha256, "camera": s.camera} for s in observations.sources],
-    }
-    check(data, _Content, f"observations {observations.name}", SessionError)
-    return data
+    return _Content(
+        name=observations.name,
+        format=observations.format,
+        people=observations.people,
+        points=observations.point_names,
+        cameras=points.cameras if points is not None else (),
+        skeleton=observations.joint_map.name,
+        joint_map=format_joint_map(observations.joint_map),
+        notes=observations.notes,
+        options=dict(observations.options),
+        sources=observations.sources,
+    )
 
 
 def _arrays(observations: ObservationSet) -> dict[str, Array]:

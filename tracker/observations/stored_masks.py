@@ -11,19 +11,15 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import cv2
-import msgspec
-import tomli_w
 
 from tracker.errors import SessionError, TrackerError
-from tracker.files import write_text_atomic
 from tracker.observations.observed import SourceFile, checksum
-from tracker.observations.stored import FOLDER, KIND, VERSION, SourceRow, appearing_folder
+from tracker.observations.stored import FOLDER, Description, appearing_folder, read_description, write_description
 from tracker.session.session import Session, save_cameras
-from tracker.text_files import read_toml
-from tracker.validation import FileStem, Name, check, check_version
+from tracker.validation import FileStem
 
 if TYPE_CHECKING:  # it decodes videos
     from tracker.observations.plans import MaskPlan
@@ -31,14 +27,8 @@ if TYPE_CHECKING:  # it decodes videos
 MASKS_FILE, _MASKS = "masks.toml", "masks"
 
 
-class _Content(msgspec.Struct, forbid_unknown_fields=True):
-    name: FileStem
-    format: Name
+class _Content(Description, forbid_unknown_fields=True, kw_only=True):
     cameras: dict[FileStem, int]
-    version: int = VERSION
-    notes: tuple[str, ...] = ()
-    options: dict[str, str] = {}
-    sources: tuple[SourceRow, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,14 +65,10 @@ def load_masks(session: Session, name: str) -> StoredMasks:
         SessionError: the file is missing, damaged or newer.
     """
     path = session.folder / FOLDER / name / MASKS_FILE
-    where = f"masks {path}"
-    data = read_toml(path, KIND)
-    check_version(data, VERSION, where, SessionError)
-    row = check(data, _Content, where, SessionError)
+    row = read_description(path, f"masks {path}", _Content)
     folder = masks_folder(session, name)
     users = tuple(c.camera.name for c in session.cameras if c.masks is not None and c.masks.parent == folder)
-    sources = tuple(SourceFile(s.path, s.sha256, s.camera) for s in row.sources)
-    return StoredMasks(row.name, row.format, row.cameras, row.notes, sources, users)
+    return StoredMasks(row.name, row.format, row.cameras, row.notes, row.sources, users)
 
 
 def store_masks(session: Session, plan: "MaskPlan") -> Session:
@@ -104,7 +90,15 @@ def store_masks(session: Session, plan: "MaskPlan") -> Session:
         sizes = {c.camera.name: c.camera.size for c in session.cameras}
         for camera in plan.masks:
             _write_masks(plan, camera, sizes[camera], temporary / _MASKS / camera)
-        write_text_atomic(temporary / MASKS_FILE, tomli_w.dumps(_content(plan)))
+        content = _Content(
+            name=plan.name,
+            format=plan.format,
+            cameras={name: int((own >= 0).sum()) for name, own in plan.pictures.items()},
+            notes=plan.notes,
+            options=dict(plan.options),
+            sources=plan.sources,
+        )
+        write_description(temporary / MASKS_FILE, f"masks {plan.name}", content)
     folder = masks_folder(session, plan.name)
     try:
         return save_cameras(
@@ -121,17 +115,3 @@ def _write_masks(plan: "MaskPlan", camera: str, size: tuple[int, int], folder: P
     for i, picture in enumerate(plan.pictures[camera].tolist()):
         if picture >= 0:
             (folder / f"{picture:06d}.png").write_bytes(cv2.imencode(".png", plan.mask(camera, i, size))[1].tobytes())
-
-
-def _content(plan: "MaskPlan") -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "version": VERSION,
-        "name": plan.name,
-        "format": plan.format,
-        "cameras": {name: int((own >= 0).sum()) for name, own in plan.pictures.items()},
-        "notes": list(plan.notes),
-        "options": dict(plan.options),
-        "sources": [{"path": s.path, "sha256": s.sha256, "camera": s.camera} for s in plan.sources],
-    }
-    check(data, _Content, f"masks {plan.name}", SessionError)
-    return data

@@ -67,6 +67,14 @@ class Views:
         """Return unit directions in the world of undistorted pixels, (n, n_views, 2), as (n, n_views, 3)."""
         return np.stack([c.pinhole.rays(points_px[:, v]) for v, c in enumerate(self.cameras)], axis=1)
 
+    def ray_distances(self, a: int, b: int, u: Array, v: Array) -> Array:
+        """Return the distances between rays u of view a and v of view b, (..., 3), metres; NaN for parallel ones."""
+        across = np.cross(u, v)
+        length = np.linalg.norm(across, axis=-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            apart = np.abs(across @ (self.centers[b] - self.centers[a])) / length
+        return np.where(length > 1e-6, apart, np.nan)
+
     def project(self, points_world: Array) -> tuple[Array, Array]:
         """Project points, (..., 3), into all views: undistorted px, (..., n_views, 2), and depths, (..., n_views)."""
         h = np.einsum("vij,...j->...vi", self.P[:, :, :3], points_world) + self.P[:, :, 3]
