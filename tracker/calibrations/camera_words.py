@@ -69,6 +69,8 @@ _NUMBERS = (
     "fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
     "qw", "qx", "qy", "qz", "tx", "ty", "tz",
 )  # fmt: skip
+COEFFICIENTS = {False: ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), True: ("k1", "k2", "k3", "k4")}
+"""OpenCV's order of the coefficients of a usual lens, and of a fisheye."""
 _POSE = {"matrix_R", "rodrigues", "quaternion", "qw", "translation", "tx", "T_camera_world", "T_world_camera"}
 """Meanings that belong to a pose."""
 _OTHER_POSES = (
@@ -346,9 +348,8 @@ def _split(known: Mapping[str, Any], matrix: Any, camera: str, document: Documen
     try:
         K, T_camera_world = split_projection(known["projection"])
     except ProjectionError as error:
-        raise CalibrationError(
-            f"{document.where}, camera {quoted(camera)}: {error}; give K, R and t of the camera instead"
-        ) from error
+        place, advice = f"{document.where}, camera {quoted(camera)}", "give K, R and t of the camera instead"
+        raise CalibrationError(f"{place}: {error}; {advice}") from error
     if matrix is not None and not np.allclose(plain_array(matrix), K, rtol=1e-3, atol=1e-3 * K[0, 0]):
         return matrix, None  # that of rectified pictures, as ROS writes it
     return (K.tolist() if matrix is None else matrix), T_camera_world
@@ -404,8 +405,7 @@ def _distortions(known: Mapping[str, Any], fisheye: bool) -> Any:
         radial, tangential = plain_array(known["radial"]).ravel(), plain_array(known.get("tangential", [0, 0])).ravel()
         found = [*radial[:2], *tangential, *radial[2:]]
     if found is None:
-        order = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-        found = [known.get(k, 0.0) for k in order] if "k1" in known else []
+        found = [known.get(k, 0.0) for k in COEFFICIENTS[fisheye]] if "k1" in known else []
     flat = reshaped(found, {n: (n,) for n in range(1, 15)})
     # OpenCV writes 12 or 14 values; those of thin prisms and tilted sensors are usually 0.
     while not fisheye and isinstance(flat, list) and len(flat) in _SHORTER and not any(flat[_SHORTER[len(flat)] :]):

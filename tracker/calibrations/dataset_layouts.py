@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from tracker.calibrations.camera_matrices import plain_array
-from tracker.calibrations.camera_words import Section, each, once, section_of
+from tracker.calibrations.camera_words import COEFFICIENTS, Section, each, once, section_of
 from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
 from tracker.validation import quoted
 
-_FISHEYE = ("k1", "k2", "k3", "k4")
 _WILDTRACK = {"intr_": {"camera_matrix", "distortion_coefficients"}, "extr_": {"rvec", "tvec"}}
 
 
@@ -51,7 +50,7 @@ def read_xrmocap(document: Document) -> dict[str, Section]:
     K = plain_array(data.get("intrinsic"))
     if K.shape == (4, 4):  # its third and fourth row are exchanged, as PyTorch3D has them
         K = np.vstack([K[:2, :3], [0.0, 0.0, 1.0]])
-    lens = {key: data.get(key) or 0.0 for key in ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")}
+    lens = {key: data.get(key) or 0.0 for key in COEFFICIENTS[False]}
     words = {"K": K.tolist(), **lens, "size": [data.get("width"), data.get("height")]}
     section = section_of(words, name or document.stem, replace(document, data={})) | {"name": name or None}
     R, t = plain_array(data["extrinsic_r"]), plain_array(data["extrinsic_t"]).ravel()
@@ -107,13 +106,13 @@ def read_calib_io(document: Document) -> dict[str, Section]:
         kind = (model.get("polymorphic_id") or 0) % 2**31 if isinstance(model.get("polymorphic_id"), int) else 0
         names.setdefault(kind, str(model.get("polymorphic_name")).removeprefix("libCalib::CameraModel"))
         numbers = {key: _inner(row).get("val") for key, row in _inner(data, "parameters").items()}
-        order = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tauX", "tauY")
+        order = (*COEFFICIENTS[False], "s1", "s2", "s3", "s4", "tauX", "tauY")
         turn, shift = (_inner(camera, "transform", key) for key in ("rotation", "translation"))
         words = {
             "model": names[kind],
             "focal_length": _focal(numbers.get("f"), numbers.get("ar")),
             "principal_point": [numbers.get("cx"), numbers.get("cy")],
-            "distortions": [numbers.get(key) or 0.0 for key in (order if "p1" in numbers else _FISHEYE)],
+            "distortions": [numbers.get(key) or 0.0 for key in (order if "p1" in numbers else COEFFICIENTS[True])],
             "rvec": [turn.get(key) for key in ("rx", "ry", "rz")],
             "t": [shift.get(key) for key in "xyz"],
             "size": _inner(data, "CameraModelCRT", "CameraModelBase", "imageSize"),

@@ -100,11 +100,8 @@ def is_fisheye(words: Mapping[str, Any]) -> bool:
         return False
     if denied := [key for key in said if spelled(key) in _FLAGS and said[key] == PINHOLE]:
         other = next(key for key in said if said[key] == FISHEYE)
-        raise UnknownLensError(
-            f"expected one model of the lens, found {denied[0]} = {quoted(words[denied[0]])} and {other} = "
-            f"{quoted(words[other])}; "
-            "correct the wrong one"
-        )
+        found = " and ".join(f"{key} = {quoted(words[key])}" for key in (denied[0], other))
+        raise UnknownLensError(f"expected one model of the lens, found {found}; correct the wrong one")
     return True
 
 

@@ -150,16 +150,12 @@ def check_convention(
     if is_clearly_worse(stated, best, len(Ts_stated)):
         rewrite = _rewrite(others[0])
         condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {in_words(others[0])}"
-        misfit = f"expected {expected}, by which the cameras see no one place"
+        misfit = f"{expected}, by which the cameras see no one place"
         if len(others) == 1:
-            raise CalibrationError(
-                f"{where}: {misfit}, found that they do {condition}",
-                Remedy("give_poses", poses=others[0], rewrite="likewise" if is_turned else rewrite),
-            )
-        raise CalibrationError(
-            f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({in_words(c)})' for c in others)}",
-            Remedy("choose_poses"),
-        )
+            remedy = Remedy("give_poses", poses=others[0], rewrite="likewise" if is_turned else rewrite)
+            raise CalibrationError.mismatch(where, misfit, f"that they do {condition}", remedy)
+        fitting = "; ".join(f"{c} ({in_words(c)})" for c in others)
+        raise CalibrationError.mismatch(where, misfit, f"that several others fit: {fitting}", Remedy("choose_poses"))
     others = [c for c in others if cost[c] <= _LEAD.ratio * stated + _LEAD.margin]
     if is_fixed or not others or stated >= _MAX_ANGLE:
         return None

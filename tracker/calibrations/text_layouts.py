@@ -13,7 +13,7 @@ from pathlib import PurePath
 import numpy as np
 
 from tracker.calibrations.camera_matrices import ProjectionError, split_projection
-from tracker.calibrations.camera_words import Section, once, plain_camera, unit_rotation, unusable
+from tracker.calibrations.camera_words import COEFFICIENTS, Section, once, plain_camera, unit_rotation, unusable
 from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
 from tracker.geometry.camera_rig import axes_point
@@ -34,8 +34,6 @@ _COLMAP = {
     "OPENCV_FISHEYE": "fx fy cx cy k1 k2 k3 k4",
 }
 """Parameters of COLMAP's models of lenses, in its order; the others are none of OpenCV's."""
-_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-_FISHEYE_ORDER = ("k1", "k2", "k3", "k4")
 
 
 def _lines(document: Document) -> list[str]:
@@ -227,7 +225,7 @@ def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, po
     # COLMAP's corner of the picture is at 0, 0, and the centre of its first pixel at 0.5, 0.5.
     K = np.array([[fx, 0.0, numbers["cx"] - 0.5], [0.0, fy, numbers["cy"] - 0.5], [0.0, 0.0, 1.0]])
     fisheye = lens[1].endswith("FISHEYE")
-    order = _FISHEYE_ORDER if fisheye else _ORDER[: 8 if "k3" in numbers else 4]
+    order = COEFFICIENTS[fisheye][: 8 if "k3" in numbers else 4]
     size = _row(document, name, "size", " ".join(lens[2:4]), 2)
     T = rigid.transform(R, np.array([x, y, z]))
     return plain_camera(name, size, K, [numbers.get(key, 0.0) for key in order], T, fisheye)

@@ -43,11 +43,9 @@ def check_units(
     limit = f"within {_DISTANCE.high:g} m" if is_far else f"at least {least:g} m"
     counts_squares = square == 1 and units == "m"  # which is noted
     if not (any_size or counts_squares) and (is_far or 0 < distance_m < least):
-        raise CalibrationError(
-            f"{where}: expected cameras {limit} {place}, found {found} {_WORDS[units]}, so that the unit is another"
-            + (f"; {squares}" if square == 1 else ""),
-            None if square == 1 else _remedy(in_units, units),
-        )
+        other = f"{found} {_WORDS[units]}, so that the unit is another"
+        advice = squares if square == 1 else _remedy(in_units, units)
+        raise CalibrationError.mismatch(where, f"cameras {limit} {place}", other, advice)
     notes = []
     if square == 1:
         notes.append(

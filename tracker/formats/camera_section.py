@@ -100,11 +100,9 @@ class CameraEntry:
             expected = "the key 'size' in the calibration"
             raise CalibrationError.mismatch(f"camera '{self.name}'", expected, "none", advice)
         if self.size is None and self.eccentricity(size) > MAX_OFFSET:
-            raise CalibrationError(
-                f"camera '{self.name}': the calibration states no image size, and its principal point "
-                f"{self.K[0, 2]:.0f}, {self.K[1, 2]:.0f} is not that of footage of {size[0]}x{size[1]} pixels; "
-                "calibrate at the size of the footage"
-            )
+            other = f"is not that of footage of {size[0]}x{size[1]} pixels; calibrate at the size of the footage"
+            point = f"and its principal point {self.K[0, 2]:.0f}, {self.K[1, 2]:.0f} {other}"
+            raise CalibrationError(f"camera '{self.name}': the calibration states no image size, {point}")
         return Camera(self.name, size, self.K, self.distortion, self.T_world_camera, self.fisheye)
 
 

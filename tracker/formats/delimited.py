@@ -70,9 +70,18 @@ def _rows(where: str, separator: str, lines: Iterable[str], skipped: tuple[str, 
     for number, line in enumerate(lines, 1):
         if line.startswith(skipped):
             continue
-        is_plain = '"' not in line and len(line) <= csv.field_size_limit()
-        try:
-            cells = line.split(separator) if is_plain else next(csv.reader([line], delimiter=separator))
-        except csv.Error as error:
-            raise FormatError(f"{where}, line {number}: {error}; export it again") from error
+        cells = split_cells(line, separator, f"{where}, line {number}")
         yield TableLine(number, [cell.strip() for cell in cells] if line.strip(" \r") else [])
+
+
+def split_cells(line: str, separator: str, place: str) -> list[str]:
+    """Return the cells of a line, without quotes around them; `place` is that of the line in messages.
+
+    Raises:
+        FormatError: it is malformed.
+    """
+    is_plain = '"' not in line and len(line) <= csv.field_size_limit()
+    try:
+        return line.split(separator) if is_plain else next(csv.reader([line], delimiter=separator))
+    except csv.Error as error:
+        raise FormatError(f"{place}: {error}; export it again") from error

@@ -57,6 +57,11 @@ class JointMap:
         single = {marker: (point,) for point, marker in self.markers.items()}
         return {m: single.get(m) or tuple(self.means.get(m, ())) for m in markers}
 
+    def missing(self, names: Sequence[str], lacks: str) -> list[FormatError]:
+        """Return that the first marker which is not among some names is missing; `lacks` begins the sentence."""
+        listed = f"which the joint map {self.name} names; expected one of {', '.join(names)}"
+        return [FormatError(f"{lacks} '{m}', {listed}") for m in self.markers.values() if m not in names][:1]
+
     @property
     def with_sides_exchanged(self) -> "JointMap":
         """The convention with left for right."""
@@ -104,11 +109,10 @@ def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:
 
     best = max(known_joint_maps(), key=fit)
     if fit(best)[0] < _MIN_JOINTS:
-        raise FormatError(
-            f"the markers of {source} follow no known convention ({', '.join(m.name for m in known_joint_maps())}): "
-            f"found {', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}",
-            Remedy("give_joint_map", marker=_quoted(markers[0])),
-        )
+        known = f"follow no known convention ({', '.join(m.name for m in known_joint_maps())})"
+        found = f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}"
+        remedy = Remedy("give_joint_map", marker=_quoted(markers[0]))
+        raise FormatError(f"the markers of {source} {known}: found {found}", remedy)
     return best
 
 
@@ -162,10 +166,8 @@ def parse_joint_map(name: str, data: object, source: str) -> JointMap:
     found = msgspec.to_builtins(check(data, _JointMapFile, f"joint map {source}", FormatError))
     markers = {p: found[p] for p in _BODY_POINTS if found[p] is not None}
     if not markers:
-        raise FormatError(
-            f'joint map {source}: expected lines such as left_shoulder = "LSHO" for {", ".join(JOINTS)}, found none; '
-            "add them"
-        )
+        expected = f'lines such as left_shoulder = "LSHO" for {", ".join(JOINTS)}'
+        raise FormatError.mismatch(f"joint map {source}", expected, "none", "add them")
     means = {marker: tuple(points) for marker, points in found["means"].items()}
     for marker, points in means.items():
         if unknown := [p for p in points if p not in _BODY_POINTS] or (["nothing"] if not points else []):
@@ -188,17 +190,10 @@ def joints_of(table: MarkerTable, source: str, joint_map: JointMap | None = None
     Raises:
         FormatError: no convention fits, or the map names a marker that the file lacks.
     """
-    if joint_map is None:
-        markers = guess_joint_map(table.names, source).markers
-        markers = {j: m for j, m in markers.items() if m in table.names}
-    else:
-        markers = joint_map.markers
-    for marker in markers.values():
-        if marker not in table.names:
-            raise FormatError(
-                f"{source} has no marker '{marker}', which the joint map {joint_map.name if joint_map else ''} names; "
-                f"expected one of {', '.join(table.names)}"
-            )
+    for error in joint_map.missing(table.names, f"{source} has no marker") if joint_map else ():
+        raise error
+    markers = (joint_map or guess_joint_map(table.names, source)).markers
+    markers = {j: m for j, m in markers.items() if m in table.names}
     joints = tuple(j for j in JOINTS if j in markers)
     columns = [table.names.index(markers[j]) for j in joints]
     return replace(table, names=joints, points=table.points[:, columns])

@@ -34,24 +34,15 @@ def json_spans(text: str) -> Any:
             if token == "]":
                 outer, name = stack[-1]
                 _put(outer, name, SpanList(holder, match.start(1)), replace_last=True)
-        elif token == "{":
-            inner: Any = {}
-            _put(holder, key, inner)
-            stack.append((inner, None))
-        elif token == "[":
-            inner = []
+        elif token in "{[":
+            inner: Any = {} if token == "{" else []
             _put(holder, key, inner)
             stack.append((inner, None))
         elif token == ",":
             stack[-1] = (holder, None)
-        elif token == ":":
-            pass
-        elif token[0] == '"':
-            if isinstance(holder, dict) and key is None:
-                stack[-1] = (holder, json.loads(token))
-            else:
-                _put(holder, key, None)
-        else:
+        elif token[0] == '"' and isinstance(holder, dict) and key is None:
+            stack[-1] = (holder, json.loads(token))
+        elif token != ":":
             _put(holder, key, match.span(1) if _NUMBER.fullmatch(token) else None)
     return root[0]
 

@@ -172,10 +172,8 @@ def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyM
     else:
         path = Path(name_or_path)
         if path.suffix != ".toml" or not os.path.isfile(path):  # unlike pathlib's, for any name
-            raise ModelError(
-                f"body model '{name_or_path}' not found: expected one of {', '.join(PRESETS)} "
-                "or the path of a .toml file"
-            )
+            expected = f"one of {', '.join(PRESETS)} or the path of a .toml file"
+            raise ModelError(f"body model '{name_or_path}' not found: expected {expected}")
         text = read_text(path, _KIND)
     return parse_model(text, str(name_or_path), height_m)
 
@@ -303,10 +301,8 @@ def _order(joints: Sequence[Joint], source: str) -> tuple[Joint, ...]:
     roots = [j.name for j in joints if not j.parent]
     for j in joints:
         if j.parent and j.parent not in parts:
-            raise ModelError(
-                f"body model {source}: joint '{j.name}' hangs on a missing parent part '{j.parent}'; "
-                f"expected one of {', '.join(sorted(parts))}"
-            )
+            problem = f"joint '{j.name}' hangs on a missing parent part '{j.parent}'"
+            raise ModelError(f"body model {source}: {problem}; expected one of {', '.join(sorted(parts))}")
     placed: dict[str, Joint] = {}
     waiting = list(joints)
     while waiting:

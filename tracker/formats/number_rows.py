@@ -1,6 +1,5 @@
 """Rows of numbers from the lines of a table file: a frame number first, the same number of columns in each."""
 
-import csv
 import re
 from array import array
 from collections.abc import Mapping, Sequence
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import FormatError
+from tracker.formats.delimited import split_cells
 from tracker.geometry.arrays import Array
 from tracker.validation import MAX_FRAMES, quoted
 
@@ -62,7 +62,10 @@ class NumberRows:
             FormatError: the row has another number of columns or is not numbers, or the table is too large.
         """
         self._check_size(line)
-        self._append(self._complete_row(text) or self._row(text, line), line)
+        row = self._complete_row(text)
+        self._append(
+            row or self._numbers(split_cells(text, self._separator, f"{self._where}, line {line}"), line), line
+        )
 
     def add_cells(self, cells: Sequence[str], line: int) -> None:
         """Add a row of cells; see `add`."""
@@ -82,7 +85,7 @@ class NumberRows:
             raise FormatError.mismatch(f"{self._where}, line {line}", expected, "more", "cut it in pieces")
 
     def _complete_row(self, text: str) -> list[float] | None:
-        """Parse a row without blanks, twice as fast as `_row`; None if it needs a closer look."""
+        """Parse a row without blanks, twice as fast as `_numbers`; None if it needs a closer look."""
         if self._separator != ",":
             if "," in text:
                 return None
@@ -93,12 +96,8 @@ class NumberRows:
             return None
         return row if len(row) == self._n_columns else None
 
-    def _row(self, text: str, line: int) -> list[float]:
-        try:
-            fields = next(csv.reader([text], delimiter=self._separator))
-        except csv.Error as error:
-            raise FormatError(f"{self._where}, line {line}: {error}; export it again") from error
-        return self._numbers(fields, line)
+    def _split(self, text: str, line: int) -> list[str]:
+        return split_cells(text, self._separator, f"{self._where}, line {line}")
 
     def _numbers(self, fields: Sequence[str], line: int) -> list[float]:
         where = f"{self._where}, line {line}"

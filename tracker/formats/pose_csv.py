@@ -151,9 +151,8 @@ def _read_head(lines: Sequence[str], where: str) -> _Head:
     try:
         return msgspec.convert(head, _Head, strict=False)
     except msgspec.ValidationError as error:
-        raise FormatError(
-            f"{where}: expected '# model = NAME' and '# height_m = METRES' below its first line; export it again"
-        ) from error
+        expected = "'# model = NAME' and '# height_m = METRES' below its first line"
+        raise FormatError(f"{where}: expected {expected}; export it again") from error
 
 
 def _read_columns(columns: Sequence[str], where: str) -> tuple[tuple[str, ...], list[float]]:

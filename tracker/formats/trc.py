@@ -192,11 +192,10 @@ def _read_rows(
         n_found = line.count("\t") + 1
         if not line.endswith("\n") and (n_found < n_columns or n_rows < (n_promised or 0)):
             of_rows = f" of {n_promised}" if n_promised else ""
-            raise FormatError(
-                f"{where}, line {number}: expected the end of a line, found that of the file, after {n_found} of "
-                f"{n_columns} columns in row {n_rows}{of_rows}, so that it may be cut off; copy or export it again, or "
-                "end the line if it is complete"
-            )
+            cut = f"after {n_found} of {n_columns} columns in row {n_rows}{of_rows}, so that it may be cut off"
+            advice = "copy or export it again, or end the line if it is complete"
+            place = f"{where}, line {number}"
+            raise FormatError.mismatch(place, "the end of a line", f"that of the file, {cut}", advice)
         rows.add(text, number)  # some writers end rows with tabs, some drop them
     return rows.table(MAX_NUMBER, {2: MAX_TIME})
 

@@ -162,30 +162,16 @@ def _skeleton(
     try:
         if names:
             found = given or guess_joint_map(names, where)
-            return names, found, _missing_markers(given, names, where)
-        found = given if given is not None and given.points else joint_map_of_size(n_points, where)
-        if len(found.points) == n_points:
-            chosen = given or found
-            return found.points, chosen, _missing_markers(given, found.points, where)
-        wrong = FormatError(
-            f"{where}: expected the {len(found.points)} points that the joint map {found.name} lists, found "
-            f"{n_points}; correct 'points' in the map"
-        )
-        return numbered, found, [wrong]
+        else:
+            known = given if given is not None and given.points else joint_map_of_size(n_points, where)
+            if len(known.points) != n_points:
+                expected = f"the {len(known.points)} points that the joint map {known.name} lists"
+                wrong = FormatError.mismatch(where, expected, n_points, "correct 'points' in the map")
+                return numbered, known, [wrong]
+            names, found = known.points, given or known
+        return names, found, given.missing(names, f"{where} have no point") if given else []
     except FormatError as error:
         return numbered, JointMap("unknown", {}), [error]
-
-
-def _missing_markers(given: JointMap | None, names: tuple[str, ...], where: str) -> list[FormatError]:
-    """Return that a map that was given names points which the files lack."""
-    missing = [m for m in (given.markers.values() if given else ()) if m not in names]
-    return [
-        FormatError(
-            f"{where} have no point '{marker}', which the joint map {given.name if given else ''} names; expected one "
-            f"of {', '.join(names)}"
-        )
-        for marker in missing[:1]
-    ]
 
 
 def _assemble(

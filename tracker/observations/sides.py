@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.observations.triangulation import INLIER_M, Views, pair_hypotheses, usual_step
+from tracker.observations.triangulation import INLIER_M, Views, cheapest_path, leaps, pair_hypotheses, usual_step
 
 _EXCHANGE = 0.5
 """Price of an exchanged view, in confidences of disagreeing points: half a point that disagrees everywhere. Without it,
@@ -46,7 +46,8 @@ def exchanged_sides(views: Views, points_px: Array, confidence: Array, pairs: Se
         found = _consensus(views, points_px[open_frames], confidence[open_frames], _exchange(columns, pattern))
         costs[i, open_frames] = found.costs + _EXCHANGE * pattern.sum()
         points[i, open_frames] = found.points_world
-    return patterns[_cheapest_path(costs, points)]
+    usual = np.maximum(usual_step(points[0]), INLIER_M / 2)
+    return patterns[cheapest_path(costs, lambda k: np.nan_to_num(leaps(points, usual, k), nan=1.0).sum(axis=-1))]
 
 
 class _Consensus(NamedTuple):
@@ -104,29 +105,6 @@ def _exchange(columns: IntArray, pattern: Mask) -> IntArray:
 def _gather(values: Array, columns: IntArray) -> Array:
     """Return values (n_frames, n_views, n_points, ...) in other columns of each view, (n_views, n)."""
     return np.stack([values[:, v, c] for v, c in enumerate(columns)], axis=1)
-
-
-def _cheapest_path(costs: Array, points: Array) -> IntArray:
-    """Return the pattern of each frame, (n_frames,).
-
-    Args:
-        costs: (n_patterns, n_frames).
-        points: (n_patterns, n_frames, n_points, 3), metres; NaN where absent.
-    """
-    usual = np.maximum(usual_step(points[0]), INLIER_M / 2)
-    n_patterns, n_frames = costs.shape
-    total, back = costs[:, 0], np.zeros((n_frames, n_patterns), dtype=np.int64)
-    for k in range(1, n_frames):
-        step = np.linalg.norm(points[:, None, k] - points[None, :, k - 1], axis=-1)
-        leaps = np.nan_to_num(np.minimum((step / (2 * usual)) ** 2, 1.0), nan=1.0).sum(axis=-1)
-        sums = leaps + total[None]
-        back[k] = np.argmin(sums, axis=1)
-        total = costs[:, k] + sums.min(axis=1)
-    path = np.empty(n_frames, dtype=np.int64)
-    path[-1] = np.argmin(total)
-    for k in range(n_frames - 1, 0, -1):
-        path[k - 1] = back[k, path[k]]
-    return path
 
 
 def with_sides_exchanged(values: Array, pairs: Sequence[tuple[int, int]], is_exchanged: Mask) -> Array:

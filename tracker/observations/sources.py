@@ -183,11 +183,9 @@ def match_cameras(
 
 def no_camera(cameras: Sequence[str], group: FileGroup) -> FormatError:
     """Return that files are named after none of the cameras of the session."""
-    return FormatError(
-        f"expected the name of a camera ({', '.join(cameras)}) in {group.place}, found "
-        f"{', '.join(dict.fromkeys(filter(None, group.labels)))}",
-        Remedy("name_observed_camera", camera=cameras[0]),
-    )
+    expected = f"the name of a camera ({', '.join(cameras)}) in {group.place}"
+    found = ", ".join(dict.fromkeys(filter(None, group.labels)))
+    return FormatError.mismatch("", expected, found, Remedy("name_observed_camera", camera=cameras[0]))
 
 
 def source_files(groups: Sequence[tuple[FileGroup, str]]) -> tuple[tuple[SourceFile, ...], dict[str, Path]]:

@@ -64,14 +64,7 @@ def read_space(
     except FormatError as error:
         joint_map = JointMap("unknown", {})
         problems.append(error)
-    missing = [m for m in (given.markers.values() if given else ()) if m not in names]
-    if missing and given:
-        problems.append(
-            FormatError(
-                f"{paths[0]} has no point '{missing[0]}', which the joint map {given.name} names; expected one of "
-                f"{', '.join(names)}"
-            )
-        )
+    problems += given.missing(names, f"{paths[0]} has no point") if given else []
     if not np.isfinite(joints_world).all(axis=-1).any():
         problems.append(FormatError("expected points of some frame, found none; check the file"))
     joints = ObservedJoints(names, request.people, joints_world)
@@ -155,9 +148,8 @@ def name_points(names: tuple[str, ...], given: JointMap | None, source: str) -> 
         if not source.startswith("xyz_"):
             raise
         named = f"{Path(source).stem}_labelled.csv"
-        raise FormatError(
-            f"{error} (import {named} if there is one, in which Caliscope names them)", error.remedy
-        ) from error
+        labelled = f"(import {named} if there is one, in which Caliscope names them)"
+        raise FormatError(f"{error} {labelled}", error.remedy) from error
     n_named = len(found.points)
     return (found.points + names[n_named:] if n_named in (n_body, len(names)) else names), given or found
 

@@ -192,10 +192,8 @@ def load_observations(session: Session, name: str) -> ObservationSet:
     try:
         points, joints, rows = _from_arrays(row, arrays, session)
     except (KeyError, ValueError, AssertionError) as error:
-        raise SessionError(
-            f"{folder / _POINTS} does not hold {session.n_frames} frames of the points that {_FILE} names ({error}); "
-            "import them again"
-        ) from error
+        lacking = f"does not hold {session.n_frames} frames of the points that {_FILE} names ({error})"
+        raise SessionError(f"{folder / _POINTS} {lacking}; import them again") from error
     return ObservationSet(
         row.name, row.format, row.people, joint_map, points, joints, rows, row.sources, row.notes,
         tuple(row.options.items()),

@@ -6,7 +6,7 @@ decided by the path of the point through the frames. Gauss-Newton then minimizes
 that agree.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -196,19 +196,38 @@ def _smooth_choice(found: Hypotheses, n_frames: int, n_points: int) -> IntArray:
     # A pair without a point is taken only where no pair has one: it costs more than all frames together can.
     nowhere = 2.0 * n_frames * (1 + costs[np.isfinite(costs)].max(initial=0.0))
     finite = np.where(np.isfinite(costs), costs, nowhere)
-    total, back = finite[:, 0], np.zeros((n_frames, n_pairs, n_points), dtype=np.int64)
-    for k in range(1, n_frames):
-        step = np.linalg.norm(points[:, None, k] - points[None, :, k - 1], axis=-1)  # (to, from, point)
-        way = np.minimum((step / (2 * usual)) ** 2, 1.0)
-        way = np.where(np.isfinite(way), way, 0.0)  # a point that is nowhere may come from anywhere
-        sums = way + total[None]
-        back[k] = np.argmin(sums, axis=1)
-        total = finite[:, k] + sums.min(axis=1)
-    choice = np.empty((n_frames, n_points), dtype=np.int64)
-    choice[-1] = np.argmin(total, axis=0)
-    for k in range(n_frames - 1, 0, -1):
-        choice[k - 1] = np.take_along_axis(back[k], choice[k][None], axis=0)[0]
-    return choice.ravel()
+    # A point that is nowhere may come from anywhere.
+    return cheapest_path(finite, lambda k: np.nan_to_num(leaps(points, usual, k), nan=0.0)).ravel()
+
+
+def leaps(points: Array, usual: Array, k: int) -> Array:
+    """Return the costs of the ways of points from frame k - 1 to k, (to, from, point): 1 from twice the usual step on.
+
+    Args:
+        points: (n_states, n_frames, n_points, 3), metres; NaN where absent.
+        usual: usual step of each point, (n_points,), metres.
+        k: frame.
+    """
+    step = np.linalg.norm(points[:, None, k] - points[None, :, k - 1], axis=-1)
+    return np.minimum((step / (2 * usual)) ** 2, 1.0)
+
+
+def cheapest_path(costs: Array, ways: Callable[[int], Array]) -> IntArray:
+    """Return the state of each frame on the cheapest path through all, (n_frames, ...), by Viterbi's algorithm.
+
+    Args:
+        costs: of the states, (n_states, n_frames, ...).
+        ways: cost of each way from frame k - 1 to k, (to, from, ...).
+    """
+    total, back = costs[:, 0], [np.zeros(costs[:, 0].shape, dtype=np.int64)]
+    for k in range(1, costs.shape[1]):
+        sums = ways(k) + total[None]
+        back.append(np.argmin(sums, axis=1))
+        total = costs[:, k] + sums.min(axis=1)
+    path = [np.asarray(np.argmin(total, axis=0))]
+    for arrows in back[:0:-1]:
+        path.append(np.take_along_axis(arrows, path[-1][None], axis=0)[0])
+    return np.stack(path[::-1])
 
 
 def usual_step(points: Array) -> Array:

@@ -80,10 +80,9 @@ def _check(found: Any, values: Array, rate: float, first_frame: int) -> None:
         first_frame,
         first_frame + values.shape[2] - 1,
     ):
-        raise FormatError(
-            f"expected {values.shape[1]} points on {values.shape[2]} frames from {first_frame} in the C3D file, "
-            f"read back {points.shape[1]} on {points.shape[2]} from {header['first_frame']}; choose another format"
-        )
+        wanted = f"{values.shape[1]} points on {values.shape[2]} frames from {first_frame} in the C3D file"
+        back = f"{points.shape[1]} on {points.shape[2]} from {header['first_frame']}"
+        raise FormatError(f"expected {wanted}, read back {back}; choose another format")
     precision = 2 * np.finfo(np.float32).eps
     if not np.allclose(points, values, rtol=precision, atol=1e-6, equal_nan=True) or not np.isclose(
         header["frame_rate"], rate, rtol=precision

@@ -30,11 +30,10 @@ def patch_table(path: Path, unit_m: float | None, changes: Mapping[int, Array]) 
     layout, table, exact = find_layout(Sample(path)), read_delimited(path), exact_text(path.read_bytes())
     columns = named_columns(table) if layout is WIDE else None
     if columns is None or columns.person is not None or (table.separator != "," and "," in exact.text):
-        raise FormatError(
-            f"{path}: expected a table with a row for each frame of one person and points in decimal numbers, the one "
-            f"layout into which points are written back, found {layout.program if layout else 'another'}; export the "
-            "poses as TRC or CSV"
-        )
+        expected = "a table with a row for each frame of one person and points in decimal numbers, the one layout"
+        found = layout.program if layout else "another"
+        advice = "export the poses as TRC or CSV"
+        raise FormatError.mismatch(path, f"{expected} into which points are written back", found, advice)
     (found,) = read_table(named_columns, path, unit_m, 1.0)
     scale = METRES_BY_WORD.get(columns.unit, unit_m)
     assert scale is not None

@@ -73,9 +73,8 @@ def read_scenes(paths: Sequence[Path], unit_m: float | None, rate: float) -> Sce
     numbers = np.array(sorted(frames), dtype=np.int64)
     sizes = {len(points) for found in people.values() for points in found.values()}
     if len(sizes) != 1:
-        raise FormatError(
-            f"{folder}: expected equally many points of people in all files, found {sorted(sizes) or 'none'}"
-        )
+        expected = "equally many points of people in all files"
+        raise FormatError(f"{folder}: expected {expected}, found {sorted(sizes) or 'none'}")
     check_size((len(people), len(numbers), *sizes, 4), str(folder))
     tables = []
     for name, found in sorted(people.items()):

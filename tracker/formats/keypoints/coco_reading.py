@@ -4,7 +4,7 @@ v of a key point is 0, 1 or 2 in datasets, which is no confidence; detectors wri
 person. Images are matched to cameras by `camera`, as this program writes it, or by the folder of their file name.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -174,13 +174,22 @@ def read_coco(path: Path, program: str = "COCO") -> list[tuple[tuple[str, ...], 
         raise FormatError(f"{where}: expected key points of people, found none; export them")
     out = []
     for labels, images in found.images.items():
-        sizes = {(i.width, i.height) for i in images.values() if i.width and i.height}
-        if len(sizes) > 1:
-            raise FormatError(f"{where}: expected images of one size for {labels[0]}, found {sorted(sizes)[:3]}")
         of_number = {number: people.get(image.id, []) for number, image in images.items()}
-        more = {"size": next(iter(sizes), None), "notes": found.notes}
+        more = {"size": common_size(images.values(), where), "notes": found.notes}
         out.append((labels, table_of_people(of_number, where, found.names, **more)))
     return out
+
+
+def common_size(images: Iterable[CocoPicture], where: str) -> tuple[int, int] | None:
+    """Return width and height of the images of a camera, px; None if none states its size.
+
+    Raises:
+        FormatError: they differ; `where` names the file.
+    """
+    sizes = {(i.width, i.height) for i in images if i.width and i.height}
+    if len(sizes) > 1:
+        raise FormatError(f"{where}: expected images of one size, found {sorted(sizes)[:3]}; export them apart")
+    return next(iter(sizes), None)
 
 
 def quoted_images(one: CocoPicture, other: CocoPicture) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.delimited import TableLine, read_delimited
@@ -83,24 +84,29 @@ def read_deeplabcut_hdf5(path: Path) -> PictureTable:
     import h5py
 
     with h5py.File(path, "r") as file:
-        groups = [g for g in file.values() if "table" in g and "non_index_axes" in g.attrs]
-        if len(groups) != 1:
-            raise FormatError(f"{where}: expected one table of pandas, found {len(groups)}; export it as CSV")
-        ((_, heads),) = _Plain(io.BytesIO(bytes(groups[0].attrs["non_index_axes"]))).load()
-        columns = [_column(head, where) for head in heads]
-        table = groups[0]["table"]
-        check_size((len(table), max(len(columns), table.dtype.itemsize // np.dtype(float).itemsize)), where)
-        rows = table[:]
-        blocks = [name for name in rows.dtype.names if name.startswith("values_block_")]
-        values = np.concatenate([rows[name].reshape(len(rows), -1) for name in blocks], axis=1).astype(np.float64)
-        indices = rows["index"].tolist()
+        _, rows, columns, blocks = _pandas_table(file, where)
+    values = np.concatenate(blocks, axis=1).astype(np.float64)
     if values.shape[1] != len(columns):
         raise FormatError(f"{where}: expected {len(columns)} columns, found {values.shape[1]}; export it as CSV")
-    names = [_text(i) for i in indices]
+    names = [_text(i) for i in rows["index"].tolist()]
     numbers = np.array([_picture_number([name], where) for name in names], dtype=np.int64)
     if (np.diff(numbers) <= 0).any() or not (np.abs(values[np.isfinite(values)]) <= MAX_NUMBER).all():
         raise FormatError(f"{where}: expected rows in order and numbers within {MAX_NUMBER:g}; export it again")
     return _table(columns, numbers, values, where, not all(map(_NUMBER.fullmatch, names)))
+
+
+def _pandas_table(file: Any, where: str) -> tuple[Any, NDArray[np.void], list[_Column], list[NDArray[Any]]]:
+    """Return the table of pandas in a file, its rows, the heads of its columns, and views of their blocks."""
+    groups = [g for g in file.values() if "table" in g and "non_index_axes" in g.attrs]
+    if len(groups) != 1:
+        raise FormatError(f"{where}: expected one table of pandas, found {len(groups)}; export it as CSV")
+    ((_, heads),) = _Plain(io.BytesIO(bytes(groups[0].attrs["non_index_axes"]))).load()
+    columns = [_column(head, where) for head in heads]
+    table = groups[0]["table"]
+    check_size((len(table), max(len(columns), table.dtype.itemsize // np.dtype(float).itemsize)), where)
+    rows = table[:]
+    blocks = [name for name in rows.dtype.names if name.startswith("values_block_")]
+    return table, rows, columns, [rows[name].reshape(len(rows), -1) for name in blocks]
 
 
 class _Plain(pickle.Unpickler):
@@ -184,10 +190,7 @@ def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: 
     if "z" in others or not own or len(set(columns)) < len(columns):
         found = "z" if "z" in others else others[0] if others else "a column twice"
         raise FormatError.mismatch(where, "each x, y and likelihood once", quoted(found), "import key points in 2-D")
-    individuals, names = (
-        list(dict.fromkeys(c.individual for c in columns)),
-        list(dict.fromkeys(c.point for c in columns)),
-    )
+    individuals, names = ([*dict.fromkeys(words)] for words in list(zip(*columns, strict=True))[:2])
     check_size((len(numbers), len(individuals), len(names), 3), where)
     points = np.full((len(numbers), len(individuals), len(names), 3), np.nan)
     for i in own:
@@ -218,9 +221,8 @@ def patch_deeplabcut_csv(path: Path, changes: Changes) -> bytes:
     """Return a file, which has been read before, with points of some rows replaced; all other bytes stay."""
     columns, n_index, _ = _read_head(_filled(path), str(path))
     n_rows = len(read_deeplabcut_csv(path).numbers)
-    new = {
-        row: {n_index + i: value for i, value in cells.items()} for row, cells in _new_cells(columns, changes).items()
-    }
+    found = _new_cells(columns, changes).items()
+    new = {row: {n_index + i: value for i, value in cells.items()} for row, cells in found}
     exact = exact_text(path.read_bytes())
     return exact.encoded(replace_cells(exact.text, ",", n_rows, new, PIXEL_DECIMALS))
 
@@ -230,23 +232,18 @@ def patch_deeplabcut_hdf5(path: Path, changes: Changes) -> None:
     import h5py
 
     with h5py.File(path, "r+") as file:
-        group = next(g for g in file.values() if "table" in g and "non_index_axes" in g.attrs)
-        ((_, heads),) = _Plain(io.BytesIO(bytes(group.attrs["non_index_axes"]))).load()
-        rows = group["table"][:]
-        blocks = [name for name in rows.dtype.names if name.startswith("values_block_")]
-        values = [rows[name].reshape(len(rows), -1) for name in blocks]  # views
+        table, rows, columns, values = _pandas_table(file, str(path))
         ends = np.cumsum([v.shape[1] for v in values])
-        for row, cells in _new_cells([_column(head, str(path)) for head in heads], changes).items():
+        for row, cells in _new_cells(columns, changes).items():
             for column, value in cells.items():
                 block = int(np.searchsorted(ends, column, side="right"))
                 values[block][row, column - ends[block]] = value
-        group["table"][:] = rows
+        table[:] = rows
 
 
 def _new_cells(columns: Sequence[_Column], changes: Changes) -> dict[int, dict[int, float]]:
     """Return the numbers that change, by row and column; NaN for the position of an absent point."""
-    individuals = list(dict.fromkeys(c.individual for c in columns))
-    names = list(dict.fromkeys(c.point for c in columns))
+    individuals, names = ([*dict.fromkeys(words)] for words in list(zip(*columns, strict=True))[:2])
     new: dict[int, dict[int, float]] = {}
     for row, people in changes.items():
         free = sorted({*range(len(individuals))} - {k for k, _ in people})

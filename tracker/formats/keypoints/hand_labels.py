@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.coco_reading import CocoPicture, images_by_camera
+from tracker.formats.keypoints.coco_reading import CocoPicture, common_size, images_by_camera
 from tracker.formats.keypoints.detections import parse_numbers
 from tracker.formats.keypoints.openpose import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
@@ -158,11 +158,9 @@ def _tables(images: Sequence[CocoPicture], people: Mapping[int, Mapping[str, _Po
     check_size((len(people), most, len(names), 3), where)
     out = []
     for labels, own in images_by_camera([i for i in images if people.get(int(i.id))], where).items():
-        sizes = {(i.width, i.height) for i in own.values() if i.width and i.height}
-        if len(sizes) > 1:
-            raise FormatError(f"{where}: expected images of one size, found {sorted(sizes)[:3]}; export them apart")
+        size = common_size(own.values(), where)
         seen = {n: [_person(points, names) for points in people[int(image.id)].values()] for n, image in own.items()}
-        out.append((labels, table_of_people(seen, where, names, size=next(iter(sizes), None), is_by_hand=True)))
+        out.append((labels, table_of_people(seen, where, names, size=size, is_by_hand=True)))
     return out
 
 

@@ -109,9 +109,8 @@ def _folder_for(path: Path) -> Generator[Path, None, None]:
         with tempfile.TemporaryDirectory() as folder:
             yield Path(folder)
     except subprocess.TimeoutExpired as error:
-        raise FormatError(
-            f"{where} cannot be read: it took over {error.timeout:.0f} s, as damaged files do; export it again"
-        ) from error
+        found = f"it took over {error.timeout:.0f} s, as damaged files do"
+        raise FormatError(f"{where} cannot be read: {found}; export it again") from error
     except OSError as error:
         raise FormatError(f"{where} cannot be read: {error.strerror or error}; check the path") from error
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
-from tracker.formats.number_rows import check_size
+from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people
 from tracker.validation import MAX_FRAMES, MAX_NUMBER
 
 
@@ -43,25 +42,24 @@ def _table(labels: Any, video: Any, where: str) -> PictureTable:
     if len(labels.skeletons) != 1:
         raise FormatError(f"{where}: expected one skeleton, found {len(labels.skeletons)}; export them apart")
     names = tuple(str(n) for n in labels.skeletons[0].node_names)
-    pictures = sorted((lf for lf in labels.labeled_frames if lf.video is video), key=lambda lf: lf.frame_idx)
-    numbers = np.array([lf.frame_idx for lf in pictures], dtype=np.int64)
-    if not len(numbers) or (np.diff(numbers) <= 0).any() or numbers[0] < 0 or numbers[-1] > MAX_FRAMES:
-        raise FormatError(f"{where}: expected each picture once, found {len(numbers)}; export it again")
-    found = [_instances(lf) for lf in pictures]
-    most = max(1, *map(len, found))
-    check_size((len(numbers), most, len(names), 3), where)
-    points = np.full((len(numbers), most, len(names), 3), np.nan)
-    for row, instances in zip(points, found, strict=True):
-        for k, instance in enumerate(instances):
-            row[k, :, :2] = instance.numpy()
-            row[k, :, 2] = instance.points["score"] if "score" in instance.points.dtype.names else np.nan
-    absent = ~np.isfinite(points[..., :2]).all(axis=-1)
-    if not (np.abs(points[~absent][:, :2]) <= MAX_NUMBER).all():
+    pictures = [lf for lf in labels.labeled_frames if lf.video is video]
+    found = {int(lf.frame_idx): _instances(lf) for lf in pictures}
+    if len(found) < max(len(pictures), 1) or min(found) < 0 or max(found) > MAX_FRAMES:
+        raise FormatError(f"{where}: expected each picture once, found {len(pictures)}; export it again")
+    people = {number: [_person(i, where) for i in instances] for number, instances in found.items()}
+    is_by_hand = not any(hasattr(i, "score") for instances in found.values() for i in instances)
+    return table_of_people(people, where, names, is_by_hand=is_by_hand)
+
+
+def _person(instance: Any, where: str) -> PicturePerson:
+    points = np.full((len(instance.points), 3), np.nan)
+    points[:, :2] = instance.numpy()
+    if "score" in instance.points.dtype.names:
+        points[:, 2] = instance.points["score"]
+    points[~np.isfinite(points[:, :2]).all(axis=1)] = (np.nan, np.nan, 0.0)
+    if (np.abs(points[:, :2]) > MAX_NUMBER).any():
         raise FormatError(f"{where}: expected coordinates within {MAX_NUMBER:g}; export it again")
-    points[absent] = (np.nan, np.nan, 0.0)
-    tracks = stack_tracks([[i.track.name if i.track is not None else "" for i in instances] for instances in found])
-    is_by_hand = not any(hasattr(i, "score") for instances in found for i in instances)
-    return PictureTable(names, numbers, points, tracks=tracks, is_by_hand=is_by_hand)
+    return PicturePerson(points, instance.track.name if instance.track is not None else "")
 
 
 def _instances(picture: Any) -> list[Any]:
