@@ -15,6 +15,7 @@ from tracker.text_files import parse_toml, read_text
 from tracker.validation import quoted
 
 _TOML_LINE = re.compile(r"\[{1,2}[^\[\]{}\n]+\]{1,2}\s*(#.*)?|[\w.\"'-]+\s*=.*")
+_PARSERS = {"toml": parse_toml, "json": parse_json, "yaml": parse_yaml, "xml": parse_xml}
 _YAML_LINE = re.compile(r"[^\s:,{}\[\]][^:,{}\[\]]*:(\s.*)?|- .*")
 
 
@@ -76,19 +77,11 @@ def read_document(path: Path) -> Document:
     """
     name_binary(path)
     text = read_text(path, KIND)
-    syntax = _syntax(text) or "text"
-    if syntax == "toml":
-        data: Any = parse_toml(text, str(path), KIND)
-    elif syntax == "json":
-        data = parse_json(text, str(path), KIND)
-    elif syntax == "yaml":
-        data = parse_yaml(text, str(path), KIND)
-    elif syntax == "xml":
-        data = parse_xml(text, str(path), KIND)
-        data = storage_data(data) if data.tag == "opencv_storage" else data
-    else:
-        data = text
-    return Document(path, syntax, data)
+    syntax = _syntax(text)
+    data: Any = text if syntax is None else _PARSERS[syntax](text, str(path), KIND)
+    if syntax == "xml" and data.tag == "opencv_storage":
+        data = storage_data(data)
+    return Document(path, syntax or "text", data)
 
 
 def _syntax(text: str) -> str | None:

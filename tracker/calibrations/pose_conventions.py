@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
+from tracker.compute.sampling import spread_indices
 from tracker.errors import CalibrationError, Remedy
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -89,13 +90,8 @@ def costs(Ts_stated: Sequence[Array]) -> dict[PoseConvention, float]:
         The root mean square angle between the axes and the point that all see, plus that between the sides of the
         pictures and the vertical that levels them best; turns by 90 degrees count as level.
     """
-    chosen = _chosen(len(Ts_stated))
+    chosen = spread_indices(len(Ts_stated), _MAX_COMPARED)
     return {c: _cost([rigid.inverse(read_pose(Ts_stated[i], c)) for i in chosen]) for c in CONVENTIONS}
-
-
-def _chosen(n: int) -> list[int]:
-    """Return the indices of the cameras that are compared, ascending."""
-    return sorted({int(i) for i in np.linspace(0, n - 1, min(n, _MAX_COMPARED))})
 
 
 def _cost(Ts_world_camera: Sequence[Array]) -> float:
@@ -171,7 +167,7 @@ def odd_camera(Ts_stated: Sequence[Array]) -> int | None:
     Args:
         Ts_stated: poses from world to camera, (4, 4), in any unit. Of fewer than four, no three agree without one.
     """
-    chosen = _chosen(len(Ts_stated))
+    chosen = spread_indices(len(Ts_stated), _MAX_COMPARED).tolist()
     if len(chosen) < 4:
         return None
     without = {i: _cost([rigid.inverse(Ts_stated[k]) for k in chosen if k != i]) for i in chosen}

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,13 +61,6 @@ class MaskSurvey:
         return self.opaque_shares if rules.is_matte else self.shares
 
 
-class _Picture(NamedTuple):
-    share: float
-    opaque_share: float
-    values: tuple[int, ...]
-    is_alpha: bool
-
-
 def survey(masks: MaskFiles, size: tuple[int, int], unknown: int = 0) -> MaskSurvey:
     """Read all masks of a camera.
 
@@ -79,20 +72,15 @@ def survey(masks: MaskFiles, size: tuple[int, int], unknown: int = 0) -> MaskSur
     Raises:
         TrackerError: one is damaged, malformed or of another size.
     """
-    found = [_picture(masks.read(i, size), unknown) for i in range(len(masks.numbers))]
-    return MaskSurvey(
-        np.array([p.share for p in found]),
-        np.array([p.opaque_share for p in found]),
-        frozenset(value for p in found for value in p.values),
-        np.array([p.is_alpha for p in found]),
-    )
-
-
-def _picture(image: LabelImage, unknown: int) -> _Picture:
-    labels = image.labels
-    values = np.flatnonzero(np.bincount(labels.ravel()))
-    shares = ((labels > 0) & (labels != unknown)).mean(), _is_opaque(labels).mean()
-    return _Picture(float(shares[0]), float(shares[1]), tuple(values[values > 0].tolist()), image.is_alpha)
+    n = len(masks.numbers)
+    shares, values, is_alpha = np.empty((2, n)), set[int](), np.empty(n, dtype=bool)
+    for i in range(n):
+        image = masks.read(i, size)
+        is_person = (image.labels > 0) & (image.labels != unknown)
+        shares[:, i] = is_person.mean(), _is_opaque(image.labels).mean()
+        values |= {*np.flatnonzero(np.bincount(image.labels.ravel())).tolist()}
+        is_alpha[i] = image.is_alpha
+    return MaskSurvey(shares[0], shares[1], frozenset(values - {0}), is_alpha)
 
 
 def _is_opaque(labels: NDArray[Any]) -> Mask:

@@ -28,11 +28,14 @@ from program_files import WRITERS
 from tracker.errors import TrackerError
 from tracker.footage.recording import read_mask
 from tracker.formats.bvh import BvhFrame, write_bvh
+from tracker.formats.joint_tables.layouts import LAYOUTS, find_layout
 from tracker.formats.keypoints import hdf5, hdf5_process
+from tracker.formats.observation_layout import Sample
 from tracker.formats.trc import write_trc
 from tracker.geometry import rigid
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints
+from tracker.observations.readers import FORMATS
 from tracker.observations.request import ImportRequest
 from tracker.observations.stored import load_observations
 from tracker.observations.stored_masks import load_masks
@@ -167,6 +170,25 @@ def run_forked(path, folder):
         child.kill()
         child.join()
         raise subprocess.TimeoutExpired("fork", SECONDS)
+
+
+def test_a_file_of_each_row_of_the_tables_is_mutated(tmp_path):
+    session, formats, layouts = make_session(tmp_path / "session", N, size=SIZE), set(), set()
+    for i, (kind, (name, package)) in enumerate(KINDS.items()):
+        path = tmp_path / str(i) / name
+        if kind.startswith("stored"):
+            continue
+        if package is None and kind != "bvh":  # which takes a second to write
+            path.parents[name.count("/")].mkdir()
+            write(kind, session, path.parents[name.count("/")])
+        else:  # known by its name, if not by that of another kind
+            path.parent.mkdir(parents=True)
+            path.touch()
+        sample = Sample(path)
+        formats |= {next((key for key, row in FORMATS.items() if row.recognizes(sample)), "")}
+        layouts |= {find_layout(sample)}
+    assert formats - {""} == FORMATS.keys()
+    assert layouts - {None} == {*LAYOUTS}
 
 
 @pytest.mark.parametrize(

@@ -81,24 +81,16 @@ def holds(data: Any, key: Literal["keypoints", "segmentation"]) -> bool:
 
 
 class PictureDataset(NamedTuple):
-    """The content of a file, by picture."""
+    """The content of a file, by picture, and what of it are key points of people."""
 
     dataset: _Dataset
     images: Mapping[tuple[str, ...], Mapping[int, CocoPicture]]
     """The images of each camera by their numbers. The key has the names that it may have, best first."""
-
-
-class KeypointDataset(NamedTuple):
-    """The content of a file, and what of it are key points of people."""
-
-    dataset: _Dataset
-    category: int
-    """The category of the people."""
-    names: tuple[str, ...]
+    category: int = 0
+    """The category of people with key points."""
+    names: tuple[str, ...] = ()
     """Names of their points; empty if the file has none."""
-    images: Mapping[tuple[str, ...], Mapping[int, CocoPicture]]
-    """The images of each camera by their numbers. The key has the names that it may have, best first."""
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def annotations(self) -> list[_Annotation]:
@@ -145,17 +137,17 @@ def images_by_camera(images: Sequence[CocoPicture], where: str) -> dict[tuple[st
     return by_camera
 
 
-def read_dataset(path: Path, program: str = "COCO") -> KeypointDataset:
+def read_dataset(path: Path, program: str = "COCO") -> PictureDataset:
     """Read key points of a dataset or a list of results, without arrays; `program` names it in messages.
 
     Raises:
         FormatError: the file is malformed, or has no key points.
     """
-    dataset, images = read_pictures(path, program)
-    category, names, notes = _category(dataset, f"{program} file {path}")
-    if any(a.segmentation for a in dataset.annotations):
+    found = read_pictures(path, program)
+    category, names, notes = _category(found.dataset, f"{program} file {path}")
+    if any(a.segmentation for a in found.dataset.annotations):
         notes = (*notes, "key points were taken, and segmentations of the file left out")
-    return KeypointDataset(dataset, category, names, images, notes)
+    return found._replace(category=category, names=names, notes=notes)
 
 
 def read_coco(path: Path, program: str = "COCO") -> list[tuple[tuple[str, ...], PictureTable]]:
@@ -236,7 +228,7 @@ def _category(dataset: _Dataset, where: str) -> tuple[int, tuple[str, ...], tupl
     return chosen, names, notes
 
 
-def _people(found: KeypointDataset, where: str) -> dict[int | str, list[PicturePerson]]:
+def _people(found: PictureDataset, where: str) -> dict[int | str, list[PicturePerson]]:
     """Return the people of each image by its id.
 
     Raises:

@@ -74,7 +74,7 @@ def read_segmentations(path: Path) -> list[SegmentedPictures]:
         FormatError: the file is malformed, has no segmentations, or has several categories and none of people.
     """
     where = f"COCO file {path}"
-    dataset, by_camera = read_pictures(path)
+    dataset, by_camera, *_ = read_pictures(path)
     chosen = [a for a in dataset.annotations if a.segmentation]
     if not chosen:
         raise FormatError(f"{where}: expected annotations with a segmentation, found none; export them")

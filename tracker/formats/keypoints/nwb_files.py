@@ -15,6 +15,7 @@ import numpy as np
 from tracker.errors import FormatError
 from tracker.formats.keypoints.deeplabcut import Changes, with_free_places
 from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
+from tracker.formats.keypoints.sleap_patching import replace_dataset
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray
 from tracker.validation import MAX_FRAMES, MAX_NUMBER
@@ -220,10 +221,7 @@ def _scale(video: _Video) -> tuple[Array, Array]:
 
 def _insert(series: Any, name: str, at: int, value: Any) -> None:
     """Insert a row into an array of a series, which is written again with its attributes."""
-    old = series[name]
-    rows, attributes = np.insert(old[:], at, value, axis=0), dict(old.attrs)
-    del series[name]
-    series.create_dataset(name, data=rows).attrs.update(attributes)
+    replace_dataset(series, name, np.insert(series[name][:], at, value, axis=0))
 
 
 def _text(value: Any) -> str:

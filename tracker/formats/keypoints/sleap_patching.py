@@ -84,7 +84,7 @@ def patch_project(path: Path, changes: Mapping[int, Changes]) -> None:
                     instance = _instances(tables, of_video[row])[person] if at is None else at
                     _set_points(tables, instance, values, offset)
         for name in names:
-            _replace(file, name, tables[name])
+            replace_dataset(file, name, tables[name])
 
 
 def _last_added(people: Sequence[tuple[int, Array]]) -> list[tuple[int, Array]]:
@@ -139,7 +139,7 @@ def _set_points(tables: Mapping[str, _Rows], instance: int, values: Array, offse
             point["score"] = confidence
 
 
-def _replace(file: Any, name: str, rows: _Rows) -> None:
+def replace_dataset(file: Any, name: str, rows: NDArray[Any]) -> None:
     """Write a table; one of another length is made again, with its attributes."""
     table = file[name]
     if table.shape == rows.shape:
