@@ -62,6 +62,12 @@ def test_squares_in_another_unit_are_refused(tmp_path, lengths, expected):
     assert read_board(path, any_size=True).columns == 7
 
 
+@pytest.mark.parametrize(("side", "expected"), [("0.06", "metres? say 60"), ("2.36", "centimetres? say 59.9 or 23.6")])
+def test_sides_of_our_own_form_in_another_unit_are_refused(tmp_path, side, expected):
+    with pytest.raises(CalibrationError, match=re.escape(f"found {side}; is it in ") + ".*" + re.escape(expected)):
+        read(tmp_path, PLAIN.replace("square_mm = 40", f"square_mm = {side}"))
+
+
 def test_the_unit_of_caliscope_is_centimetres(tmp_path):
     path = tmp_path / "charuco.toml"
     path.write_text('columns = 5\nrows = 7\ndictionary = "DICT_4X4_50"\nsquare_size_override_cm = 54\n')
