@@ -82,7 +82,18 @@ class _AxisRow(_Row):
             raise ValueError(f"expected a direction other than 0 as 'axis', found {list(self.axis)}")
 
 
-class _JointRow(_Row):
+class _CenteredRow(_Row, kw_only=True):
+    """A table of a point with its joint centre."""
+
+    center_offset: _Position = (0.0, 0.0, 0.0)
+    center_source: _Source = ""
+
+    def __post_init__(self) -> None:
+        if any(self.center_offset) and not self.center_source:
+            raise ValueError("expected the source of 'center_offset' as 'center_source', found none; name it")
+
+
+class _JointRow(_CenteredRow):
     name: Name
     child: Name
     parent: _Parent = ""
@@ -92,11 +103,9 @@ class _JointRow(_Row):
     free: bool = False
     cone_deg: _Turn = 180.0
     twist_deg: _Turn = 180.0
-    center_offset: _Position = (0.0, 0.0, 0.0)
-    center_source: _Source = ""
 
     def __post_init__(self) -> None:
-        _check_center(self.center_offset, self.center_source)
+        super().__post_init__()
         if self.kind == "ball" and self.axes:
             raise ValueError(f"expected no axes of a ball joint, found {len(self.axes)}")
 
@@ -118,15 +127,10 @@ class _PartRow(_Row):
             raise ValueError(f"expected no exponents of the shape {self.shape}, found some; leave them out")
 
 
-class _LandmarkRow(_Row):
+class _LandmarkRow(_CenteredRow):
     name: Name
     part: Name
     position: _Position
-    center_offset: _Position = (0.0, 0.0, 0.0)
-    center_source: _Source = ""
-
-    def __post_init__(self) -> None:
-        _check_center(self.center_offset, self.center_source)
 
 
 class _GroupRow(_Row):
@@ -145,16 +149,6 @@ class _ModelFile(_Row):
     joint_sigma_m: Annotated[float, Meta(ge=0, le=1, description="0 to 1 metre")] | None = None
     landmarks: Annotated[list[_LandmarkRow], Meta(max_length=256, description="at most 256 landmarks")] = []
     search: Annotated[list[_GroupRow], Meta(max_length=32, description="at most 32 search groups")] = []
-
-
-def _check_center(offset: Sequence[float], source: str) -> None:
-    """Check that the offset of a joint centre has a source.
-
-    Raises:
-        ValueError: it has none.
-    """
-    if any(offset) and not source:
-        raise ValueError("expected the source of 'center_offset' as 'center_source', found none; name it")
 
 
 def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyModel:

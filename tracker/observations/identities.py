@@ -81,12 +81,8 @@ def follow_people(views: Views, points_px: Array, confidence: Array, frame: int,
         detections = [d for view, d in sorted(left) if view == v]
         if not (detections and tracks):
             continue
-        distances = np.array(
-            [
-                [track_distance(views, v, t.last_world, points_px[v, d], confidence[v, d]) for d in detections]
-                for t in tracks
-            ]
-        )
+        px, sure, last = points_px[v], confidence[v], [track.last_world for track in tracks]
+        distances = np.array([[track_distance(views, v, x, px[d], sure[d]) for d in detections] for x in last])
         for row, i in zip(*linear_sum_assignment(distances), strict=True):
             if distances[row, i] < SAME_PERSON_M:
                 taken.setdefault(int(row), {})[v] = detections[i]

@@ -29,13 +29,9 @@ def by_subject(table: MarkerTable, kept: Sequence[str] = ()) -> list[MarkerTable
         return [replace(table, names=tuple(names), person=largest) if is_once else table]
     rest = [table.names[columns[0]] for prefix, columns in groups.items() if prefix not in people]
     notes = (f"points of no person, such as {rest[0]}, are left out",) if rest else ()
+    table = replace(table, notes=(*table.notes, *notes))
+    parts = [(person, subjects[person]) for person in people]
     return [
-        replace(
-            table,
-            names=tuple(plain[i] for i in subjects[person]),
-            points=table.points[:, subjects[person]],
-            notes=(*table.notes, *notes),
-            person=person,
-        )
-        for person in people
+        replace(table, names=tuple(plain[i] for i in own), points=table.points[:, own], person=person)
+        for person, own in parts
     ]
