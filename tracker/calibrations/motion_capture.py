@@ -75,11 +75,8 @@ def _subpixels(intrinsic: "_Numbers", size: list[float], document: Document, nam
     for unit in (_SUBPIXELS, 1.0):
         if abs(ratio / unit - 1) < 0.02:
             return unit
-    expected, advice = (
-        "a sensor as wide as the video in pixels or 64ths",
-        "export the calibration for the size of the video",
-    )
-    raise refuse(document, name, f"{expected} of them", f"{ratio:.3g} units per pixel", advice)
+    expected, found = "a sensor as wide as the video in pixels or 64ths of them", f"{ratio:.3g} units per pixel"
+    raise refuse(document, name, expected, found, "export the calibration for the size of the video")
 
 
 def is_vicon(document: Document) -> bool:
