@@ -9,6 +9,7 @@ from rigs import cameras, ring
 from tracker.formats.joint_maps import known_joint_maps
 from tracker.formats.model_toml import load_model
 from tracker.plausibility.examine import contradictions
+from tracker.plausibility.filmed_motion import FilmedMotion
 from tracker.plausibility.filmed_people import FilmedPeople
 from tracker.plausibility.readings import Reading, ReadPoints
 from tracker.simulate.motion.postures import solve_posture
@@ -88,7 +89,7 @@ def detected(points, seed, sigma_m=0.02, gross=0.03):
 def filmed(person, seed, n_views=4):
     """The silhouettes of a person with a trunk, holes and clutter, as distances."""
     rng, views = np.random.default_rng((seed, 2)), [c.scaled(0.5) for c in cameras(ring(n_views))]
-    n_frames, size, distances = len(person["neck"]), views[0].size, []
+    n_frames, size, distances, flows = len(person["neck"]), views[0].size, [], []
     for camera in views:
         px = {name: camera.project(points) for name, points in person.items()}
         metre_px = camera.K[0, 0] / camera.depths(person["neck"])
@@ -104,7 +105,20 @@ def filmed(person, seed, n_views=4):
                 cv2.circle(mask, tuple(int(x) for x in rng.integers((0, 0), size)), int(rng.integers(2, 9)), value, -1)
             of_view[k] = np.minimum(np.round(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3)), 255)
         distances.append(of_view)
-    return FilmedPeople(tuple(views), tuple(distances), np.ones((n_frames, n_views), dtype=bool))
+        flows.append(np.stack([_flow(px, k, size, rng) for k in range(n_frames - 1)]).astype(np.float16))
+    motion = FilmedMotion(tuple(views), tuple(flows), 1)
+    return FilmedPeople(tuple(views), tuple(distances), np.ones((n_frames, n_views), dtype=bool), motion)
+
+
+def _flow(px, k, size, rng, sigma_px=0.5):
+    """How the limbs of a person move in a picture, at every fourth pixel, with noise."""
+    flow = np.zeros((-(-size[1] // 4), -(-size[0] // 4), 2), np.float32)
+    for a, b, _ in _BONES:
+        for share in np.linspace(0, 1, 5):
+            at, after = (px[a][i] * (1 - share) + px[b][i] * share for i in (k, k + 1))
+            center = tuple(int(x) for x in np.round(at / 4))
+            cv2.circle(flow, center, 2, tuple(float(x) for x in after - at), -1)
+    return flow + sigma_px * rng.normal(size=flow.shape)
 
 
 class Case:

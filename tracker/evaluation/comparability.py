@@ -59,11 +59,10 @@ def distance_note(
 
 
 def _lag_note(read: ReadPoints, own: Reading) -> tuple[str, Remedy] | None:
-    shift = round(read.best_shift(own))
-    if not shift:
+    lag = read.lag(own)
+    if lag is None or not lag.frames:
         return None
-    later = f"{abs(shift)} frame{'s' * (abs(shift) != 1)} {'later' if shift > 0 else 'earlier'}"
-    return f"the reference fits the poses of {later} best", Remedy("check_reference_frames")
+    return f"the reference fits the poses of {lag} best", Remedy("check_reference_frames")
 
 
 def _explanation(read: ReadPoints, own: Reading, estimate: Array, truth: Array) -> tuple[str, Remedy]:

@@ -187,7 +187,8 @@ def _lag_frames(imported: BodyPoints, places: Array, frames: Sequence[int], fps:
     known = dict(zip(imported.names, np.moveaxis(places, 1, 0), strict=True))
     up = floor_plane("z", None).normal  # no matter for lags
     read = read_beside(known, imported.joints_world[frames], frames, up, fps, ignores_offsets=True)
-    return -round(read.best_shift(Reading(JointMap("the import", {n: n for n in known}))))
+    lag = read.lag(Reading(JointMap("the import", {n: n for n in known})))
+    return 0 if lag is None else -lag.frames
 
 
 def _steps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:

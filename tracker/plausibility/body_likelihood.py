@@ -40,6 +40,8 @@ class PeoplePriors(NamedTuple):
     """Number of postures from which on their common offsets count more than their number."""
     parts: int = 4
     """Parts that are independent evidence in each view: forearms and calves."""
+    in_step: int = 1
+    """Frames by which points may be late without a question: as much as numbers from 0 or 1 and filters make."""
     stretch_s: float = 2.0
     """Shortest stretch of a motion that is looked at, seconds: two steps of each leg."""
     most_off: float = 0.5

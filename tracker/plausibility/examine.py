@@ -52,10 +52,11 @@ def examine_import(session: Session, request: ImportRequest, plan: ImportPlan) -
     maps = [given.joint_map] if read.names else _known_maps(given.joint_map)
     first_row = int(observations.row_frames[0][0])
     found = contradictions(read, given, maps, first_row, in_space=observations.joints is not None)
+    notes = _step_notes(read, given)
     if request.unusual:
-        notes = (*observations.notes, *(f"{problem}; kept, as chosen" for problem in found))
-        return replace(plan, observations=replace(observations, notes=notes))
-    return replace(plan, problems=tuple(found))
+        notes, found = [*(f"{problem}; kept, as chosen" for problem in found), *notes], []
+    observations = replace(observations, notes=(*observations.notes, *notes))
+    return replace(plan, observations=observations, problems=tuple(found))
 
 
 def examine_joints(session: Session, person: int, joints: MarkerTable, axes: str, around: int) -> list[FormatError]:
@@ -174,11 +175,23 @@ def contradictions(
         best = [given]
     else:
         found = _others(read, given, best)
-    if shift := round(read.best_shift(best[0])):
-        later = f"{abs(shift)} frame{'s' * (abs(shift) != 1)} {'later' if shift > 0 else 'earlier'}"
-        text = f"expected points in step with the footage, found that they fit the frames of {later} best"
-        found.append(FormatError(text, Remedy("shift_points", frame=first_row + shift)))
+    if (lag := read.lag(best[0])) and abs(lag.frames) > PRIORS.in_step:
+        text = f"expected points in step with the footage, found that they fit the frames of {lag} best"
+        found.append(FormatError(text, Remedy("shift_points", frame=first_row + lag.frames)))
     return found or _impossible(read, best[0])
+
+
+def _step_notes(read: ReadPoints, given: Reading) -> list[str]:
+    """Say how far it is known that points are in step with the footage."""
+    if read.known_people is None or not read.known_people.knows_frames:
+        return []
+    lag = read.lag(given)
+    if lag is None:
+        return ["the footage does not show whether the points are in step with it"]
+    if abs(lag.frames) == PRIORS.in_step:
+        return [f"the points fit the frames of {lag} best"]
+    within = max(abs(lag.low), abs(lag.high))
+    return [] if lag.frames or within <= PRIORS.in_step else [f"the points are in step within {within} frames"]
 
 
 def _same(a: Reading, b: Reading) -> bool:

@@ -15,6 +15,7 @@ from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.observations.triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import Places
+from tracker.plausibility.filmed_motion import FilmedMotion, MotionFinder
 from tracker.session.session import Session
 
 _BELOW = (("elbow", "wrist"), ("knee", "ankle"))
@@ -31,6 +32,8 @@ class FilmedPeople:
     """By view, the distance of each pixel from the silhouettes, (F, height, width), whole px, at most 255."""
     shows_people: Mask
     """Whether a view shows anybody, (F, n_views)."""
+    motion: FilmedMotion | None = None
+    """How the pictures move; None where that is unknown."""
     is_filmed: bool = True
     """Whether they are those of footage; else people may be anywhere in the pictures."""
     is_whole: bool = True
@@ -51,36 +54,34 @@ class FilmedPeople:
         """Whether there is footage."""
         return self.is_filmed
 
-    def costs(self, places: Places, shift: int = 0) -> Array:
+    def lag_errors_m(self, places: Places, most: int) -> Array:
+        """Return how far limbs move beside the pictures of other frames; see `FilmedMotion.errors_m`."""
+        return np.empty((2 * most + 1, 0, 0)) if self.motion is None else self.motion.errors_m(places, most)
+
+    def costs(self, places: Places) -> Array:
         """Return how far limbs lie outside of the silhouettes, (F,): mean truncated squares, 0 to 1; NaN if unknown.
 
         A point that fewer than two views show, or than there are, counts as far outside.
 
         Args:
             places: of one person on the frames, metres.
-            shift: frames by which the pictures are later.
         """
         points = _limb_points(places)
         known = np.isfinite(points).all(axis=-1)
-        shown = np.arange(len(points)) + shift
-        is_shown = (shown >= 0) & (shown < len(self.shows_people))
-        shown = np.where(is_shown, shown, 0)
-        of_views = self.shows_people[shown] & is_shown[:, None]
-        squares = np.stack([self._squares(v, points, shown) for v in range(len(self.cameras))])
-        squares[~of_views.T] = np.nan
-        n_seen, n_views = np.isfinite(squares).sum(axis=0), of_views.sum(axis=1)[:, None]
+        squares = np.stack([self._squares(v, points) for v in range(len(self.cameras))])
+        squares[~self.shows_people.T] = np.nan
+        n_seen, n_views = np.isfinite(squares).sum(axis=0), self.shows_people.sum(axis=1)[:, None]
         of_points = np.where(n_seen >= np.minimum(2, n_views), np.nansum(squares, axis=0) / np.maximum(n_seen, 1), 1.0)
         n_known = known.sum(axis=1)
         out = np.where(known, of_points, 0.0).sum(axis=1) / np.maximum(n_known, 1)
         return np.where((n_known > 0) & (n_views[:, 0] > 0), out, np.nan)
 
-    def _squares(self, view: int, points: Array, shown: IntArray) -> Array:
+    def _squares(self, view: int, points: Array) -> Array:
         """Return the truncated squares of the distances of points in a view, (F, n); NaN where it does not show them.
 
         Args:
             view: its index.
             points: (F, n, 3), metres.
-            shown: index of the picture of each frame, (F,).
         """
         camera, distances = self.cameras[view], self.distances_px[view]
         flat = points.reshape(-1, 3)
@@ -89,37 +90,47 @@ class FilmedPeople:
             inside = ((px > -0.5) & (px < np.array(distances.shape[:0:-1]) - 0.5)).all(axis=-1)
             inside &= depths[..., 0] > NEAR_PLANE_M
         u, v = np.moveaxis(np.round(np.where(inside[..., None], px, 0.0)).astype(np.int64), -1, 0)
-        away_m = distances[shown[:, None], v, u] * depths[..., 0] / camera.K[0, 0]
+        away_m = distances[np.arange(len(points))[:, None], v, u] * depths[..., 0] / camera.K[0, 0]
         return np.where(inside, np.minimum(away_m / INLIER_M, 1.0) ** 2, np.nan)
 
 
 def film_people(session: Session, frames: IntArray) -> FilmedPeople:
-    """Find the people of some frames by the session's masks, backgrounds, or its own median.
+    """Find the people of some frames by the session's masks, backgrounds, or its own median, and their motion.
 
     Without readable footage, people may be anywhere in the pictures.
+
+    Args:
+        session: its cameras and footage.
+        frames: at equal steps, (F,).
     """
-    found = _silhouettes(session, frames)
-    if found is None:
-        return _anywhere(tuple(c.camera for c in session.cameras), len(frames))
+    unknown = _anywhere(tuple(c.camera for c in session.cameras), len(frames))
+    if not len(frames) or not all(c.footage.exists() for c in session.cameras):
+        return unknown
+    try:
+        with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
+            return _filmed(recording, finder, frames)
+    except TrackerError:  # the footage has its own messages
+        return unknown
+
+
+def _filmed(recording: Recording, finder: SilhouetteFinder, frames: IntArray) -> FilmedPeople:
+    step = int(frames[1] - frames[0]) if len(frames) > 1 else 1
+    found, motion = list[tuple[ViewSilhouette, ...]](), MotionFinder(step)
+    for k in range(int(frames[0]), int(frames[-1]) + 1):
+        if (k - frames[0]) % step == 0:
+            found.append(finder.silhouettes(k))
+        shown = [c.clock.nearest(k, recording.n_frames) for c in finder.cameras]
+        motion.add(recording.read_each(shown), [s.camera for s in found[0]])
+    cameras = tuple(s.camera for s in found[0])
     distances = tuple(np.stack([_distances(s.mask) for s in of_view]) for of_view in zip(*found, strict=True))
     shows = np.array([[not s.is_empty for s in views] for views in found])
     is_whole = all(s.source != "recording" for views in found for s in views)
-    return FilmedPeople(tuple(s.camera for s in found[0]), distances, shows, is_whole=is_whole)
+    return FilmedPeople(cameras, distances, shows, motion.motion(cameras), is_whole=is_whole)
 
 
 def _anywhere(cameras: tuple[Camera, ...], n_frames: int) -> FilmedPeople:
     distances = tuple(np.broadcast_to(np.uint8(0), (n_frames, c.height, c.width)) for c in cameras)
     return FilmedPeople(cameras, distances, np.ones((n_frames, len(cameras)), dtype=bool), is_filmed=False)
-
-
-def _silhouettes(session: Session, frames: IntArray) -> list[tuple[ViewSilhouette, ...]] | None:
-    if not all(c.footage.exists() for c in session.cameras):
-        return None
-    try:
-        with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
-            return [finder.silhouettes(int(k)) for k in frames]
-    except TrackerError:  # the footage has its own messages
-        return None
 
 
 def _distances(mask: Mask) -> NDArray[np.uint8]:

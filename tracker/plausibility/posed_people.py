@@ -32,22 +32,26 @@ class PosedPerson:
         """All of it."""
         return self
 
-    def costs(self, places: Places, shift: int = 0) -> Array:
+    def costs(self, places: Places) -> Array:
         """Return how far joints lie from the known ones, (F,); see `readings.KnownPeople`."""
-        names = [name for name in places if name in self.places]
-        if not names:
-            return np.full(len(next(iter(places.values()))), np.nan)
-        given, known = (np.stack([p[n] for n in names], axis=1) for p in (places, self.places))
-        shown = np.arange(len(given)) + shift
-        inside = (shown >= 0) & (shown < len(known))
-        steps = given - known[np.where(inside, shown, 0)]
-        if self.ignores_offsets:
-            steps[~inside] = np.nan
-            steps -= median_over_time(steps)
-        away_m = np.linalg.norm(steps, axis=-1)
-        squares = np.minimum(away_m / INLIER_M, 1.0) ** 2
+        squares = np.minimum(self._away_m(places, 0) / INLIER_M, 1.0) ** 2
         n_known = np.isfinite(squares).sum(axis=1)
-        return np.where(inside & (n_known > 0), np.nansum(squares, axis=1) / np.maximum(n_known, 1), np.nan)
+        return np.where(n_known > 0, np.nansum(squares, axis=1) / np.maximum(n_known, 1), np.nan)
+
+    def lag_errors_m(self, places: Places, most: int) -> Array:
+        """Return how far joints lie from those of other frames, (2 most + 1, F, n_joints), metres."""
+        return np.stack([self._away_m(places, shift) for shift in range(-most, most + 1)])
+
+    def _away_m(self, places: Places, shift: int) -> Array:
+        """Return the distances from the joints so many frames later, (F, n_joints); NaN where unknown."""
+        names = [name for name in places if name in self.places]
+        given, known = (np.array([p[n] for n in names]).reshape(len(names), -1, 3) for p in (places, self.places))
+        steps = np.full(given.shape, np.nan)
+        at = np.arange(given.shape[1])
+        inside = (at + shift >= 0) & (at + shift < known.shape[1])
+        steps[:, inside] = given[:, inside] - known[:, at[inside] + shift]
+        steps = np.swapaxes(steps, 0, 1)
+        return np.linalg.norm(steps - median_over_time(steps) * self.ignores_offsets, axis=-1)
 
 
 def read_beside(

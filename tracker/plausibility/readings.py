@@ -14,7 +14,7 @@ from tracker.formats.file_axes import axes_matrix, axis_conventions
 from tracker.formats.joint_maps import JointMap
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.lengths import METRES_BY_WORD, USUAL_SIZES
-from tracker.observations.shifts import SAMPLES, vertex
+from tracker.observations.shifts import SAMPLES
 from tracker.observations.triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import (
     PRIORS,
@@ -25,6 +25,7 @@ from tracker.plausibility.body_likelihood import (
     stature_nats,
     upright_nats,
 )
+from tracker.plausibility.lags import Lag, find_lag
 
 
 class KnownPeople(Protocol):
@@ -42,12 +43,19 @@ class KnownPeople(Protocol):
     def certain(self) -> "KnownPeople":
         """The part of it that suffices to refute people who are elsewhere."""
 
-    def costs(self, places: Places, shift: int = 0) -> Array:
+    def costs(self, places: Places) -> Array:
         """Return how far a person is from it, (F,): mean truncated squares, 0 to 1; NaN where unknown.
 
         Args:
             places: of the person on the frames, metres.
-            shift: frames by which the evidence is later.
+        """
+
+    def lag_errors_m(self, places: Places, most: int) -> Array:
+        """Return how far a person is from it on other frames, (n_lags, ..., n), metres; NaN where unknown.
+
+        Args:
+            places: of the person on the frames, metres.
+            most: largest lag of the evidence, steps; lags are evenly spaced, and 0 is in the middle.
         """
 
 
@@ -61,8 +69,6 @@ class Reading:
     """Axes of the file that are the session's x, y, z."""
     scale: float = 1.0
     """Factor of the points as they were read."""
-    shift: int = 0
-    """Frames by which the recording is later than the points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +157,7 @@ class ReadPoints:
         axes = [*axis_conventions()] if in_space else [given.axes]
         by_map = {m.name: self.bones(replace(given, joint_map=m)) for m in maps}
         scales = self._scales(given) if in_space else [given.scale]
-        body = {Reading(*each, given.shift): -np.inf for each in product(maps, axes, scales)}
+        body = {Reading(*each): -np.inf for each in product(maps, axes, scales)}
         statures = {
             (name, s): sum(stature_nats(s * b.stature, t) for b, t in zip(found, self.statures_m, strict=True))
             for (name, found), s in product(by_map.items(), scales)
@@ -191,23 +197,16 @@ class ReadPoints:
         usual = [s for s in scales if is_near(s).any() or any(map(USUAL_SIZES["person"].has, s * statures))]
         return usual or [given.scale]
 
-    def best_shift(self, reading: Reading) -> float:
-        """Return by how many frames of the session the recording is later than the points; 0 if that is not clear.
+    def lag(self, reading: Reading) -> Lag | None:
+        """Return by how many frames of the session the recording is later than the points; None if that is unknown.
 
-        It is at most a quarter of the stretch and `SAMPLES` steps. A parabola places it between two frames.
+        It is at most a quarter of the stretch and `SAMPLES` steps.
         """
         most = min(len(self.points) // 4, SAMPLES)
-        if self.known_people is None or not self.known_people.knows_frames or not most:
-            return 0.0
-        costs = np.array([self._costs(replace(reading, shift=s)) for s in range(-most, most + 1)])
-        both = np.isfinite(costs).all(axis=0)  # the same frames and people at all shifts
-        if not both.any():
-            return 0.0
-        nats = self._weight * costs[:, both].mean(axis=1)
-        best = int(nats.argmax())
-        if nats[best] < nats[most] + CLEAR_NATS:
-            return 0.0
-        return self.step * (best - most + vertex(nats[max(best - 1, 0) : best + 2]))
+        if self.known_people is None or not most:
+            return None
+        errors = [self.known_people.lag_errors_m(places, most) for places in self.places(reading)]
+        return find_lag(np.concatenate(errors, axis=-1), most * self.step, PRIORS.posture_s * self.fps / self.step)
 
     def _place_nats(self, reading: Reading) -> float:
         """Return the log likelihood of a reading by where people are, up to a constant; at most 0."""
@@ -228,4 +227,4 @@ class ReadPoints:
         """Return how far each person is from those of the recording, (n_people * F,), 0 to 1; NaN if unknown."""
         if self.known_people is None:
             return np.empty(0)
-        return np.concatenate([self.known_people.costs(p, reading.shift) for p in self.places(reading)])
+        return np.concatenate([self.known_people.costs(p) for p in self.places(reading)])

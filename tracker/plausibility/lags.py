@@ -1,0 +1,71 @@
+"""Find by how many frames motions that should be one lie apart, and how far that is known."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.fitting.hypothesis import CLEAR_NATS
+from tracker.fitting.keypoints import GROSS_SIGMAS
+from tracker.geometry.arrays import Array
+from tracker.observations.shifts import vertex
+
+
+class Lag(NamedTuple):
+    """By how many frames of the session a recording is later than points of it."""
+
+    best: float
+    """Where they fit best, between frames."""
+    low: int
+    high: int
+    """First and last lag that may be right."""
+
+    @property
+    def frames(self) -> int:
+        """The lag in whole frames; 0 if they may be in step."""
+        return 0 if self.low <= 0 <= self.high else round(self.best)
+
+    def __str__(self) -> str:
+        """Return words such as "3 frames later (2 to 5)"."""
+        n, ends = abs(self.frames), sorted(map(abs, (self.low, self.high)))
+        known = "" if ends == [n, n] else f" ({ends[0]} to {ends[1]})"
+        return f"{n} frame{'s' * (n != 1)} {'later' if self.frames > 0 else 'earlier'}{known}"
+
+
+def find_lag(errors: Array, reach: float, n_rows: float, n_tried: int = 0) -> Lag | None:
+    """Find the lag with the least errors; None if these do not limit it on both sides.
+
+    Errors count as squares that saturate (Geman-McClure), in units of their median at the best lag. A lag is excluded
+    if its costs are larger than the best by a paired t-test: t^2 / 2 nats, as of normal means, `CLEAR_NATS` and the
+    logarithm of the number of lags that were tried.
+
+    Args:
+        errors: of evenly spaced lags, (n_lags, F, n), those of lag 0 in the middle; NaN where unknown.
+        reach: the last lag, frames.
+        n_rows: number of rows after which errors are independent of those before.
+        n_tried: number of lags of which these are the nearest, compared again on the rows that they share; 0 for all.
+    """
+    known = np.isfinite(errors).all(axis=0)
+    if not known.any():
+        return None
+    scale = GROSS_SIGMAS * max(np.median(errors[:, known], axis=1).min(), np.finfo(float).tiny**0.5)
+    costs = np.where(known, errors**2 / (errors**2 + scale**2), 0.0)
+    mean = costs.sum(axis=(1, 2))
+    best, middle = int(mean.argmin()), len(mean) // 2
+    near = max(2 * abs(best - middle), middle // 2)
+    if near < middle and not n_tried:
+        return find_lag(errors[middle - near : middle + near + 1], reach * near / middle, n_rows, len(errors))
+    rows_known, cells = np.flatnonzero(known.any(axis=1)), list[Array]()
+    for rows in np.array_split(rows_known, max(1, round(len(rows_known) / n_rows))):
+        n_known = known[rows].sum(axis=0)
+        cells.append(costs[:, rows].sum(axis=1)[:, n_known > 0] / n_known[n_known > 0])
+    more = np.concatenate(cells, axis=1)
+    more -= more[best]
+    if more.shape[1] < 2:
+        return None
+    least = np.sqrt(2 * (CLEAR_NATS + np.log(n_tried or len(more))) / more.shape[1]) * more.std(axis=1, ddof=1)
+    likely = np.flatnonzero(more.mean(axis=1) <= least)
+    if likely[0] == 0 or likely[-1] == len(more) - 1:
+        return None
+    lags = np.linspace(-reach, reach, len(more))
+    at = lags[best] + (lags[1] - lags[0]) * vertex(-mean[best - 1 : best + 2])
+    return Lag(float(at), int(lags[likely[0]]), int(lags[likely[-1]]))
