@@ -11,15 +11,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.geometry.arrays import Array, Image
+from tracker.geometry.arrays import Array, Image, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.images.working_view import MIN_REGION_PX
 from tracker.plausibility.body_likelihood import Places
 
 _BONES = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
 """Joints at the ends of the parts that move."""
-_CELL_PX = 4
-"""Spacing at which flows are kept, px: that of OpenCV's finest level (`DISOpticalFlow`, ultrafast)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +30,15 @@ class FilmedMotion:
     """By view, from each picture to that `step` frames later, (n, rows, columns, 2), px; NaN where unknown."""
     step: int
     """Frames of the session from a place of a person to the next."""
+    n_steps: int = 3
+    """Steps over which motions are compared: 0.1 s in which a limb moves more than the points of a network tremble."""
+    cell_px: int = 4
+    """Spacing of the rows and columns of flows, px: that of OpenCV's finest level (`DISOpticalFlow`, ultrafast)."""
 
     def errors_m(self, places: Places, most: int) -> Array:
-        """Return how far limbs move beside the pictures of other frames, (2 most * step + 1, F - 1, n_views * n_bones).
+        """Return how far limbs move otherwise than the pictures of other frames, metres.
+
+        The shape is (2 most * step + 1, F - n_steps, n_views * n_bones).
 
         Args:
             places: of one person, (F, 3) each, metres.
@@ -48,23 +52,24 @@ class FilmedMotion:
         errors = [self._of_view(v, np.moveaxis(points, 2, 0), lags) for v in range(len(self.cameras))]
         return np.concatenate(errors, axis=-1)
 
-    def _of_view(self, view: int, points: Array, lags: Array) -> Array:
-        """Return the errors of a view, (n_lags, F - 1, n_bones), from points, (F, n_bones, 3, 3), metres."""
+    def _of_view(self, view: int, points: Array, lags: IntArray) -> Array:
+        """Return the errors of a view, (n_lags, F - n_steps, n_bones), from points, (F, n_bones, 3, 3), metres."""
         camera, flow = self.cameras[view], self.flows[view]
         flat = points.reshape(-1, 3)
         px = camera.project(flat).reshape(*points.shape[:3], 2)
         metres = (camera.depths(flat) / camera.K[0, 0]).reshape(px.shape[:3])[:-1]
         with np.errstate(invalid="ignore"):
-            inside = ((px > -0.5) & (px < np.array(camera.size) - 0.5)).all(axis=-1)[:-1] & (metres > 0)
-        u, v = np.moveaxis(np.where(inside[..., None], px[:-1], 0.0).round().astype(np.int64) // _CELL_PX, -1, 0)
-        moved, out = np.diff(px, axis=0), np.full((len(lags), *inside.shape[:2]), np.nan)
+            inside = np.all((px > -0.5) & (px < np.array(camera.size) - 0.5), axis=-1)[:-1] & (metres > 0)
+        u, v = np.moveaxis(np.where(inside[..., None], px[:-1], 0.0).round().astype(np.int64) // self.cell_px, -1, 0)
+        moved, apart_m = np.diff(px, axis=0), np.full((len(lags), *inside.shape, 2), np.nan)
         for row, lag in enumerate(lags):
             shown = self.step * np.arange(len(inside)) + lag
             rows = (shown >= 0) & (shown < len(flow))
             seen = flow[shown[rows, None, None], v[rows], u[rows]]
-            away_m = np.linalg.norm(seen - moved[rows], axis=-1) * metres[rows]
-            out[row, rows] = np.where(inside[rows], away_m, np.nan).mean(axis=-1)
-        return out
+            apart_m[row, rows] = np.where(inside[rows], metres[rows], np.nan)[..., None] * (seen - moved[rows])
+        n = max(0, len(inside) - self.n_steps + 1)
+        sums = np.sum([apart_m[:, i : i + n] for i in range(self.n_steps)], axis=0)
+        return np.asarray(np.linalg.norm(sums, axis=-1).mean(axis=-1))
 
 
 class MotionFinder:
@@ -79,10 +84,7 @@ class MotionFinder:
 
     def add(self, frames: Sequence[Image | None], cameras: Sequence[Camera]) -> None:
         """Take the next frame of each camera, RGB, at the size of cameras; None if it is damaged."""
-        pictures = [
-            None if f is None else cv2.resize(cv2.cvtColor(f, cv2.COLOR_RGB2GRAY), c.size, interpolation=cv2.INTER_AREA)
-            for f, c in zip(frames, cameras, strict=True)
-        ]
+        pictures = [None if f is None else _grey(f, c) for f, c in zip(frames, cameras, strict=True)]
         if len(self._before) == self.step:
             pairs = zip(self._before[0], pictures, cameras, strict=True)
             self._flows.append([self._flow(before, after, c) for before, after, c in pairs])
@@ -95,10 +97,15 @@ class MotionFinder:
         return FilmedMotion(tuple(cameras), tuple(np.stack(f) for f in zip(*self._flows, strict=True)), self.step)
 
     def _flow(self, before: Image | None, after: Image | None, camera: Camera) -> NDArray[np.float16]:
-        if before is None or after is None or min(camera.size) < MIN_REGION_PX:
-            shape = [-(-n // _CELL_PX) for n in (camera.height, camera.width)]
-            return np.full((*shape, 2), np.nan, np.float16)
-        return self._finder.calc(before, after, None)[::_CELL_PX, ::_CELL_PX].astype(np.float16)
+        flow = np.full((camera.height, camera.width, 2), np.nan, np.float32)
+        if before is not None and after is not None and min(camera.size) >= MIN_REGION_PX:
+            self._finder.calc(before, after, np.nan_to_num(flow, copy=False))
+        return flow[:: FilmedMotion.cell_px, :: FilmedMotion.cell_px].astype(np.float16)
+
+
+def _grey(frame: Image, camera: Camera) -> Image:
+    grey = cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY)
+    return np.asarray(cv2.resize(grey, camera.size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _named(side: str) -> list[tuple[str, str]]:

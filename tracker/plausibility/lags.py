@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.fitting.keypoints import GROSS_SIGMAS
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Mask
 from tracker.observations.shifts import vertex
 
 
@@ -14,7 +14,7 @@ class Lag(NamedTuple):
     """By how many frames of the session a recording is later than points of it."""
 
     best: float
-    """Where they fit best, between frames."""
+    """The likeliest one, between frames."""
     low: int
     high: int
     """First and last lag that may be right."""
@@ -44,19 +44,19 @@ def find_lag(errors: Array, reach: float, n_rows: float, n_tried: int = 0) -> La
         n_rows: number of rows after which errors are independent of those before.
         n_tried: number of lags of which these are the nearest, compared again on the rows that they share; 0 for all.
     """
-    known = np.isfinite(errors).all(axis=0)
+    known: Mask = np.all(np.isfinite(errors), axis=0)
     if not known.any():
         return None
-    scale = GROSS_SIGMAS * max(np.median(errors[:, known], axis=1).min(), np.finfo(float).tiny**0.5)
+    scale = GROSS_SIGMAS * max(np.median(errors[:, known], axis=1).min(), np.finfo(float).tiny ** 0.5)
     costs = np.where(known, errors**2 / (errors**2 + scale**2), 0.0)
     mean = costs.sum(axis=(1, 2))
     best, middle = int(mean.argmin()), len(mean) // 2
     near = max(2 * abs(best - middle), middle // 2)
     if near < middle and not n_tried:
         return find_lag(errors[middle - near : middle + near + 1], reach * near / middle, n_rows, len(errors))
-    rows_known, cells = np.flatnonzero(known.any(axis=1)), list[Array]()
+    rows_known, cells = np.flatnonzero(np.any(known, axis=1)), list[Array]()
     for rows in np.array_split(rows_known, max(1, round(len(rows_known) / n_rows))):
-        n_known = known[rows].sum(axis=0)
+        n_known = np.sum(known[rows], axis=0)
         cells.append(costs[:, rows].sum(axis=1)[:, n_known > 0] / n_known[n_known > 0])
     more = np.concatenate(cells, axis=1)
     more -= more[best]
