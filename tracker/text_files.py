@@ -11,6 +11,7 @@ import tomllib
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import resources
 from io import BufferedReader, TextIOWrapper
 from itertools import accumulate
 from pathlib import Path
@@ -58,6 +59,12 @@ class TextKind:
     """Kind of error that a bad file raises."""
     remedy: str = "correct it"
     """Advice to a person whose file cannot be read as text."""
+
+
+def packaged_texts(*folders: str) -> dict[str, str]:
+    """Return the texts of the TOML files in a folder of the package by their names without suffix, in order."""
+    files = sorted(resources.files("tracker").joinpath(*folders).iterdir(), key=lambda file: file.name)
+    return {f.name.removesuffix(".toml"): f.read_text("utf-8") for f in files if f.name.endswith(".toml")}
 
 
 def read_text(path: Path, kind: TextKind) -> str:

@@ -8,14 +8,13 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib import resources
 from pathlib import Path
 
 import msgspec
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.trc import MarkerTable
-from tracker.text_files import DOCUMENT_BYTES, TextKind, parse_toml, read_toml
+from tracker.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml, read_toml
 from tracker.validation import Name, check
 
 LIMB_JOINTS = tuple(
@@ -84,9 +83,7 @@ OWN = JointMap("our own", {j: j for j in _BODY_POINTS})
 @cache
 def known_joint_maps() -> tuple[JointMap, ...]:
     """Return the conventions that the program knows."""
-    folder = resources.files("tracker") / "formats" / "skeletons"
-    files = sorted((f for f in folder.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
-    texts = {f.name.removesuffix(".toml"): f.read_text("utf-8") for f in files}
+    texts = packaged_texts("formats", "skeletons")
     return (OWN, *(parse_joint_map(name, parse_toml(text, name, _KIND), name) for name, text in texts.items()))
 
 

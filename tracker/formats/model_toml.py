@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -22,20 +21,15 @@ from msgspec import Meta
 from tracker.body.model import BodyModel
 from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
-from tracker.text_files import DOCUMENT_BYTES, TextKind, parse_toml, read_text
+from tracker.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml, read_text
 from tracker.validation import UNPRINTABLE, Color, Name, Vector, check, check_version
 
 VERSION = 1
 """Version of the files; a newer one is refused."""
 DEFAULT_HEIGHT_M = 1.75
 """Height of an adult where none is given, metres."""
-PRESETS = tuple(
-    sorted(
-        f.name.removesuffix(".toml")
-        for f in (resources.files("tracker") / "body" / "models").iterdir()
-        if f.name.endswith(".toml")
-    )
-)
+_PRESET_TEXTS = packaged_texts("body", "models")
+PRESETS = tuple(_PRESET_TEXTS)
 
 
 _KIND = TextKind("body model", DOCUMENT_BYTES, ModelError)
@@ -162,7 +156,7 @@ def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyM
         ModelError: the model is unknown, unreadable or malformed.
     """
     if str(name_or_path) in PRESETS:
-        text = (resources.files("tracker") / "body" / "models" / f"{name_or_path}.toml").read_text("utf-8")
+        text = _PRESET_TEXTS[str(name_or_path)]
     else:
         path = Path(name_or_path)
         if path.suffix != ".toml" or not os.path.isfile(path):  # unlike pathlib's, for any name

@@ -40,12 +40,6 @@ VERSION = 1
 KIND = TextKind("observations", TABLE_BYTES, SessionError)
 
 
-_People = Annotated[tuple[Name, ...], msgspec.Meta(min_length=1, description="the people of whom they are")]
-_Points = Annotated[
-    tuple[Name, ...], msgspec.Meta(min_length=1, max_length=MAX_NAMES, description="the names of the points")
-]
-
-
 class Description(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """The file that says what was imported under a name."""
 
@@ -58,8 +52,10 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 
 class _Content(Description, forbid_unknown_fields=True, kw_only=True):
-    people: _People
-    points: _Points
+    people: Annotated[tuple[Name, ...], msgspec.Meta(min_length=1, description="the people of whom they are")]
+    points: Annotated[
+        tuple[Name, ...], msgspec.Meta(min_length=1, max_length=MAX_NAMES, description="the names of the points")
+    ]
     cameras: tuple[Name, ...] = ()
     skeleton: Name
     joint_map: dict[str, Any]
