@@ -9,9 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.detection.detector import ADULT, DetectedPerson, Detector, PictureSquare
+from tracker.footage.mask_image import ANYONE, UNKNOWN
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
 from tracker.observations.identities import SAME_PERSON_M, PersonTrack, follow_people, track_distance
@@ -92,6 +95,31 @@ class PeopleInViews:
                 self._complete(track, frame, figures, pictures)
         return figures
 
+    def mask(self, frame: int, view: int, figures: Sequence[DetectedPerson]) -> NDArray[np.uint8]:
+        """Return the mask of a picture as footage has it, (H, W); see `tracker.footage.recording.read_mask`.
+
+        People whom other views show at the same place are somebody. Unknown are figures whom no other view shows, and
+        where somebody should be whom the detector does not see here.
+
+        Args:
+            frame: on which people were found last.
+            view: index of the view.
+            figures: of the picture, whose detector gives masks.
+        """
+        camera = self._views.cameras[view]
+        width, height = camera.size
+        out = np.zeros((height, width), np.uint8)
+        here = [track for track in self.tracks if track.seen == frame and not track.is_flat]
+        confirmed = {track.members[frame, view] for track in here if (frame, view) in track.members}
+        for track in here:
+            if (frame, view) not in track.members and (square := self._square(track, view)) is not None:
+                center, radius = square.center_px.round().astype(int), round(square.side_px / 2)
+                cv2.circle(out, tuple(map(int, center)), radius, UNKNOWN, cv2.FILLED)
+        for i, figure in sorted(enumerate(figures), key=lambda at: at[0] in confirmed):
+            if figure.mask is not None:
+                out[figure.mask((height, width)) > 0.5] = ANYONE if i in confirmed else UNKNOWN
+        return out
+
     def recall(self, observations: ObservationSet) -> dict[int, Seen]:
         """Take over the figures that were seen before, by frame, and follow the people among them."""
         points, out = observations.points, dict[int, Seen]()
@@ -155,7 +183,7 @@ class PeopleInViews:
             apart = np.linalg.norm(found.points_px - other.points_px, axis=1)
             if np.nanmedian(apart) * ADULT.square_m < INLIER_M * square.side_px:
                 return
-        figures.append(replace(found, mask=None))  # masks of all frames would fill the memory
+        figures.append(found)
 
     def _is_around(self, square: PictureSquare, figure: DetectedPerson) -> bool:
         """Return whether a square is around the hips of a figure: others behind it are found by other views."""
