@@ -5,6 +5,14 @@ import numpy as np
 from tracker.detection.detector import DetectedPerson, PictureSquare
 
 
+def box_of(px, shape):
+    """Probability that each pixel of a picture shows a person: 1 in the rectangle around the points."""
+    out = np.zeros(shape, np.float32)
+    (left, top), (right, bottom) = (f(px, axis=0).round().astype(int) for f in (np.nanmin, np.nanmax))
+    out[max(0, top) : max(0, bottom), max(0, left) : max(0, right)] = 1.0
+    return out
+
+
 class FakeDetector:
     """Finds people by their projected points; a picture is marked with its view and frame."""
 
@@ -41,7 +49,10 @@ class FakeDetector:
                 apart = np.linalg.norm((points[9, :2] + points[12, :2]) / 2 - square.center_px)
                 near.append((apart, person, points))
         apart, _, points = min(near, default=(np.inf, 0, None), key=lambda found: found[:2])
-        return DetectedPerson(points[:, :2].copy(), points[:, 2], 1.0) if apart < 0.2 * square.side_px else None
+        if apart >= 0.2 * square.side_px:
+            return None
+        px = points[:, :2].copy()
+        return DetectedPerson(px, points[:, 2], 1.0, lambda shape: box_of(px, shape))
 
     def _people(self, picture):
         view, low, high = picture[0, 0].tolist()

@@ -1,23 +1,26 @@
 """Detect the people of a session: the points of all figures in all views, stored as observations."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import TypeAlias
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.compute.progress import Report, unreported
 from tracker.detection.detector import Detector
 from tracker.detection.people_in_views import PeopleInViews, Seen, points_of
-from tracker.errors import TrackerError
+from tracker.errors import SessionError, TrackerError
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import JointMap, known_joint_maps
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Image
 from tracker.geometry.ground_plane import floor_plane
 from tracker.observations.identities import most_seen_people
 from tracker.observations.observed import ObservationSet, ObservedPoints
-from tracker.observations.stored import list_observations, load_observations, save_observations
+from tracker.observations.stored import list_observations, load_observations, new_folder, save_observations
+from tracker.observations.stored_masks import describe_masks, masks_folder
 from tracker.session.session import Session
 
 FORMAT = "detection"
@@ -38,6 +41,8 @@ class DetectionPlan:
     """Name of the detector and of its model, which are stored."""
     frames: range
     """Frames of the session, ascending."""
+    masks: bool = False
+    """Whether masks of the people are stored too, under the name with `_masks` behind. No camera uses them yet."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +88,16 @@ def detect_people(
     up = floor_plane(session.up, session.floor).normal
     people = PeopleInViews(detector, columns, len(convention.points), cameras, up, session.fps)
     found = {} if before is None else people.recall(before)
+    masks = _MaskWriter(session, f"{plan.name}_masks", goes_on=before is not None) if plan.masks else None
     todo = [k for k in plan.frames if k not in found]
     try:
         for i, k in enumerate(todo):
             report("detecting people", i / len(todo))
-            found[k] = people.see(k, recording.read(k))
+            pictures = recording.read(k)
+            figures = people.see(k, pictures)
+            if masks is not None:
+                masks.write(k, [people.mask(k, v, own) for v, own in enumerate(figures)], pictures)
+            found[k] = [[replace(figure, mask=None) for figure in own] for own in figures]  # masks fill the memory
             here, only = {k: found[k]}, range(k, k + 1)
             show(k, lambda here=here, only=only: _observations(session, plan, convention, here, only, ()))
     except KeyboardInterrupt:
@@ -108,8 +118,40 @@ def detect_people(
     save_observations(
         session, _observations(session, plan, convention, found, done, notes), {}, replaces=before is not None
     )
+    if masks is not None:
+        describe_masks(session, masks.name, FORMAT, {"detector": plan.detector, "detected": _text(done)})
     counts = tuple(sum(bool(views[v]) for views in found.values()) for v in range(len(cameras)))
     return Detected(done, len(found) == len(plan.frames), counts, people.number, notes)
+
+
+class _MaskWriter:
+    """Writes masks one by one."""
+
+    def __init__(self, session: Session, name: str, goes_on: bool) -> None:
+        """Prepare the folder, which is there already if a detection goes on.
+
+        Raises:
+            SessionError: others have the name.
+        """
+        self.name, self._cameras, self._folder = name, session.cameras, masks_folder(session, name)
+        if not goes_on:
+            new_folder(session, name)
+
+    def write(self, k: int, masks: Sequence[NDArray[np.uint8]], pictures: Sequence[Image | None]) -> None:
+        """Write the masks of a frame, (H, W) each, of the views that have a picture.
+
+        Raises:
+            SessionError: they cannot be written.
+        """
+        try:
+            for source, mask, picture in zip(self._cameras, masks, pictures, strict=True):
+                folder = self._folder / source.camera.name
+                folder.mkdir(parents=True, exist_ok=True)
+                if picture is not None:
+                    data = cv2.imencode(".png", mask)[1].tobytes()
+                    (folder / f"{k + source.offset:06d}.png").write_bytes(data)
+        except OSError as error:
+            raise SessionError(f"cannot write {self._folder}: {error}; free some space, and detect again") from error
 
 
 def _begun(session: Session, plan: DetectionPlan) -> ObservationSet | None:

