@@ -90,7 +90,10 @@ def _detect(arguments: DetectArguments, path: Path, folder: Path, reporter: Repo
 
 def _format(found: dict[str, Any]) -> str:
     first, end = found["frames"]
-    lines = [f"{found['name']}: {found['detector']}, frames {first} to {end - 1}"]
+    lines = [
+        f"{found['name']}: {found['detector']}, frames {first} to {end - 1}",
+        f"  people at once: {found['people']}",
+    ]
     lines += [f"  {camera}: people in {n} of {end - first} pictures" for camera, n in found["pictures"].items()]
     lines += [f"  note: {note}" for note in found["notes"]]
     lines.append(f"stored as {found['name']}" + ("" if found["complete"] else "; stopped, run it again to go on"))

@@ -44,7 +44,8 @@ def test_detected_people_are_shown_stored_and_known_to_other_commands(run, sessi
     words = "detect", session, "--as", "net", "--detector", "fake", "--model", "own"
     status, out, _ = run(*words)
     assert (status, out.splitlines()) == (0, [
-        "net: fake own, frames 0 to 7", *(f"  cam{v}: people in 8 of 8 pictures" for v in range(4)), "stored as net",
+        "net: fake own, frames 0 to 7", "  people at once: 1",
+        *(f"  cam{v}: people in 8 of 8 pictures" for v in range(4)), "stored as net",
     ])  # fmt: skip
     assert_refused(run(*words), ["expected a free name, found 'net', which is complete"])
     info = json.loads(run("info", session, "--json")[1])
