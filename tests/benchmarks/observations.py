@@ -22,7 +22,7 @@ from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording as Footage
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
-from tracker.judging.judge import DOUBTED, Judgement, judge, judge_person
+from tracker.judging.judge import Judgement, judge, judge_person
 from tracker.judging.verdicts import LIMBS
 from tracker.observations.body_points import BodyPoints
 from tracker.session.session import load_session
@@ -142,7 +142,7 @@ def cells(found: list[Judgement], truth: Truth) -> list[str]:
                     scores.append(verdict.probability_off)
         first += [bool(truth.off(own.imported, d.frame, d.limb)) for d in own.worst[:LISTED]]
     is_off, score = np.array(off), np.array(scores)
-    flagged = score >= DOUBTED
+    flagged = score >= 1 - score  # as `LimbVerdict.is_doubted`
     percent = [f"{100 * flagged[chosen].mean():.0f}%" if chosen.any() else "" for chosen in (is_off, ~is_off)]
     wrong = f"{sum(first) / len(found):.1f}" if is_off.sum() >= LISTED * len(found) else ""
     return [f"{is_off.sum()} of {len(off)}", area(score, is_off), wrong, *percent]
