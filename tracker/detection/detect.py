@@ -229,9 +229,13 @@ def _observations(
 def _notes(people: PeopleInViews, n: int, done: range) -> tuple[str, ...]:
     """Say whether other people than the `n` of the session are seen, and who is not seen all the time."""
     out, taken = [], most_seen_people(people.tracks, n)
-    if people.number != n:
-        end = ": those seen most are taken" if people.number > n else ""
-        out.append(f"{people.number} people are seen at once by three views or by all, the session has {n}{end}")
+    if people.number < n:
+        out.append(f"{people.number} of {n} people are seen at once by three views or by all")
+    elif people.number > n:
+        out.append(
+            f"{people.number} people are seen at once by three views or by all, the session has {n}: "
+            "those seen most are taken"
+        )
     for tracks in taken:
         frames = sorted({k for t in tracks for k, _ in t.members})
         if frames[0] - done.start >= people.every or done.stop - frames[-1] > people.every:

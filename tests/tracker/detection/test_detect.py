@@ -91,13 +91,13 @@ def test_a_detection_that_sees_nobody_stores_nothing(couple):
 
 
 @pytest.mark.parametrize(("people", "expected"), [
-    (("ann",), ", the session has 1: those seen most are taken"),
-    (("ann", "ben", "cid"), ", the session has 3"),
+    (("ann",), "2 people are seen at once by three views or by all, the session has 1: those seen most are taken"),
+    (("ann", "ben", "cid"), "2 of 3 people are seen at once by three views or by all"),
 ])  # fmt: skip
 def test_other_numbers_of_people_are_noted(tmp_path, couple, people, expected):
     session = make_session(tmp_path / "other", N, people=people)
     found = run(session, FakeDetector(seen(session, couple[1])))
-    assert (found.n_people, found.notes[0]) == (2, f"2 people are seen at once by three views or by all{expected}")
+    assert (found.n_people, found.notes[0]) == (2, expected)
 
 
 def run_alone(folder, points, **missed):
