@@ -103,7 +103,7 @@ class SeenBody(NamedTuple):
         Args:
             model: the body.
             seen: the points on all frames.
-            cameras: of the session, in its order.
+            cameras: of the session, in its order; none: all points are as certain as their confidence says.
         """
         parts, places = _places(model, seen, self.offsets_part)
         sigmas = self.sigmas / np.sqrt(np.maximum(seen.confidence, _LEAST))

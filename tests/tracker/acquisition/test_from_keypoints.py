@@ -64,6 +64,7 @@ def test_a_point_on_which_the_views_of_a_frame_disagree_is_less_certain_there(re
     assert (found[5, :, knee] > 0.03).all()
     assert (found[7, :, knee] < 0.02).all()
     np.testing.assert_array_equal(np.delete(found, [5, 7], axis=0), np.delete(usual, [5, 7], axis=0))
+    np.testing.assert_array_equal(learnt.keypoints(MODEL, points, ()).sigmas[0, 0], learnt.sigmas / np.sqrt(0.8))
 
 
 def test_a_frame_with_gross_errors_costs_more(recording):
