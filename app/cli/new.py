@@ -67,8 +67,8 @@ class NewArguments:
     rescale: bool = False
     """scale a calibration at a whole multiple of the footage's size to it: the same field of view in fewer pixels."""
     any_size: bool = False
-    """take cameras nearer than 0.5 m or farther than 60 m, people below 0.6 m or above 2.3 m, and focal lengths below
-    0.3 or above 5 times the longer side of the picture."""
+    """take cameras nearer than 0.5 m or farther than 60 m, people below 0.6 m or above 2.3 m, focal lengths below
+    0.3 or above 5 times the longer side of the picture, and cameras of which no two see a person together."""
 
 
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:

@@ -38,7 +38,7 @@ from tracker.session.matching import (
     match_footage,
     shared_footage,
 )
-from tracker.session.rig_summary import summarize_rig
+from tracker.session.rig_summary import check_shared_view, summarize_rig
 from tracker.session.session import PALETTE, Person, Session, check_content, create_session
 from tracker.validation import same_form
 
@@ -90,7 +90,7 @@ class NewSession:
     rescale: bool = False
     """Whether a calibration at a whole multiple of the footage's size is scaled to it."""
     any_size: bool = False
-    """Whether rooms, people and focal lengths of unusual sizes are taken."""
+    """Whether unusual sizes of rooms, people and focal lengths, and cameras without a shared view, are taken."""
 
 
 @dataclass(frozen=True)
@@ -229,6 +229,7 @@ def check_parts(
         check_side_files(source)
     if not request.any_size:
         check_heights(request.heights, SessionError)
+        check_shared_view(list(cameras.values()))
     people = _make_people(request.people, request.models, request.heights)
     report("The body models fit: " + ", ".join(f"{p.name} {p.model.height_m:.2f} m" for p in people) + ".")
     if request.up in UP_ROTATIONS:

@@ -1,4 +1,4 @@
-"""How the cameras of a session stand: distances to the point they look at, heights, and what is odd about them."""
+"""How the cameras of a session stand: distances to the point they look at, heights, a shared view, and oddities."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from tracker.calibrations.pose_conventions import FITS_DEG
+from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import MAX_OFFSET
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
@@ -72,6 +73,41 @@ def summarize_rig(cameras: Sequence[Camera], up: str = "z") -> RigSummary:
     return RigSummary(
         names, centers, axes, point.position if meet else None, distances, heights, sentence, tuple(doubts)
     )
+
+
+def check_shared_view(cameras: Sequence[Camera]) -> None:
+    """Check that two cameras can see a person together.
+
+    Two cameras, not at one place, must show a ball half as wide as the smallest person is tall, at usual distances.
+
+    Raises:
+        CalibrationError: there are several cameras, and no two of them can.
+    """
+    low, high = USUAL_SIZES["distance"]
+    radius_m = USUAL_SIZES["person"].low / 4
+    # Steps in depth are as long as a ball is wide where a lens of an unusually long focal length just holds it.
+    depths_m = np.geomspace(low, high, 101)[:, None, None]
+    corners = radius_m * np.array([*np.eye(3), *-np.eye(3)])
+    for i, camera in enumerate(cameras):
+        grid = np.stack(np.meshgrid(*(np.linspace(0, n - 1, 9) for n in camera.pinhole.size)), axis=-1)
+        places = camera.pinhole.back_project(grid, depths_m).reshape(-1, 3)
+        balls = places[_shows(camera, places), None] + corners
+        balls = balls[_shows(camera, balls).all(axis=1)]
+        for other in cameras[i + 1 :]:
+            near = balls[np.linalg.norm(balls[:, 0] - other.center_world, axis=-1) < high]
+            is_apart = np.linalg.norm(camera.center_world - other.center_world) >= MIN_APART_M
+            if is_apart and _shows(other, near).all(axis=1).any():
+                return
+    if len(cameras) > 1:
+        found = f"none of {len(cameras)}: they stand at one place or look at other ones; check their poses and the unit"
+        raise CalibrationError.mismatch(
+            "calibration", "two cameras that can see a person together", found, Remedy("any_size")
+        )
+
+
+def _shows(camera: Camera, points_world: Array) -> Array:
+    """Return whether the pictures of a camera show points, (..., 3)."""
+    return camera.is_filmed(camera.pinhole.project(points_world))
 
 
 def _interval(values_m: Array) -> str:

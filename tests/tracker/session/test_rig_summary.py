@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from rigs import cameras, looking, on_circle, ring
 
+from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.camera_rig import axes_point
-from tracker.session.rig_summary import summarize_rig
+from tracker.session.rig_summary import check_shared_view, summarize_rig
 
 
 def test_distances_and_heights():
@@ -88,3 +89,38 @@ def test_distortion_in_another_order_is_noted():
     assert summarize_rig(cameras(ring(3), (-0.3, 0.1, 0.002, 0.001, -0.2))).doubts == ()
     fisheyes = [replace(c, distortion=np.array([0.1, 0.1, -0.2, 0.1]), fisheye=True) for c in rig]
     assert summarize_rig(fisheyes).doubts == ()
+
+
+BACK_TO_BACK = [looking([x, 0, 1.0], [4 * x, 0, 1.0]) for x in (-1.0, 1.0)]
+
+
+@pytest.mark.parametrize(
+    "Ts",
+    [
+        ring(4),
+        [looking([x, 0, 1.0], [x, 4.0, 1.0]) for x in (-0.03, 0.03)],
+        [looking([3.0 * k, 0, 2.0], [3.0 * k, 4.0, 1.0]) for k in range(6)],
+        [looking([6.0 * k, 0, 2.5], [6.0 * k + 4.0, 0.1, 1.0]) for k in range(5)],
+        [*BACK_TO_BACK, looking([0, 3.0, 1.0], [1.0, 3.0, 1.0])],
+        [looking([0, 0, 1.0], [4.0, 0, 1.0]), looking([8.0, 0, 1.0], [4.0, 0, 1.0])],
+    ],
+    ids=["ring", "stereo", "wall", "corridor", "a pair of three", "face to face"],
+)
+def test_rigs_of_which_two_cameras_share_a_view_are_taken(Ts):
+    check_shared_view(cameras(Ts))
+
+
+@pytest.mark.parametrize(
+    "Ts",
+    [
+        BACK_TO_BACK,
+        [looking([0.1 * np.cos(a), 0.1 * np.sin(a), 1], [np.cos(a), np.sin(a), 1]) for a in np.arange(4) * np.pi / 2],
+        [looking([0, 0, 70.0 * k], [4.0, 0, 70.0 * k]) for k in range(3)],
+        [rigid.inverse(T) for T in ring(4, height=2.0)],
+    ],
+    ids=["back to back", "outwards", "rooms apart", "inverted poses"],
+)
+def test_cameras_without_a_shared_view_are_refused(Ts):
+    with pytest.raises(CalibrationError, match="two cameras that can see a person together") as caught:
+        check_shared_view(cameras(Ts))
+    assert caught.value.remedy.code == "any_size"
