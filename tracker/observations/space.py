@@ -142,14 +142,7 @@ def name_points(names: tuple[str, ...], given: JointMap | None, source: str) -> 
     n_body = next((k for k, name in enumerate(names) if name != str(k)), len(names))
     if n_body in (75, 543, 553):  # MediaPipe's body, before hands and perhaps a face of 468 or 478 points
         n_body = 33
-    try:
-        found = given if given is not None and given.points else joint_map_of_size(n_body, source)
-    except FormatError as error:
-        if not source.startswith("xyz_"):
-            raise
-        named = f"{Path(source).stem}_labelled.csv"
-        labelled = f"(import {named} if there is one, in which Caliscope names them)"
-        raise FormatError(f"{error} {labelled}", error.remedy) from error
+    found = given if given is not None and given.points else joint_map_of_size(n_body, source)
     n_named = len(found.points)
     return (found.points + names[n_named:] if n_named in (n_body, len(names)) else names), given or found
 

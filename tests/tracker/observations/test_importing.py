@@ -338,8 +338,9 @@ def test_hands_after_a_body_without_names(session, tmp_path, kind):
 
 def test_numbers_of_no_skeleton_in_a_table_of_caliscope(session, tmp_path):
     path = write_joints("caliscope", tmp_path, range(14), TRUTH[None, :, :14]).rename(tmp_path / "xyz_HOLISTIC.csv")
-    found = problems(planned(session, path, unit_m=1.0))
-    assert "found 14 (import xyz_HOLISTIC_labelled.csv if there is one, in which Caliscope names them)" in found
+    found = planned(session, path.rename(tmp_path / "joints.csv"), unit_m=1.0)
+    assert "found 14" in problems(found)
+    assert any("the table of Caliscope whose name ends in _labelled.csv" in n for n in found.observations.notes)
 
 
 def test_files_of_other_programs_are_named(session, tmp_path):

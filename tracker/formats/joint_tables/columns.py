@@ -31,6 +31,7 @@ _SECONDS = ("s", "ms", "us", "ns")
 _PEOPLE = ("person", "subject", "individual", "person_id", "subject_id", "track_id")
 NAMES = ("keypoint", "keypoint_id", "point_id", "bodypart", "marker", "joint", "landmark", "keypoint_name", "name")
 _GROUPS = ("trajectory", "model")
+_NUMBERED = "its points are numbers; the table of Caliscope whose name ends in _labelled.csv has their names"
 
 
 @dataclass(frozen=True)
@@ -93,11 +94,12 @@ def named_columns(table: Delimited) -> Columns:
     below = {cell.lower().strip("()[]") for i, cell in enumerate(begun.cells if begun else ()) if i in dict(found)}
     if below < {*METRES_BY_WORD} and len(below) == 1:
         units, begun = below, None
-    notes: tuple[str, ...] = ()
+    notes = [_NUMBERED] * (name is not None and {"sync_index", "point_id"} <= {*lower})
     if time is not None and begun is not None and ":" in "".join(begun.cells[time : time + 1]):
-        time, notes = None, (f"its column {cells[time]} has clock times, which are left out",)
+        notes.append(f"its column {cells[time]} has clock times, which are left out")
+        time = None
     return Columns(
-        points, frame, time, units.pop(), "", second, person, name, groups, len(cells), begun=begun, notes=notes
+        points, frame, time, units.pop(), "", second, person, name, groups, len(cells), begun=begun, notes=tuple(notes)
     )
 
 
