@@ -28,6 +28,8 @@ class CalibrationLayout:
     """Reads the cameras of one file by their names. The name of a lone camera without one is empty: its file's."""
     by_program: bool = True
     """Whether programs alone write it, so that its convention is beyond doubt where it fits."""
+    is_unit_sure: bool = True
+    """Whether `unit` is that of all files: one that programs leave to their users may be another."""
     note: str = ""
     """Sentence for users on what its files leave open; usually empty."""
     join: Callable[[Sequence[Document]], Sequence[Document]] = tuple

@@ -12,7 +12,7 @@ from tracker.calibrations.camera_matrices import is_transposed
 from tracker.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
 from tracker.calibrations.document import Document, read_document, refuse
-from tracker.calibrations.foreign import foreign, named, refuse_program
+from tracker.calibrations.foreign import foreign, name_binary, named, refuse_program
 from tracker.calibrations.layouts import find_layout
 from tracker.calibrations.pose_conventions import check_convention, odd_camera, read_pose
 from tracker.calibrations.rotation_forms import check_turned, refuse_angles, with_quaternions
@@ -87,7 +87,8 @@ def read_cameras(
     check_names(entries, where)
     notes += [*pose_notes, *_alike([entry.name for entry in entries])]
     square = next((s for d, _ in documents if (s := board_square(d)) is not None), None)
-    notes += check_units(entries, where, used, square, any_size)
+    is_sure = units is not None or stated is not None or layout.is_unit_sure
+    notes += check_units(entries, where, used, square, any_size, is_sure)
     if not any_size:
         check_focal_lengths(entries, where)
     return CalibratedCameras(entries, left_out, tuple(notes))
@@ -142,7 +143,11 @@ def _in_folder(folder: Path) -> list[tuple[Document, CalibrationLayout]]:
     if not found:
         if failure is not None:
             raise failure
+        for path in paths_in(folder, CalibrationError)[:_MAX_FILES]:
+            name_binary(path)
         raise named(folder, "a folder without one", "give the files of the cameras")
+    if len({layout.name for _, layout in found}) > 1:  # lenses alone may lie beside cameras that have theirs
+        found = [f for f in found if any(_reason(s) is None for s in f[1].read(f[0]).values())] or found
     if len({layout.name for _, layout in found}) > 1:
         names = ", ".join(document.path.name for document, _ in found[:4])
         raise named(folder, f"a folder with calibrations of several layouts, {names}", "give one of these files")

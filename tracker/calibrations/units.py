@@ -17,7 +17,12 @@ _WORDS = {"m": "metres", "cm": "centimetres", "mm": "millimetres"}
 
 
 def check_units(
-    entries: Sequence[CameraEntry], where: str, units: Units, square: float | None, any_size: bool = False
+    entries: Sequence[CameraEntry],
+    where: str,
+    units: Units,
+    square: float | None,
+    any_size: bool = False,
+    is_sure: bool = True,
 ) -> list[str]:
     """Check the unit of cameras that were read with it.
 
@@ -27,6 +32,7 @@ def check_units(
         units: the unit as which their translations were read.
         square: side of a square of the board in the file's unit, if it states one.
         any_size: whether unusual distances are noted only.
+        is_sure: whether the unit is stated; else one by which the distance is more usual is refused.
 
     Returns:
         Notes: evidence for another unit.
@@ -46,6 +52,9 @@ def check_units(
         other = f"{found} {_WORDS[units]}, so that the unit is another"
         advice = squares if square == 1 else _remedy(in_units, units)
         raise CalibrationError.mismatch(where, f"cameras {limit} {place}", other, advice)
+    if not (is_sure or any_size) and _DISTANCE.units_of(in_units, METRES)[:1] not in ([], [units]):
+        found = f"{found} {_WORDS[units]} {place}, so that the unit may be another"
+        raise CalibrationError.mismatch(where, "a unit", found, _remedy(in_units, units))
     notes = []
     if square == 1:
         notes.append(

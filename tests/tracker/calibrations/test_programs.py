@@ -15,6 +15,7 @@ from calibration_files import (
     google,
     lines,
     mayacam1,
+    mayacam2,
     mvhumannet,
     rig_for,
     skeletool,
@@ -26,6 +27,7 @@ from rigs import cameras, looking
 
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import CalibrationError
+from tracker.geometry import rigid
 
 RIG = cameras([looking(p) for p in ([4.0, 0.3, 1.5], [0.2, 3.5, 2.0], [-4.0, 0.0, 1.7])], (-0.12, 0.03, 0.001, 0.0))
 POINTS = np.random.default_rng(0).uniform((-0.6, -0.6, 0.4), (0.6, 0.6, 1.6), (20, 3))
@@ -231,3 +233,37 @@ def test_programs_that_are_not_read_are_named(tmp_path, name, data, found):
     path.write_bytes(json.dumps(data).encode() if name != "a.pickle" else pickle.dumps(data))
     with pytest.raises(CalibrationError, match=found):
         read_cameras(path)
+
+
+@pytest.mark.parametrize("write", [mayacam1, mayacam2])
+def test_millimetres_of_mayacam_are_asked_about(tmp_path, write):
+    rig = rig_for(write, RIG)
+    in_mm = [replace(c, T_world_camera=rigid.transform(c.T_world_camera[:3, :3], 10 * c.center_world)) for c in rig]
+    path = write(tmp_path, in_mm)
+    with pytest.raises(CalibrationError, match=r"so that the unit may be another") as caught:
+        read_cameras(path)
+    assert re.match(r"mm \([34]", caught.value.remedy.fields["units"])
+    assert_read(path, rig, units="mm")
+    assert_read(path, in_mm, units="cm")
+
+
+def test_a_folder_of_mvhumannet_is_read(tmp_path):
+    rig = rig_for(mvhumannet, RIG)
+    path = mvhumannet(tmp_path, rig)
+    to_json(tmp_path / "camera_intrinsics.json", {"K": rig[0].K, "dist": [0.0] * 5})
+    assert path.parent == tmp_path
+    assert_read(tmp_path, rig)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "found"),
+    [
+        ("cameras.bin", bytes(8), r"a binary model of COLMAP; export it as text"),
+        ("stereo_params.pickle", pickle.dumps({"cam0-cam1": {"cameraMatrix1": 1}}), "DeepLabCut 3D; write both"),
+    ],
+)
+def test_folders_of_files_that_are_not_read_are_named(tmp_path, name, data, found):
+    (tmp_path / "a.mp4").write_bytes(b"no calibration")
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(CalibrationError, match=found):
+        read_cameras(tmp_path)
