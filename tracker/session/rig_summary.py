@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.calibrations.pose_conventions import FITS_DEG
 from tracker.errors import CalibrationError, Remedy
@@ -105,7 +106,7 @@ def check_shared_view(cameras: Sequence[Camera]) -> None:
         )
 
 
-def _shows(camera: Camera, points_world: Array) -> Array:
+def _shows(camera: Camera, points_world: Array) -> NDArray[np.bool_]:
     """Return whether the pictures of a camera show points, (..., 3)."""
     return camera.is_filmed(camera.pinhole.project(points_world))
 
