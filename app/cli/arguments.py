@@ -112,10 +112,17 @@ def finite(text: str) -> float:
 
 
 def parse_common_or_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> Mapping[str, T] | T | None:
-    """Parse one value for all people, or NAME=VALUE words; None if there are no words."""
+    """Parse one value for all people, or NAME=VALUE words; None if there are no words.
+
+    Raises:
+        TrackerError: a word is neither, or there are several values for all people.
+    """
     if len(words) == 1 and "=" not in words[0]:
         try:
             return kind(words[0])
         except ValueError:
             raise TrackerError(f"expected {option} as a value or NAME=VALUE, found '{words[0]}'") from None
+    if any("=" not in word for word in words):
+        expected, found = f"{option} once for all people, or as NAME=VALUE for each", " and ".join(words)
+        raise TrackerError.mismatch("", expected, found, "leave one out")
     return parse_pairs(words, option, kind) or None

@@ -15,8 +15,8 @@ _DIGITS = re.compile(r"([0-9]{1,19})")
 _TIME = re.compile(
     r"(?<![0-9])(?:(?:(?P<date>(?:19|20)[0-9]{2}[-_.]?[01][0-9][-_.]?[0-3][0-9])[-_. T]?)?"
     r"(?P<h>[0-2][0-9])(?P<sign>[-_.:h]?)(?P<m>[0-5][0-9])(?:(?P=sign)|m)(?P<s>[0-5][0-9])|(?P<unix>1[0-9]{9}))s?"
-    r"(?:[-_.,]?(?P<fraction>[0-9]{3}|[0-9]{6}|[0-9]{9}))?(?![0-9])"
-    r"|(?<![0-9])(?P<seconds>[0-9]+)[-_.,](?P<part>[0-9]{3}|[0-9]{6}|[0-9]{9})(?![0-9])"
+    r"(?:[-_.,]?(?P<fraction>[0-9]{3}|[0-9]{6}|[0-9]{9})|[-_.,](?P<short>[0-9]{1,8}))?(?![0-9])"
+    r"|(?<![0-9])(?P<seconds>[0-9]+)[-_.,](?P<part>[0-9]{1,9})(?![0-9])"
 )
 """Times in names: date and clock, clock, Unix time, or seconds, all with digits of a fraction of a second."""
 
@@ -114,7 +114,7 @@ def _times(words: Sequence[Sequence[str]], index: Collection[tuple[int, int]]) -
         words: of each name.
         index: places whose digits are no part of a time.
     """
-    times, wholes = [], set[float]()
+    wholes, digits, is_number = [], [], False
     for name in words:
         parts = [_DIGITS.split(text) for text in name]
         for i, k in index:
@@ -122,12 +122,31 @@ def _times(words: Sequence[Sequence[str]], index: Collection[tuple[int, int]]) -
         found = _TIME.search("".join(map("".join, parts)))
         if found is None:
             return None
-        whole = _whole_seconds(found)
-        digits = found["fraction"] or found["part"] or "0"
-        times.append(whole + int(digits) / 10 ** len(digits))
-        wholes.add(whole)
-    is_counted = len(wholes) < len(times) and max(t % 1 for t in times) < 0.5  # within each second
-    return None if len(set(times)) == 1 or (is_counted and len(set(times)) > len(wholes)) else tuple(times)
+        wholes.append(_whole_seconds(found))
+        digits.append(found["fraction"] or found["short"] or found["part"] or "0")
+        is_number = is_number or found["seconds"] is not None
+    fractions = _fractions(digits)
+    if fractions is None:
+        if is_number:
+            return None
+        fractions = [0.0] * len(wholes)
+    times = [whole + fraction for whole, fraction in zip(wholes, fractions, strict=True)]
+    is_counted = len({*wholes}) < len(times) and max(fractions) < 0.5  # within each second
+    return None if len(set(times)) == 1 or (is_counted and len(set(times)) > len({*wholes})) else tuple(times)
+
+
+def _fractions(digits: Sequence[str]) -> list[float] | None:
+    """Return fractions of a second; None if their digits are none, or may be decimals or a number without zeros ahead.
+
+    Decimals end in no 0 where they are not all of one length, and whole thousandths or the like begin with none.
+    """
+    width = max(map(len, digits))
+    several = [d for d in digits if len(d) > 1]
+    is_even = len({*map(len, digits)}) == 1
+    is_decimal = is_even or any(d[0] == "0" for d in several)
+    if width % 3 or not (is_decimal or any(d[-1] == "0" for d in several)):
+        return None
+    return [int(d) / 10 ** (len(d) if is_decimal else width) for d in digits]
 
 
 def _whole_seconds(found: re.Match[str]) -> float:

@@ -342,7 +342,7 @@ def _clocks(request: NewSession, footage: Mapping[str, Footage], fps: float) -> 
         return None, disagreement("offsets given", given, clocks.source, clocks.starts)
     if by_names is None:
         notes += sound_disagreement(clocks, files, fps)
-    return (clocks if any(clocks.starts.values()) or any(clocks.lost.values()) else None), notes
+    return (clocks if clocks.is_needed else None), notes
 
 
 def _left_out(sources: Sequence[CameraSource], n_frames: int) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """Pair the footage of cameras by their clocks: those in video files, and the times in names of pictures."""
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import reduce
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -32,6 +33,13 @@ class ClockStarts(NamedTuple):
     """The clock of each camera, for a sentence."""
     lost: Mapping[str, Sequence[LostFrames]] = {}
     """Frames that cameras lost, with frames of the footage."""
+    is_against_numbers: bool = False
+    """Whether the numbers in the names of pictures pair frames otherwise, or not at all."""
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether frames would be paired otherwise without these starts."""
+        return any(self.starts.values()) or any(self.lost.values()) or self.is_against_numbers
 
 
 def find_clock_starts(files: Mapping[str, Path], fps: float, declared: Collection[float] = ()) -> list[ClockStarts]:
@@ -92,7 +100,7 @@ def clock_notes(found: Sequence[ClockStarts], n_frames: Mapping[str, int]) -> tu
         listed = listed_starts(clocks.starts)
         if chosen is None and not doubt:
             chosen = clocks
-            if any(clocks.starts.values()) or any(clocks.lost.values()):
+            if clocks.is_needed:
                 notes.append(f"the {clocks.source} of all cameras pairs frames ({clocks.text}): offsets {listed}")
             notes += [
                 f"camera '{name}': frames lost by it: {sum(r.n for r in rows)}, first before its frame {rows[0].since}"
@@ -101,7 +109,7 @@ def clock_notes(found: Sequence[ClockStarts], n_frames: Mapping[str, int]) -> tu
             ]
         elif chosen is not None and not doubt:
             notes += disagreement(chosen.source, chosen.starts, clocks.source, clocks.starts)
-        elif differs and chosen is None:
+        elif chosen is None and (differs or clocks.is_against_numbers):
             notes.append(
                 f"by the {clocks.source} ({clocks.text}) the offsets would be {listed}; they are not taken: {doubt}"
             )
@@ -271,16 +279,22 @@ def _check_numbers(name: str, folder: ImageFolder, times: Array) -> None:
 
 
 def _against_numbers(folders: Mapping[str, ImageFolder], times: Mapping[str, Array]) -> ClockStarts | None:
-    """Return the starts by times, in doubt, where they contradict the numbers; None where they have no common span."""
+    """Return the starts by times where numbers have none in common, else in doubt where they contradict the numbers.
+
+    None where times have no common span, or confirm the numbers.
+    """
     try:
         clocks = _paired_by_time(folders, times)
     except RecordingError:
         return None
     numbers = {name: np.array(f.numbers) for name, f in folders.items()}
+    if not reduce(np.intersect1d, numbers.values()).size:  # each camera counts from a beginning of its own
+        return clocks._replace(is_against_numbers=True)
     begin = max(own[0] for own in numbers.values())
     starts = {name: float((begin - own[0]) / np.diff(own).min()) for name, own in numbers.items()}
     contradicts = disagreement("numbers", starts, clocks.source, clocks.starts)
-    return clocks._replace(doubt="the numbers in the names pair frames") if contradicts else None
+    doubt = "the numbers in the names pair frames"
+    return clocks._replace(doubt=doubt, is_against_numbers=True) if contradicts else None
 
 
 def _paired_by_time(folders: Mapping[str, ImageFolder], times: Mapping[str, Array]) -> ClockStarts:

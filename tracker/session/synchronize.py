@@ -148,7 +148,9 @@ def clock_disagreement(session: Session, source: str, found: Sequence[FoundStart
 
 
 def footage_clocks(session: Session, starts_by: str = "session") -> tuple[dict[str, str], list[str]]:
-    """Return the best clock of each camera's footage, for a person, and a sentence if they contradict the session.
+    """Return the best clock of each camera's footage, for a person, and sentences on them.
+
+    Sentences name clocks that contradict the session, or that show other starts and are not to be taken.
 
     Args:
         session: of the cameras.
@@ -159,9 +161,9 @@ def footage_clocks(session: Session, starts_by: str = "session") -> tuple[dict[s
     """
     read = {c.camera.name: read_start_times(c.footage, c.camera.name) for c in session.cameras}
     found = {name: f"{starts[0].source} {starts[0].text}" for name, starts in read.items() if starts}
-    chosen = _clocks(session)[0]
+    chosen, notes = _clocks(session)
     if chosen is None:
-        return found, []
+        return found, notes
     found = {name: found.get(name, chosen.source) for name in chosen.starts}
     starts = {c.camera.name: c.start_frames for c in session.cameras}
     return found, disagreement(starts_by, starts, chosen.source, chosen.starts)

@@ -85,7 +85,7 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
 
 
 def clock_notes(session: "Session", found: "CalibrationCheck") -> list[str]:
-    """Return a sentence if the motion of the people contradicts the clocks in the files of the footage."""
+    """Return sentences on clocks of the footage that the motion of the people contradicts, or that are not taken."""
     from tracker.pipeline.calibration_revisions import with_corrections
     from tracker.session.synchronize import footage_clocks
 

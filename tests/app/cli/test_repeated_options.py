@@ -7,7 +7,7 @@ import tyro
 from command_line import assert_refused
 
 from app.__main__ import _COMMANDS
-from app.cli.arguments import gather_repeated, parse_pairs, repeatable
+from app.cli.arguments import gather_repeated, parse_common_or_pairs, parse_pairs, repeatable
 from tracker.errors import TrackerError
 
 
@@ -51,6 +51,15 @@ def test_a_name_with_two_values(again):
         parse_pairs(["cam=a", "other=a", again], "--camera", str)
     with pytest.raises(TrackerError, match="once for"):
         parse_pairs(["caf\u00e9=a", "cafe\u0301=b"], "--camera", str)
+
+
+@pytest.mark.parametrize("words", [["1.7", "1.8"], ["ann=1.7", "1.8"], ["1.8", "1.8"]])
+def test_one_value_for_all_and_another_one(words):
+    expected = (
+        f"expected --height once for all people, or as NAME=VALUE for each, found {' and '.join(words)}; leave one"
+    )
+    with pytest.raises(TrackerError, match=expected):
+        parse_common_or_pairs(words, "--height", float)
 
 
 def test_from_end_to_end(run, session):

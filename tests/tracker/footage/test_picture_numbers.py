@@ -111,3 +111,22 @@ def test_any_names(names, may_repeat):
         assert values is None or len(values) == len(names)
     if found.numbers is not None and not may_repeat:
         assert len(set(found.numbers)) == len(names)
+
+
+@pytest.mark.parametrize("width", [3, 6, 9])
+@pytest.mark.parametrize("begin", ["169800001", "20240311_14251"])
+def test_fractions_without_zeros_ahead(width, begin):
+    """33 ms are written as 33, as Python's f"{seconds}_{microseconds}" does."""
+    names = [f"{begin}{7 + (27 + k) // 30}_{10**width * ((27 + k) % 30) // 30}" for k in range(40)]
+    times = picture_numbers(names).times
+    assert [t - times[0] for t in times] == pytest.approx([k / 30 for k in range(40)], abs=2e-3)
+
+
+def test_decimals_without_zeros_at_the_end():
+    names = ["17.05", "17.1", "17.15", "17.9", "18.251"]
+    assert picture_numbers(names).times == (17.05, 17.1, 17.15, 17.9, 18.251)
+
+
+def test_fractions_that_may_be_either():
+    """Is 17_5 half a second or five thousandths?"""
+    assert picture_numbers(["17_425", "17_85", "18_275", "18_7"]).times is None

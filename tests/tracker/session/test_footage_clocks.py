@@ -14,6 +14,7 @@ from tracker.footage.sound import SoundSettings
 from tracker.session import footage_clocks
 from tracker.session.session import load_session
 from tracker.session.synchronize import FoundStart, clock_disagreement
+from tracker.session.synchronize import footage_clocks as clocks_of_footage
 
 __all__ = ["room"]
 
@@ -304,6 +305,25 @@ def test_numbers_that_times_contradict_are_named(room):
     assert note.endswith("would be front=4 left=0; they are not taken: the numbers in the names pair frames")
 
 
+@pytest.mark.parametrize("late", [0, 2])
+def test_numbers_that_times_contradict_are_named_among_common_frames(room, late):
+    names = {"front": numbered_and_timed(0, TIMES), "left": numbered_and_timed(5, TIMES[late:])}
+    session, notes = noted(room, videos=folders(room, **names), fps=30.0, common_frames=True)
+    assert [c.offset for c in session.cameras] == [5, 0]
+    assert f"would be front={late} left=0; they are not taken: the numbers in the names pair frames" in notes[0]
+
+
+@pytest.mark.parametrize("late", [0, 4])
+@pytest.mark.parametrize("common", [False, True])
+def test_times_pair_pictures_whose_numbers_have_none_in_common(room, late, common):
+    names = {"front": numbered_and_timed(0, TIMES), "left": numbered_and_timed(700, TIMES[late:])}
+    session, notes = noted(room, videos=folders(room, **names), fps=30.0, common_frames=common)
+    assert [c.offset for c in session.cameras] == [late, 0]
+    assert session.n_frames == 20 - late
+    assert notes[0].startswith("the time in the names of the pictures of all cameras pairs frames")
+    assert notes[0].endswith(f"offsets front={late} left=0")
+
+
 def test_numbers_that_times_confirm_or_say_nothing_of(room):
     """The clocks of two machines may be hours apart: numbers of one trigger need no word on them."""
     names = {"front": numbered_and_timed(0, TIMES), "left": numbered_and_timed(4, TIMES[4:])}
@@ -319,6 +339,14 @@ def test_creation_times_without_a_common_frame_are_named(room):
     videos = tagged(room, "creation_time", front="2026-01-02T03:04:05Z", left="2026-01-02T03:05:05Z")
     _, (note,) = noted(room, videos=videos)
     assert "would be front=1798.2 left=0; they are not taken: it is known to 30 frames only" in note
+
+
+def test_clocks_that_are_not_taken_are_shown_later_too(room):
+    made, (note,) = noted(
+        room, videos=tagged(room, "creation_time", front="2026-01-02T03:04:05Z", left="2026-01-02T03:04:25Z")
+    )
+    assert "they are not taken" in note
+    assert clocks_of_footage(made)[1] == [note]
 
 
 def test_time_codes_of_two_forms(room):
