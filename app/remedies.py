@@ -121,6 +121,10 @@ PHRASES = {
         "choose another --frame, or add a camera from another side",
         "go to another frame, or add a camera from another side",
     ),
+    "find_otherwise": Phrases(
+        "detect the people by a network with quadrille detect, give a --background or masks, or place them in the page",
+        "press Detect people, or place them by hand",
+    ),
     "name_all_people": Phrases(
         "make the session with all --people, or give masks of the person",
         "make the session with the names of all people, or give masks of the person",

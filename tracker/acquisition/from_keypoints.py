@@ -35,18 +35,19 @@ _ROUNDS = 3
 """Fits to the key points, each with the offsets learnt from the one before."""
 
 
-def fit_to_keypoints(model: BodyModel, seen: BodyPoints) -> dict[int, PosedBody]:
+def fit_to_keypoints(model: BodyModel, seen: BodyPoints, frames: Sequence[int] | None = None) -> dict[int, PosedBody]:
     """Fit a body to the triangulated points of each frame that has four or more, without looking at pictures.
 
     Args:
         model: the body; its sizes stay.
         seen: the points.
+        frames: that are used, ascending; all by default.
 
     Returns:
         The body by frame.
     """
     points, out, near = _points(model, seen), dict[int, PosedBody](), None
-    for k in range(len(seen.joints_world)):
+    for k in range(len(seen.joints_world)) if frames is None else frames:
         if len(seen.places(k)) >= 4:
             near = fit_to_points(model, seen.places(k), near, centers=True).pose
             out[k] = PosedBody(model, near)

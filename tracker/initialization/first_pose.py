@@ -8,7 +8,7 @@ The most likely track is kept. It is doubtful where another start is as likely, 
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import combinations, product
+from itertools import combinations
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
@@ -25,13 +25,13 @@ from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.initialization.generators.person_scene import PersonScene, silhouette_axes
 from tracker.initialization.generators.start_generators import GENERATORS
 from tracker.initialization.own_figure import others_on_frame, own_figure
-from tracker.initialization.silhouette_check import check_against_silhouettes
+from tracker.initialization.silhouette_check import check_against_silhouettes, filling, is_cut_off
 from tracker.initialization.standing_heights import StandingHeights
 from tracker.initialization.start_choice import compare_starts
 from tracker.initialization.start_fit import StartFitter, StartTrack, short_tracks
 from tracker.session.session import Session
 from tracker.tracking.confidence import Status, worst
-from tracker.voxels.figure_masks import FigureMask, figure_masks
+from tracker.voxels.figure_masks import figure_masks
 from tracker.voxels.shadows import recover_from_shadows
 from tracker.voxels.visual_hull import VisualHull, carve_people
 
@@ -39,8 +39,8 @@ VOXEL_M = 0.025
 """Edge of a voxel, metres."""
 ENOUGH_FRAMES = 2
 """Number of frames with good starts whose heights agree that end the trial of `auto`."""
-_OTHER_FRAMES = 5
-"""Frames on which `auto` tries another generator where the first gave no good start."""
+_PICTURES = 16
+"""Pictures in which `auto` looks for voxels, on at least `ENOUGH_FRAMES` frames: some 20 s of processor time."""
 HEIGHT_SIGMA = 0.02
 """Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
 _HEIGHTS_AGREE = 3 * HEIGHT_SIGMA
@@ -129,25 +129,32 @@ def find_first_poses_anywhere(
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever generator and on whatever of some frames tracks best; see `find_first_poses`.
 
-    The cheapest generator is tried until the starts of two frames are good and agree on the heights. Frames that are
-    tried in any case are tried at the same time. The other generators are tried where no start is good, one after the
-    other, on the frames that cost least. `show` receives each frame and what was found on it. `step` is called between
-    fits and for each silhouette, every second or so and from several threads; an exception that it raises ends the
-    search.
+    Frames on which the silhouettes agree best go first. The cheapest generator is tried until the starts of two frames
+    are good and agree on the heights. Frames that are tried in any case are tried at the same time. Where no start is
+    good, the other generators are tried on the frame that costs least. The number of frames is bounded by that of their
+    pictures. `show` receives each frame and what was found on it. `step` is called between fits and for each
+    silhouette, every second or so and from several threads; an exception that it raises ends the search.
     """
     cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show, step) as trial:
-        left = list(frames)
+        ranked = trial.ranked(frames)
+        left = ranked[: max(ENOUGH_FRAMES, _PICTURES // len(session.cameras))]
         while left and not trial.is_settled:
             n_sure = max(1, ENOUGH_FRAMES - sum(f.is_good for f in trial.found))
             trial.add(left[:n_sure], (cheapest,))
             del left[:n_sure]
-        by_cost = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or list(frames)
-        for name, frame in product(others, by_cost[:_OTHER_FRAMES]):
+        best = min(trial.found, key=lambda f: f.cost_px).frame if trial.found else ranked[0]
+        for name in others:
             if any(f.is_good for f in trial.found):
                 break
-            trial.add([frame], (name,))
-        return trial.best()
+            trial.add([best], (name,))
+        try:
+            return trial.best()
+        except TrackerError as error:
+            text = (
+                f"expected a frame on which people are found by their silhouettes, found none of {len(frames)}: {error}"
+            )
+            raise TrackerError(text, Remedy("find_otherwise"), error.camera) from error
 
 
 class _EndedError(Exception):
@@ -231,6 +238,22 @@ class _Trial:
         cost = f"cost {found.cost_px:.2f} px over a short track"
         self._say(f"frame {frame}, {' and '.join(generators)}: {statuses}, {cost}")
 
+    def ranked(self, frames: Sequence[int]) -> list[int]:
+        """Return frames, first those on which silhouettes agree in most views that show the first person alone."""
+
+        def agreement(frame: int) -> float:
+            person, silhouettes = self._people[0], self._finder.silhouettes(frame, self._people[0])
+            try:
+                hull = carve_people(silhouettes, self._size_m)
+                figure = own_figure(self._session, person, hull, others_on_frame(self._session, person, frame, {}))
+            except TrackerError:
+                return 0.0
+            masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
+            whole = [m.shows_figure_alone and not is_cut_off(m.mask) for m in masks]
+            return float(np.nan_to_num(hull.coverages) @ whole)
+
+        return sorted(frames, key=agreement, reverse=True)
+
     @property
     def is_settled(self) -> bool:
         """Whether two frames have good starts that agree on the heights of all."""
@@ -284,7 +307,7 @@ def _best_on_frame(
 ) -> FirstPose:  # fmt: skip
     """Return the pose on a frame; where it is not good, the more likely one of that and of silhouettes with shadows."""
     tried, errors, before = list[_Tried](), list[TrackerError](), None
-    for source in task.sources:
+    for source in task.sources if next(iter(GENERATORS)) in generators else task.sources[:1]:
         silhouettes = source.silhouettes(frame, task.person)
         if before is not None and not _are_larger(silhouettes, before):
             break
@@ -315,13 +338,14 @@ def _on_frame(
     known = {i: pose.start.body for i, pose in found.items()}
     others = others_on_frame(session, person, frame, known)
     figure = own_figure(session, person, hull, others)
+    silhouettes = [s for s in silhouettes if s.camera.name not in hull.broken]
     masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
     scene = PersonScene(figure, silhouettes, masks, floor_plane(session.up, session.floor))
     model = session.people[person].model
     height_m = source.heights.around(scene, frame, person) if has_preset_sizes(model) else None
     proposals = _proposals(scene, model if height_m is None else model.with_height(height_m), generators)
     fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others), step)
-    compared = compare_starts(fitter, proposals, lambda tracks: _filling(tracks, silhouettes, masks))
+    compared = compare_starts(fitter, proposals, lambda tracks: filling(tracks, silhouettes, masks))
     best = compared.tracked[0]
     notes = _notes(best.start, compared.is_facing_sure, hull, silhouettes)
     doubts = [
@@ -334,25 +358,6 @@ def _on_frame(
     lines = _lines_px(session, scene)
     pose = FirstPose(frame, best.start, status, best.cost_px, compared.is_facing_sure, notes, lines)
     return _Tried(pose, best, fitter)
-
-
-def _filling(
-    tracked: Sequence[StartTrack], silhouettes: Sequence[ViewSilhouette], masks: Sequence[FigureMask]
-) -> list[StartTrack]:
-    """Return the starts whose bodies fill the silhouettes.
-
-    Raises:
-        TrackerError: none does.
-    """
-    checks = [check_against_silhouettes(t.start.body, silhouettes, masks) for t in tracked]
-    kept = [track for track, check in zip(tracked, checks, strict=True) if not check.is_refused]
-    if not kept:
-        raise TrackerError(
-            f"expected a body that fills the silhouettes, found none: {checks[0].note}",
-            Remedy("another_frame_or_place"),
-            checks[0].worst_camera,
-        )
-    return kept
 
 
 def _proposals(scene: PersonScene, model: BodyModel, generators: Sequence[str]) -> list[Hypothesis]:
@@ -389,12 +394,7 @@ def _notes(
         notes.append(f"view {hull.broken[0]} was left out: the others agree without it; check whether it has moved")
     if not start.is_measured:
         notes.append(f"the height stays {start.model.height_m:.2f} m: the person does not stand upright")
-    cut = [s.camera.name for s in silhouettes if _is_cut_off(s)]
+    cut = [s.camera.name for s in silhouettes if is_cut_off(s.mask)]
     if cut:
         notes.append(f"cut off by the image in view {', '.join(cut)}")
     return tuple(notes)
-
-
-def _is_cut_off(silhouette: ViewSilhouette) -> bool:
-    mask = silhouette.mask
-    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())

@@ -7,8 +7,10 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.contours.body_silhouette import body_silhouette
+from tracker.errors import Remedy, TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.geometry.arrays import Array, intersection_over_union
+from tracker.geometry.arrays import Array, Mask, intersection_over_union
+from tracker.initialization.start_fit import StartTrack
 from tracker.voxels.figure_masks import FigureMask
 
 _MIN_OVERLAP = 0.55
@@ -63,3 +65,27 @@ def check_against_silhouettes(
         if m.shows_figure_alone
     ]
     return SilhouetteCheck(tuple(name for name, _ in found), np.array([share for _, share in found]))
+
+
+def filling(
+    tracked: Sequence[StartTrack], silhouettes: Sequence[ViewSilhouette], masks: Sequence[FigureMask]
+) -> list[StartTrack]:
+    """Return the starts whose bodies fill the silhouettes.
+
+    Raises:
+        TrackerError: none does.
+    """
+    checks = [check_against_silhouettes(t.start.body, silhouettes, masks) for t in tracked]
+    kept = [track for track, check in zip(tracked, checks, strict=True) if not check.is_refused]
+    if not kept:
+        raise TrackerError(
+            f"expected a body that fills the silhouettes, found none: {checks[0].note}",
+            Remedy("another_frame_or_place"),
+            checks[0].worst_camera,
+        )
+    return kept
+
+
+def is_cut_off(mask: Mask) -> bool:
+    """Return whether a silhouette, (H, W), touches the border of the picture."""
+    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())

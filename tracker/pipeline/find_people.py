@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tracker.compute.progress import Report, unreported
+from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.initialization.first_pose import (
@@ -18,14 +19,13 @@ from tracker.initialization.first_pose import (
     find_first_poses,
     find_first_poses_anywhere,
 )
+from tracker.initialization.known_start import fit_to_contours
+from tracker.observations.stored import list_observations
 from tracker.pipeline.body_acquisition import MEASURED, SIZES_EDITS, with_sizes_changed
-from tracker.pipeline.keypoint_evidence import SOURCE, find_by_keypoints
+from tracker.pipeline.keypoint_evidence import MAX_FRAMES, find_by_keypoints
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
-
-_FRAMES = 12
-"""Largest number of frames on which first poses are looked for."""
 
 AXES = "silhouette_axes"
 """Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera.
@@ -37,13 +37,14 @@ class FindSettings:
     """Settings of the search for people."""
 
     frame: int | None = None
-    """First frame to try; None for the middle of the recording first, where people are seen from all sides."""
+    """One of the frames to try; None for the middle of the recording, where people are seen from all sides."""
     generator: str | None = None
     """The generator of starts, which is tried on that frame alone; None for all on several frames."""
     voxel_m: float = VOXEL_M
     """Edge of a voxel, metres."""
     keypoints: str | None = None
-    """Name of the observations whose key points show the people; None to find them in the silhouettes."""
+    """Name of the observations whose key points show the people; None for those that there are, and for the silhouettes
+    where these show no start that fits the contours."""
 
 
 def frames_to_try(frames: Sequence[int], first: int | None) -> list[int]:
@@ -55,7 +56,7 @@ def frames_to_try(frames: Sequence[int], first: int | None) -> list[int]:
     """
     begin = frames[len(frames) // 2] if first is None else first
     # Midpoints of equal parts: on the first and last frame a start is tracked in one direction only.
-    n = min(_FRAMES, len(frames))
+    n = min(MAX_FRAMES, len(frames))
     indices = ((np.arange(n) + 0.5) * len(frames) / n).astype(int)
     spread = sorted({frames[i] for i in indices} - {begin})
     order = [begin]
@@ -63,7 +64,7 @@ def frames_to_try(frames: Sequence[int], first: int | None) -> list[int]:
         farthest = max(spread, key=lambda k: min(abs(k - other) for other in order))
         spread.remove(farthest)
         order.append(farthest)
-    return order[:_FRAMES]
+    return order[:MAX_FRAMES]
 
 
 def expected_steps(n_frames: int, done: int, good: int) -> int:
@@ -95,9 +96,6 @@ def find_people(
     Raises:
         TrackerError: no frame shows the people well enough.
     """
-    if settings.keypoints is not None:
-        report("finding first poses", 0.0)
-        return find_by_keypoints(session, people, frames, settings.keypoints)
     if settings.generator is not None and settings.frame is not None:
         by = (settings.generator,)
         return find_first_poses(session, observer, people, [settings.frame], by, settings.voxel_m)
@@ -119,7 +117,24 @@ def find_people(
         report("finding first poses", share, "")
 
     go_on()
-    return find_first_poses_anywhere(session, observer, people, tried, settings.voxel_m, say, count, go_on)
+    by_points = None
+    for name in list_observations(session) if settings.keypoints is None else [settings.keypoints]:
+        try:
+            found = fit_to_contours(session, observer, find_by_keypoints(session, people, frames, name), go_on)
+        except TrackerError:
+            if settings.keypoints is not None:
+                raise
+            continue
+        if found.is_good or settings.keypoints is not None:
+            return found
+        by_points = by_points or found
+    try:
+        found = find_first_poses_anywhere(session, observer, people, tried, settings.voxel_m, say, count, go_on)
+    except TrackerError:
+        if by_points is None:
+            raise
+        return by_points
+    return found if found.is_good or by_points is None else by_points
 
 
 def first_record(first: FirstPose, revision: int) -> PoseRecord:
@@ -174,13 +189,10 @@ def sentences(session: Session, found: FirstPoses) -> list[str]:
     out = []
     for person, first in found.poses.items():
         name = session.people[person].name
-        if first.start.source == SOURCE:
-            out.append(f"{name}: started on frame {found.frame} by key points, {first.model.height_m:.2f} m tall")
-            continue
+        cost = f", {first.status}, cost {first.cost_px:.2f} px over a short track"
         out.append(
-            f"{name}: started on frame {found.frame} by {first.start.source}, "
-            f"{first.model.height_m:.2f} m tall, {first.status}, "
-            f"cost {first.cost_px:.2f} px over a short track"
+            f"{name}: started on frame {found.frame} by {first.start.source}, {first.model.height_m:.2f} m tall"
+            + cost * bool(np.isfinite(first.cost_px))
         )
         out += [f"{name}: {note}" for note in first.notes]
     return out

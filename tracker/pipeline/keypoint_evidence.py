@@ -14,6 +14,7 @@ from tracker.acquisition.from_keypoints import SeenBody, fit_to_keypoints, learn
 from tracker.acquisition.segment_lengths import segment_lengths
 from tracker.body.dimensions import HEIGHT_LIMITS_M
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.sampling import spread_indices
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.observer import Observer
@@ -34,6 +35,10 @@ _OFFSET_M = 0.025
 """Standard deviation of the constant offset of a detector's joint, metres: hips and shoulders are off by 2 to 5 cm."""
 SOURCE = "key points"
 """Source of a first pose."""
+MAX_FRAMES = 12
+"""Largest number of frames on which a first pose is looked for."""
+MAX_FRAMES = 12
+"""Largest number of frames whose key points are compared for a first pose: a fit takes 80 ms of processor time."""
 
 
 def read_points(session: Session, name: str) -> dict[int, BodyPoints]:
@@ -76,8 +81,8 @@ def _assigned(session: Session, name: str) -> tuple[ObservationSet, dict[str, Bo
 def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[int], name: str) -> FirstPoses:
     """Find the first poses of people from key points, all on one frame. Pictures are not looked at.
 
-    Of the frames on which most points of all are known, the one whose key points fit the bodies best is taken. A body
-    in preset sizes takes the height of the points.
+    Frames are spread over those on which most points of all are known. The one whose key points fit the bodies best is
+    taken. A body in preset sizes takes the height of the points.
 
     Args:
         session: the session; nothing is stored.
@@ -89,25 +94,30 @@ def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[
         TrackerError: the observations lack somebody, or have too few points of them.
     """
     points, cameras = read_points(session, name), [c.camera for c in session.cameras]
-    bodies, costs = dict[int, Mapping[int, PosedBody]](), dict[int, dict[int, float]]()
+    known = dict.fromkeys(frames, 0)
     for person in people:
-        who = session.people[person]
+        who = session.people[person].name
         if person not in points:
-            raise TrackerError(f"expected key points of '{who.name}' in '{name}', found none; import them, too")
-        own = points[person]
-        bodies[person] = {k: b for k, b in fit_to_keypoints(_at_height(who.model, own), own).items() if k in frames}
-        if not bodies[person]:
+            raise TrackerError(f"expected key points of '{who}' in '{name}', found none; import them, too")
+        own = {k: len(points[person].places(k)) for k in frames}
+        if max(own.values()) < 4:
             raise TrackerError(
-                f"expected a frame with four joints of '{who.name}' in '{name}', found none; place the body by hand",
+                f"expected a frame with four joints of '{who}' in '{name}', found none; place the body by hand",
                 Remedy("place_body"),
             )
-        costs[person] = learn_seen_body(bodies[person], own, cameras).costs(bodies[person], own, cameras)
-    common = sorted(set.intersection(*(set(c) for c in costs.values())))
-    if not common:
+        known = {k: n + own[k] for k, n in known.items() if own[k] >= 4}
+    if not known:
         raise TrackerError(
             f"expected a frame on which '{name}' has four joints of everybody, found none; find people one by one"
         )
-    frame = min(common, key=lambda k: sum(own[k] for own in costs.values()))
+    better = sorted(sorted(known, key=lambda k: -known[k])[: max(MAX_FRAMES, len(known) // 2)])
+    tried = [better[i] for i in spread_indices(len(better), MAX_FRAMES)]
+    bodies, costs = dict[int, Mapping[int, PosedBody]](), dict[int, dict[int, float]]()
+    for person in people:
+        seen = points[person]
+        bodies[person] = fit_to_keypoints(_at_height(session.people[person].model, seen), seen, tried)
+        costs[person] = learn_seen_body(bodies[person], seen, cameras).costs(bodies[person], seen, cameras)
+    frame = min(tried, key=lambda k: sum(own[k] for own in costs.values()))
     starts = {i: Hypothesis(bodies[i][frame], SOURCE, costs[i][frame], is_measured=False) for i in people}
     return FirstPoses(
         frame, {i: FirstPose(frame, start, "doubtful", float("nan"), True, ()) for i, start in starts.items()}
