@@ -133,7 +133,8 @@ def measured(recording: Recording, folder: Path, models: Path | None) -> Iterato
         mean_mm, worst_mm = min(_error_mm(body, table, found["frame"]) for table in tables)
         yield (
             f"{recording.label(person.name)}: {detected:.1f} s + {spent:.1f} s, {own['status']} by {own['method']} on "
-            f"{found['frame']}, {mean_mm:.0f} mm, worst {worst_mm:.0f}, {own['height_m']:.2f} m. {'; '.join(own['notes'])}"
+            f"{found['frame']}, {mean_mm:.0f} mm, worst {worst_mm:.0f}, {own['height_m']:.2f} m. "
+            f"{'; '.join(own['notes'])}"
         )
 
 

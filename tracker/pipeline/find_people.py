@@ -43,7 +43,7 @@ class FindSettings:
     voxel_m: float = VOXEL_M
     """Edge of a voxel, metres."""
     keypoints: str | None = None
-    """Name of the observations whose key points show the people; None for those that there are, and for the silhouettes
+    """Name of the observations whose key points show the people. None for those of the session, and for the silhouettes
     where these show no start that fits the contours."""
 
 

@@ -37,8 +37,6 @@ SOURCE = "key points"
 """Source of a first pose."""
 MAX_FRAMES = 12
 """Largest number of frames on which a first pose is looked for."""
-MAX_FRAMES = 12
-"""Largest number of frames whose key points are compared for a first pose: a fit takes 80 ms of processor time."""
 
 
 def read_points(session: Session, name: str) -> dict[int, BodyPoints]:
