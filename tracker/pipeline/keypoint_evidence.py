@@ -79,8 +79,8 @@ def _assigned(session: Session, name: str) -> tuple[ObservationSet, dict[str, Bo
 def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[int], name: str) -> FirstPoses:
     """Find the first poses of people from key points, all on one frame. Pictures are not looked at.
 
-    Frames are spread over those on which most points of all are known. The one whose key points fit the bodies best is
-    taken. A body in preset sizes takes the height of the points.
+    Frames are spread over the half on which most points of all are known. The one whose key points fit the bodies best
+    is taken. A body in preset sizes takes the height of the points.
 
     Args:
         session: the session; nothing is stored.
@@ -108,7 +108,8 @@ def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[
         raise TrackerError(
             f"expected a frame on which '{name}' has four joints of everybody, found none; find people one by one"
         )
-    better = sorted(sorted(known, key=lambda k: -known[k])[: max(MAX_FRAMES, len(known) // 2)])
+    usual = np.median(list(known.values()))
+    better = [k for k, n in known.items() if n >= usual]
     tried = [better[i] for i in spread_indices(len(better), MAX_FRAMES)]
     bodies, costs = dict[int, Mapping[int, PosedBody]](), dict[int, dict[int, float]]()
     for person in people:

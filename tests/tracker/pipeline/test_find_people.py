@@ -17,7 +17,7 @@ from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model
-from tracker.initialization import first_pose, own_figure
+from tracker.initialization import first_pose, known_start, own_figure
 from tracker.initialization.first_pose import FirstPose, FirstPoses, find_first_poses, find_first_poses_anywhere
 from tracker.initialization.generators.start_generators import GENERATORS, from_voxels
 from tracker.initialization.start_fit import StartTrack
@@ -165,6 +165,38 @@ def test_two_frames_that_agree_end_the_trial(session, silhouettes, fits, monkeyp
 
 
 @pytest.mark.slow
+def test_frames_on_which_silhouettes_agree_go_first(session, silhouettes, fits, monkeypatch):
+    whole = silhouettes_of_figure(figure()[0], CAMERAS)
+    poor = [whole[0]._replace(mask=whole[0].mask | np.roll(whole[0].mask, 60, axis=1)), *whole[1:]]
+    nobody = [s._replace(mask=np.zeros_like(s.mask)) for s in whole]
+    seen = SimpleNamespace(silhouettes=lambda k, person=None: {20: nobody, 10: poor}.get(k, whole), close=lambda: None)
+    monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording, step: seen)
+    tried = list[int]()
+    find_first_poses_anywhere(
+        session, OBSERVER, [0], [20, 10, 30, 15], 0.05, show=lambda frame, found: found is None and tried.append(frame)
+    )
+    assert tried == [30, 15]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("n_views", "n_voxels"), [(4, 4), (8, 2)])
+def test_the_search_ends_after_so_many_pictures(session, silhouettes, monkeypatch, n_views, n_voxels):
+    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
+    session = replace(session, cameras=(session.cameras * 2)[:n_views])
+
+    def nothing(scene, model, is_known):
+        raise TrackerError("expected a head, found none")
+
+    monkeypatch.setattr(first_pose, "GENERATORS", dict.fromkeys(GENERATORS, nothing))
+    said = []
+    with pytest.raises(TrackerError, match="found none of 12: expected a head, found none") as error:
+        find_first_poses_anywhere(session, OBSERVER, [0], range(12), 0.05, said.append)
+    assert error.value.remedy.code == "find_otherwise"
+    tried = [text.split(":")[0].split(", ")[1] for text in said]
+    assert tried == ["voxels"] * n_voxels + ["axis", "search"]
+
+
+@pytest.mark.slow
 def test_the_first_two_frames_are_tried_at_the_same_time(session, silhouettes, monkeypatch):
     silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
     at_once = threading.Barrier(2, timeout=20)
@@ -227,9 +259,11 @@ def test_a_camera_that_moved_is_named(session, silhouettes, fits, monkeypatch):
     monkeypatch.setattr(own_figure, "_MAX_HULL_M3", 0.5)  # three views leave a wide hull
     views = silhouettes_of_figure(figure()[0], CAMERAS)
     silhouettes += [views[0], views[1]._replace(mask=np.roll(views[1].mask, 130, axis=1)), *views[2:]]
-    notes = " ".join(find(session, 0.03).poses[0].notes)
+    found = find(session, 0.03).poses[0]
+    notes = " ".join(found.notes)
     assert "view RIGHT was left out" in notes
     assert "cut off" not in notes
+    assert found.status == "good"  # the others agree, and the view that was left out checks nothing
 
 
 def test_several_cameras_that_moved_are_an_error(session, silhouettes):
@@ -331,6 +365,63 @@ def test_both_ways_of_facing_are_compared(session, silhouettes, fits):
     first = find(session).poses[0]
     assert first.is_facing_sure  # the second track costs 10 nats more
     assert set(first.lines_px) <= set(NAMES)
+
+
+def off_frame(session, status):
+    """Stands for a track from a start: it moves by a centimetre, and ends with a status."""
+
+    def track(start):
+        return StartTrack(start.at(start.pose + 0.01), status, 2.0, {3: start.pose})
+
+    return lambda *_: SimpleNamespace(track=track)
+
+
+@pytest.mark.parametrize(("status", "is_moved"), [("good", True), ("doubtful", False), ("lost", False)])
+def test_a_known_start_follows_the_contours_that_agree(session, monkeypatch, status, is_moved):
+    monkeypatch.setattr(known_start, "StartFitter", off_frame(session, status))
+    known = known_people(session)
+    found = known_start.fit_to_contours(session, OBSERVER, known).poses[0]
+    assert found.status == ("good" if is_moved else "doubtful")
+    assert np.allclose(found.start.pose - known.poses[0].start.pose, 0.01 * is_moved)
+
+
+def known_people(session):
+    first = found_people(session, 1.0).poses[0]
+    return FirstPoses(7, {0: first._replace(status="doubtful", cost_px=np.nan, start=replace(first.start, source="x"))})
+
+
+@pytest.mark.parametrize("status", ["good", "doubtful"])
+def test_key_points_of_the_session_go_first_and_silhouettes_follow_where_contours_contradict(
+    session, monkeypatch, status
+):
+    good, known = found_people(session, 1.0), known_people(session)
+    asked = []
+    module = "tracker.pipeline.find_people."
+
+    def by_points(session, people, frames, name):
+        asked.append(name)
+        if name == "joints":
+            raise TrackerError("expected key points of 'person' in 'joints', found none")
+        return known
+
+    def fitted(session, observer, found, step):
+        return FirstPoses(7, {0: found.poses[0]._replace(status=status)})
+
+    monkeypatch.setattr(module + "list_observations", lambda session: ["joints", "net"])
+    monkeypatch.setattr(module + "find_by_keypoints", by_points)
+    monkeypatch.setattr(module + "fit_to_contours", fitted)
+    monkeypatch.setattr(module + "find_first_poses_anywhere", lambda *_: good)
+    found = find_people(session, OBSERVER, [0], range(9), FindSettings())
+    assert asked == ["joints", "net"]
+    assert found.poses[0].start.source == ("x" if status == "good" else "axis")
+    named = find_people(session, OBSERVER, [0], range(9), FindSettings(keypoints="net"))
+    assert named.poses[0].start.source == "x"  # silhouettes are not asked where key points are named
+
+    def nobody(*_):
+        raise TrackerError("expected a frame on which people are found by their silhouettes, found none")
+
+    monkeypatch.setattr(module + "find_first_poses_anywhere", nobody)
+    assert find_people(session, OBSERVER, [0], range(9), FindSettings()).poses[0].start.source == "x"
 
 
 def found_people(session, scale):

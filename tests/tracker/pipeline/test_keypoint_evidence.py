@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, load_model
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.request import ImportRequest
+from tracker.pipeline import keypoint_evidence as module
 from tracker.pipeline.keypoint_evidence import (
     SEEN_BODIES,
     find_by_keypoints,
@@ -66,6 +68,20 @@ def test_people_are_found_on_a_frame_without_gross_errors(tmp_path):
     for i, first in found.poses.items():
         assert off(first.start.body, motions[i], found.frame) < 0.05
         assert (first.status, first.start.source) == ("doubtful", "key points")
+
+
+def test_some_frames_of_a_long_recording_are_fitted(tmp_path, monkeypatch):
+    session, _ = imported(tmp_path)
+    fitted = []
+
+    def fit(model, seen, frames=None):
+        fitted.extend(range(N) if frames is None else frames)
+        return {k: PosedBody(model, model.neutral()) for k in fitted}
+
+    monkeypatch.setattr(module, "fit_to_keypoints", fit)
+    monkeypatch.setattr(module, "MAX_FRAMES", 4)
+    assert find_by_keypoints(session, (0,), range(2, N), "net").frame in fitted
+    assert (len(fitted), min(fitted), max(fitted)) == (4, 2, N - 1)
 
 
 @pytest.mark.slow
