@@ -258,7 +258,10 @@ def test_two_people_where_one_was_announced(session, silhouettes):
 def test_a_camera_that_moved_is_named(session, silhouettes, fits, monkeypatch):
     monkeypatch.setattr(own_figure, "_MAX_HULL_M3", 0.5)  # three views leave a wide hull
     views = silhouettes_of_figure(figure()[0], CAMERAS)
-    silhouettes += [views[0], views[1]._replace(mask=np.roll(views[1].mask, 130, axis=1)), *views[2:]]
+    part = views[1].mask.copy()
+    part[int(np.flatnonzero(part.any(axis=1)).mean()) :] = False
+    moved = views[1]._replace(mask=np.roll(views[1].mask, 130, axis=1) | part)
+    silhouettes += [views[0], moved, *views[2:]]
     found = find(session, 0.03).poses[0]
     notes = " ".join(found.notes)
     assert "view RIGHT was left out" in notes
