@@ -39,12 +39,13 @@ class InitArguments:
     """table of poses (CSV), as `simulate` writes it."""
     method: Literal["joints", "poses", "voxels", "axis", "auto", "keypoints"] = "joints"
     """joints fits the pose to known joints; poses copies it from a table; voxels finds the parts of the body in the
-    visual hull; axis searches the body on the axis of the silhouettes; auto tries both on several frames and keeps the
-    start that tracks best; keypoints takes the frame on which the key points of --of fit a body best."""
+    visual hull; axis searches the body on the axis of the silhouettes; auto takes stored key points, or tries both on
+    the frames whose silhouettes agree best and keeps the start that tracks best; keypoints takes the frame on which the
+    key points of --of fit a body best."""
     of: OptionalName = None
     """keypoints: name of the imported observations."""
     frame: int = 0
-    """frame to set; with auto the first one to try."""
+    """frame to set; with auto one of those that it chooses from."""
     frames: OptionalRange = None
     """A:B, half open: auto and keypoints take one of these; all by default."""
     voxel_size: float = 25.0

@@ -31,13 +31,13 @@ class TrackWords:
     method: str = ""
     """how people are tracked."""
     init: Literal["auto"] | None = None
-    """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
-    directions."""
+    """auto finds people who have no pose first, by stored key points or by silhouettes, on the frame where they track
+    best, and tracks from there in both directions."""
     detect: bool = False
     """with --init auto: detect people by a network first, as quadrille detect does, and track by their key points and
     the contours; for footage without backgrounds."""
     of: OptionalName = None
-    """name of imported observations: their key points show --init auto the people, and are the evidence that --evidence
+    """name of observations: their key points alone show --init auto the people, and are the evidence that --evidence
     says."""
     evidence: Literal["contours", "keypoints", "both"] = "contours"
     """both: key points of --of too; contours overrule them where they contradict. keypoints: the body is fitted to them

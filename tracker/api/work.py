@@ -65,7 +65,7 @@ def find(
         session: the session or its folder.
         people: names; all by default. Those who have a pose are left alone.
         frames: that may be used; all by default.
-        keypoints: name of imported observations that show the people; the silhouettes by default.
+        keypoints: name of observations that show the people; by default those of the session, or the silhouettes.
         progress: receives the progress.
 
     Raises:

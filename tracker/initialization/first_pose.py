@@ -130,10 +130,10 @@ def find_first_poses_anywhere(
     """Find first poses by whatever generator and on whatever of some frames tracks best; see `find_first_poses`.
 
     Frames on which the silhouettes agree best go first. The cheapest generator is tried until the starts of two frames
-    are good and agree on the heights. Frames that are tried in any case are tried at the same time. Where no start is
-    good, the other generators are tried on the frame that costs least. The number of frames is bounded by that of their
-    pictures. `show` receives each frame and what was found on it. `step` is called between fits and for each
-    silhouette, every second or so and from several threads; an exception that it raises ends the search.
+    are good and agree on the heights. Frames that are tried in any case are tried at the same time. The other
+    generators are tried on the frame that costs least, if no start is good. The number of pictures bounds that of the
+    frames. `show` receives each frame and what was found on it. `step` is called between fits and for each silhouette,
+    every second or so and from several threads; an exception that it raises ends the search.
     """
     cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show, step) as trial:
