@@ -130,10 +130,10 @@ def find_first_poses_anywhere(
     """Find first poses by whatever generator and on whatever of some frames tracks best; see `find_first_poses`.
 
     Frames on which the silhouettes agree best go first. The cheapest generator is tried until the starts of two frames
-    are good and agree on the heights. Frames that are tried in any case are tried at the same time. The other
-    generators are tried on the frame that costs least, if no start is good. The number of pictures bounds that of the
-    frames. `show` receives each frame and what was found on it. `step` is called between fits and for each silhouette,
-    every second or so and from several threads; an exception that it raises ends the search.
+    are good and agree on the heights. Frames that are tried in any case are tried at the same time. If no start is
+    good, the other generators are tried on the frame that costs least, until one finds a start. The number of pictures
+    bounds that of the frames. `show` receives each frame and what was found on it. `step` is called between fits and
+    for each silhouette, every second or so and from several threads; an exception that it raises ends the search.
     """
     cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show, step) as trial:
@@ -144,8 +144,9 @@ def find_first_poses_anywhere(
             trial.add(left[:n_sure], (cheapest,))
             del left[:n_sure]
         best = min(trial.found, key=lambda f: f.cost_px).frame if trial.found else ranked[0]
+        n_found = len(trial.found)
         for name in others:
-            if any(f.is_good for f in trial.found):
+            if len(trial.found) > n_found or any(f.is_good for f in trial.found):
                 break
             trial.add([best], (name,))
         try:
