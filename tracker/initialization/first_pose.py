@@ -144,11 +144,10 @@ def find_first_poses_anywhere(
             trial.add(left[:n_sure], (cheapest,))
             del left[:n_sure]
         best = min(trial.found, key=lambda f: f.cost_px).frame if trial.found else ranked[0]
-        n_found = len(trial.found)
+        enough = len(trial.found) if any(f.is_good for f in trial.found) else len(trial.found) + 1
         for name in others:
-            if len(trial.found) > n_found or any(f.is_good for f in trial.found):
-                break
-            trial.add([best], (name,))
+            if len(trial.found) < enough:
+                trial.add([best], (name,))
         try:
             return trial.best()
         except TrackerError as error:
