@@ -26,7 +26,7 @@ class BoundingVolume(NamedTuple):
     """Highest corner, (3,), metres."""
 
 
-def bounding_volume(silhouettes: Sequence[ViewSilhouette]) -> BoundingVolume:
+def bounding_volume(silhouettes: Sequence[ViewSilhouette], pyramids: Sequence[Array] = ()) -> BoundingVolume:
     """Return the box around the intersection of the pyramids that the silhouettes' boxes span.
 
     A side of a box at the image's border does not bound the person, who may be cut off there. A silhouette that a
@@ -34,6 +34,7 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette]) -> BoundingVolume:
 
     Args:
         silhouettes: of all views. Views with an empty silhouette are left out.
+        pyramids: the `pyramid` of each, if they are known; none is empty then.
 
     Raises:
         TrackerError: fewer than two views show people, or the views show nothing in common.
@@ -50,7 +51,7 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette]) -> BoundingVolume:
     around = [s.camera for s in seen]
     middle = viewed_point(around)
     reach = _REACH * float(np.mean([np.linalg.norm(c.center_world - middle) for c in around]))
-    box = _intersection([_pyramid(s) for s in seen], middle - reach, middle + reach)
+    box = _intersection(pyramids or [pyramid(s) for s in seen], middle - reach, middle + reach)
     if box is None:
         raise TrackerError(
             "expected silhouettes of the same people in all views, found none in common; check that the calibration is "
@@ -59,7 +60,7 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette]) -> BoundingVolume:
     return BoundingVolume(*box)
 
 
-def _pyramid(silhouette: ViewSilhouette) -> Array:
+def pyramid(silhouette: ViewSilhouette) -> Array:
     """Return the planes (a, b) with a . x <= b, (m, 4), of the pyramid that a silhouette's box spans; none if it spans
     none."""
     camera, mask = silhouette.camera, silhouette.mask

@@ -8,7 +8,7 @@ import numpy as np
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
-from tracker.voxels.bounding_volume import bounding_volume
+from tracker.voxels.bounding_volume import bounding_volume, pyramid
 from tracker.voxels.carving import Carver
 from tracker.voxels.figure_masks import needed_figures, paint
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
@@ -89,8 +89,8 @@ def coverages(voxels: Voxels, silhouettes: Sequence[ViewSilhouette]) -> Array:
     return np.array([_coverage(voxels.grid.centers(indices), voxels.grid.size_m, s) for s in silhouettes])
 
 
-def _carve(silhouettes: Sequence[ViewSilhouette], size_m: float) -> Voxels:
-    box = bounding_volume(silhouettes)
+def _carve(silhouettes: Sequence[ViewSilhouette], pyramids: Sequence[Array], size_m: float) -> Voxels:
+    box = bounding_volume(silhouettes, pyramids)
     return Carver(silhouettes).carve(VoxelGrid.over(box.low, box.high, size_m))
 
 
@@ -104,15 +104,16 @@ def _carve_consistent(silhouettes: Sequence[ViewSilhouette], size_m: float) -> t
     """
     whole: tuple[Voxels, Array] | None = None
     contradiction: TrackerError | None = None
+    pyramids = [pyramid(s) for s in silhouettes]
     try:
-        voxels = _carve(silhouettes, size_m)
+        voxels = _carve(silhouettes, pyramids, size_m)
         whole = voxels, coverages(voxels, silhouettes)
     except TrackerError as error:
         contradiction = error
     n = len(silhouettes)
     before = whole[1] if whole else np.zeros(n)
     if n > 2 and before.min() < 1 - _MATTERS:
-        without = [_without(i, silhouettes, size_m) for i in range(n)]
+        without = [_without(i, silhouettes, pyramids, size_m) for i in range(n)]
         gains = [float(np.delete(w[1] - before, i).mean()) if w else 0.0 for i, w in enumerate(without)]
         best, second = (int(i) for i in np.argsort(gains)[:-3:-1])
         chosen = without[best]
@@ -123,10 +124,13 @@ def _carve_consistent(silhouettes: Sequence[ViewSilhouette], size_m: float) -> t
     return *whole, -1
 
 
-def _without(left_out: int, silhouettes: Sequence[ViewSilhouette], size_m: float) -> tuple[Voxels, Array] | None:
+def _without(
+    left_out: int, silhouettes: Sequence[ViewSilhouette], pyramids: Sequence[Array], size_m: float
+) -> tuple[Voxels, Array] | None:
     """Return the voxels of all views but one, and the coverages of all; None if the others contradict each other."""
     try:
-        voxels = _carve([s for i, s in enumerate(silhouettes) if i != left_out], size_m)
+        others = [i for i in range(len(silhouettes)) if i != left_out]
+        voxels = _carve([silhouettes[i] for i in others], [pyramids[i] for i in others], size_m)
     except TrackerError:
         return None
     return voxels, coverages(voxels, silhouettes)
