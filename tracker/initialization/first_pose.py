@@ -22,6 +22,7 @@ from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import has_preset_sizes
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
+from tracker.initialization.frame_ranking import ranked_frames
 from tracker.initialization.generators.person_scene import PersonScene, silhouette_axes
 from tracker.initialization.generators.start_generators import GENERATORS
 from tracker.initialization.own_figure import others_on_frame, own_figure
@@ -131,9 +132,10 @@ def find_first_poses_anywhere(
 
     Frames on which the silhouettes agree best go first. The cheapest generator is tried until the starts of two frames
     are good and agree on the heights. Frames that are tried in any case are tried at the same time. If no start is
-    good, the other generators are tried on the frame that costs least, until one finds a start. The number of pictures
-    bounds that of the frames. `show` receives each frame and what was found on it. `step` is called between fits and
-    for each silhouette, every second or so and from several threads; an exception that it raises ends the search.
+    good, the other generators are tried on the frame that costs least, until one finds a start, of several people a
+    good one. The number of pictures bounds that of the frames. `show` receives each frame and what was found on it.
+    `step` is called between fits and for each silhouette, every second or so and from several threads; an exception
+    that it raises ends the search.
     """
     cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show, step) as trial:
@@ -144,9 +146,10 @@ def find_first_poses_anywhere(
             trial.add(left[:n_sure], (cheapest,))
             del left[:n_sure]
         best = min(trial.found, key=lambda f: f.cost_px).frame if trial.found else ranked[0]
-        enough = len(trial.found) if any(f.is_good for f in trial.found) else len(trial.found) + 1
+        n_before = len(trial.found)
         for name in others:
-            if len(trial.found) < enough:
+            # Several people hide one another's limbs, of which the axes know nothing.
+            if not trial.has_good and (len(people) > 1 or len(trial.found) == n_before):
                 trial.add([best], (name,))
         try:
             return trial.best()
@@ -239,20 +242,16 @@ class _Trial:
         self._say(f"frame {frame}, {' and '.join(generators)}: {statuses}, {cost}")
 
     def ranked(self, frames: Sequence[int]) -> list[int]:
-        """Return frames, first those on which silhouettes agree in most views that show the first person alone."""
+        """Return frames, the most promising first; an eighth of the voxels is enough to compare them."""
+        first = self._people[0]
+        return ranked_frames(
+            frames, self._session, first, lambda k: self._finder.silhouettes(k, first), 2 * self._size_m
+        )
 
-        def agreement(frame: int) -> float:
-            person, silhouettes = self._people[0], self._finder.silhouettes(frame, self._people[0])
-            try:
-                hull = carve_people(silhouettes, self._size_m)
-                figure = own_figure(self._session, person, hull, others_on_frame(self._session, person, frame, {}))
-            except TrackerError:
-                return 0.0
-            masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
-            whole = [m.shows_figure_alone and not is_cut_off(m.mask) for m in masks]
-            return float(np.nan_to_num(hull.coverages) @ whole)
-
-        return sorted(frames, key=agreement, reverse=True)
+    @property
+    def has_good(self) -> bool:
+        """Whether the starts of a frame are good."""
+        return any(f.is_good for f in self.found)
 
     @property
     def is_settled(self) -> bool:
