@@ -8,7 +8,7 @@ The most likely track is kept. It is doubtful where another start is as likely, 
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import combinations
+from itertools import combinations, product
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
@@ -41,7 +41,7 @@ VOXEL_M = 0.025
 ENOUGH_FRAMES = 2
 """Number of frames with good starts whose heights agree that end the trial of `auto`."""
 _PICTURES = 16
-"""Pictures in which `auto` looks for voxels, on at least `ENOUGH_FRAMES` frames: some 20 s of processor time."""
+"""Pictures in which `auto` looks for voxels of one person, or otherwise for several: some 20 s of processor time."""
 HEIGHT_SIGMA = 0.02
 """Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
 _HEIGHTS_AGREE = 3 * HEIGHT_SIGMA
@@ -130,27 +130,27 @@ def find_first_poses_anywhere(
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever generator and on whatever of some frames tracks best; see `find_first_poses`.
 
-    Frames on which the silhouettes agree best go first. The cheapest generator is tried until the starts of two frames
-    are good and agree on the heights. Frames that are tried in any case are tried at the same time. If no start is
-    good, the other generators are tried on the frame that costs least, until one finds a start, of several people a
-    good one. The number of pictures bounds that of the frames. `show` receives each frame and what was found on it.
-    `step` is called between fits and for each silhouette, every second or so and from several threads; an exception
-    that it raises ends the search.
+    The cheapest generator is tried until the starts of two frames are good and agree on the heights. Frames that are
+    tried in any case are tried at the same time. Of one person, those on which the silhouettes agree best are tried,
+    and the number of pictures bounds theirs. If no start is good, the other generators are tried on the frame that
+    costs least, until one finds a start. Several people hide one another's limbs: all frames are tried for them, and
+    other generators on several, until a start is good. `show` receives each frame and what was found on it. `step` is
+    called between fits and for each silhouette, from several threads; an exception that it raises ends the search.
     """
     cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show, step) as trial:
-        ranked = trial.ranked(frames)
-        left = ranked[: max(ENOUGH_FRAMES, _PICTURES // len(session.cameras))]
+        is_one, few = len(people) == 1, max(ENOUGH_FRAMES, _PICTURES // len(session.cameras))
+        left = trial.ranked(frames)[:few] if is_one else list(frames)
+        first = left[0]
         while left and not trial.is_settled:
             n_sure = max(1, ENOUGH_FRAMES - sum(f.is_good for f in trial.found))
             trial.add(left[:n_sure], (cheapest,))
             del left[:n_sure]
-        best = min(trial.found, key=lambda f: f.cost_px).frame if trial.found else ranked[0]
+        best = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or [first]
         n_before = len(trial.found)
-        for name in others:
-            # Several people hide one another's limbs, of which the axes know nothing.
-            if not trial.has_good and (len(people) > 1 or len(trial.found) == n_before):
-                trial.add([best], (name,))
+        for name, frame in product(others, best[: 1 if is_one else few]):
+            if not trial.has_good and (not is_one or len(trial.found) == n_before):
+                trial.add([frame], (name,))
         try:
             return trial.best()
         except TrackerError as error:
