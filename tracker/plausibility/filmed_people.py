@@ -54,9 +54,15 @@ class FilmedPeople:
         """Whether there is footage."""
         return self.is_filmed
 
-    def lag_errors_m(self, places: Places, most: int) -> Array:
-        """Return how far limbs move beside the pictures of other frames; see `FilmedMotion.errors_m`."""
-        return np.empty((2 * most + 1, 0, 0)) if self.motion is None else self.motion.errors_m(places, most)
+    def lag_errors_m(self, places: Places, most: int) -> list[Array]:
+        """Return how far limbs move beside the pictures of other frames, and how far they are from their silhouettes.
+
+        See `readings.KnownPeople` and `FilmedMotion.errors_m`. A pixel is the least distance from a silhouette.
+        """
+        points, lags = _limb_points(places), range(-most, most + 1)
+        views = range(len(self.cameras))
+        apart = [np.concatenate([self._away_m(v, points, lag, 1) for v in views], axis=-1) for lag in lags]
+        return [*([] if self.motion is None else [self.motion.errors_m(places, most)]), np.stack(apart)]
 
     def costs(self, places: Places) -> Array:
         """Return how far limbs lie outside of the silhouettes, (F,): mean truncated squares, 0 to 1; NaN if unknown.
@@ -68,30 +74,35 @@ class FilmedPeople:
         """
         points = _limb_points(places)
         known = np.isfinite(points).all(axis=-1)
-        squares = np.stack([self._squares(v, points) for v in range(len(self.cameras))])
-        squares[~self.shows_people.T] = np.nan
+        away_m = np.stack([self._away_m(v, points) for v in range(len(self.cameras))])
+        squares = np.minimum(away_m / INLIER_M, 1.0) ** 2
         n_seen, n_views = np.isfinite(squares).sum(axis=0), self.shows_people.sum(axis=1)[:, None]
         of_points = np.where(n_seen >= np.minimum(2, n_views), np.nansum(squares, axis=0) / np.maximum(n_seen, 1), 1.0)
         n_known = known.sum(axis=1)
         out = np.where(known, of_points, 0.0).sum(axis=1) / np.maximum(n_known, 1)
         return np.where((n_known > 0) & (n_views[:, 0] > 0), out, np.nan)
 
-    def _squares(self, view: int, points: Array) -> Array:
-        """Return the truncated squares of the distances of points in a view, (F, n); NaN where it does not show them.
+    def _away_m(self, view: int, points: Array, lag: int = 0, least_px: int = 0) -> Array:
+        """Return the distances of points from the silhouettes of a view, (F, n), metres; NaN where it shows neither.
 
         Args:
             view: its index.
             points: (F, n, 3), metres.
+            lag: rows by which the silhouettes are later.
+            least_px: least distance, px.
         """
         camera, distances = self.cameras[view], self.distances_px[view]
         flat = points.reshape(-1, 3)
         px, depths = (x.reshape(*points.shape[:2], -1) for x in (camera.project(flat), camera.depths(flat)))
+        shown = np.arange(len(points)) + lag
+        is_row = (shown >= 0) & (shown < len(distances))
+        shown = np.where(is_row, shown, 0)
         with np.errstate(invalid="ignore"):
             inside = ((px > -0.5) & (px < np.array(distances.shape[:0:-1]) - 0.5)).all(axis=-1)
-            inside &= depths[..., 0] > NEAR_PLANE_M
+            inside &= (depths[..., 0] > NEAR_PLANE_M) & (is_row & self.shows_people[shown, view])[:, None]
         u, v = np.moveaxis(np.round(np.where(inside[..., None], px, 0.0)).astype(np.int64), -1, 0)
-        away_m = distances[np.arange(len(points))[:, None], v, u] * depths[..., 0] / camera.K[0, 0]
-        return np.where(inside, np.minimum(away_m / INLIER_M, 1.0) ** 2, np.nan)
+        away_px = np.maximum(distances[shown[:, None], v, u], least_px)
+        return np.where(inside, away_px * depths[..., 0] / camera.K[0, 0], np.nan)
 
 
 def film_people(session: Session, frames: IntArray) -> FilmedPeople:

@@ -38,9 +38,9 @@ class PosedPerson:
         n_known = np.isfinite(squares).sum(axis=1)
         return np.where(n_known > 0, np.nansum(squares, axis=1) / np.maximum(n_known, 1), np.nan)
 
-    def lag_errors_m(self, places: Places, most: int) -> Array:
-        """Return how far joints lie from those of other frames, (2 most + 1, F, n_joints), metres."""
-        return np.stack([self._away_m(places, shift) for shift in range(-most, most + 1)])
+    def lag_errors_m(self, places: Places, most: int) -> list[Array]:
+        """Return how far joints lie from those of other frames, (2 most + 1, F, n_joints), metres, as a list of one."""
+        return [np.stack([self._away_m(places, shift) for shift in range(-most, most + 1)])]
 
     def _away_m(self, places: Places, shift: int) -> Array:
         """Return the distances from the joints so many frames later, (F, n_joints); NaN where unknown."""

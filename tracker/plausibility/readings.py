@@ -50,8 +50,10 @@ class KnownPeople(Protocol):
             places: of the person on the frames, metres.
         """
 
-    def lag_errors_m(self, places: Places, most: int) -> Array:
+    def lag_errors_m(self, places: Places, most: int) -> Sequence[Array]:
         """Return how far a person is from it on other frames, (n_lags, ..., n), metres; NaN where unknown.
+
+        Each kind of evidence has its own; one counts where those before it do not show the lag.
 
         Args:
             places: of the person on the frames, metres.
@@ -205,8 +207,10 @@ class ReadPoints:
         most = min(len(self.points) // 4, SAMPLES)
         if self.known_people is None or not most:
             return None
-        errors = [self.known_people.lag_errors_m(places, most) for places in self.places(reading)]
-        return find_lag(np.concatenate(errors, axis=-1), most * self.step, PRIORS.posture_s * self.fps / self.step)
+        of_people = [self.known_people.lag_errors_m(places, most) for places in self.places(reading)]
+        n_rows = PRIORS.posture_s * self.fps / self.step
+        errors = (np.concatenate(kind, axis=-1) for kind in zip(*of_people, strict=True))
+        return next((lag for e in errors if (lag := find_lag(e, most * self.step, n_rows)) is not None), None)
 
     def _place_nats(self, reading: Reading) -> float:
         """Return the log likelihood of a reading by where people are, up to a constant; at most 0."""
