@@ -13,15 +13,16 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.formats.joint_maps import JointMap
 from tracker.geometry.arrays import Array
-from tracker.geometry.ground_plane import floor_plane
+from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.judging import reasons
 from tracker.judging.best_motion import best_motion
 from tracker.judging.verdicts import LIMBS, probability_beyond, with_doubt
 from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.chain import Sink
 from tracker.pipeline.keypoint_evidence import read_points
+from tracker.plausibility.examine import contradictions
 from tracker.plausibility.posed_people import read_beside
-from tracker.plausibility.readings import Reading
+from tracker.plausibility.readings import Reading, ReadPoints
 from tracker.session.session import Session
 from tracker.store.stored_poses import StoredPose
 from tracker.tracking.pose_errors import point_covariances
@@ -79,6 +80,8 @@ class Judgement:
     """The poses that they were compared with, by frame."""
     lag_frames: int = 0
     """Frames by which the joints lag behind the tracked ones throughout; 0 if no lag is clear."""
+    misread: tuple[str, ...] = ()
+    """By what names, axes or unit all joints would fit a person better, or why they fit none."""
 
     @property
     def worst(self) -> list[Doubt]:
@@ -95,7 +98,7 @@ class Judgement:
     @property
     def sentences(self) -> list[str]:
         """Sentences on what is off throughout."""
-        out = []
+        out = [*self.misread]
         if self.lag_frames:
             n, word = abs(self.lag_frames), "late" if self.lag_frames > 0 else "early"
             out.append(f"all joints are {n} frame{'s' * (n != 1)} {word} throughout")
@@ -138,12 +141,14 @@ def judge(
             f"expected observations of somebody in the session, found none in '{name}'; import them again"
         )
     best = best_motion(session, observer, name, tuple(points), settings, sink)
-    return [judge_person(session.people[i].name, points[i], best[i], observer, session.fps, report) for i in points]
+    floor = floor_plane(session.up, session.floor)
+    names = [p.name for p in session.people]
+    return [judge_person(names[i], points[i], best[i], observer, session.fps, report, floor) for i in points]
 
 
 def judge_person(
     person: str, imported: BodyPoints, tracked: Mapping[int, StoredPose], observer: Observer | None,
-    fps: float, report: Report = unreported,
+    fps: float, report: Report = unreported, floor: GroundPlane | None = None,
 ) -> Judgement:  # fmt: skip
     """Judge the imported joints of a person by tracked poses.
 
@@ -154,6 +159,7 @@ def judge_person(
         observer: shows where the person is, for the reasons; None for reasons without.
         fps: frames per second.
         report: shows progress. An exception that it raises ends the work.
+        floor: of the session; None for that across z.
     """
     frames = [k for k in sorted(tracked) if k < len(imported.joints_world)]
     at = {n: i for i, n in enumerate(imported.names)}
@@ -178,17 +184,21 @@ def judge_person(
     offsets, spread = _constant(imported, tracked, frames, steps)
     points = [[tracked[k].body.model.point_names.index(n) for n in imported.names] for k in frames]
     places = np.array([tracked[k].body.joint_centers_world[p] for k, p in zip(frames, points, strict=True)])
-    lag = _lag_frames(imported, places, frames, fps) if frames else 0
-    return Judgement(person, out, offsets, spread, imported, tracked, lag)
-
-
-def _lag_frames(imported: BodyPoints, places: Array, frames: Sequence[int], fps: float) -> int:
-    """Return by how many frames joints lag behind tracked ones, (F, N, 3); 0 if that is not clear."""
+    if not frames:
+        return Judgement(person, out, offsets, spread, imported, tracked)
     known = dict(zip(imported.names, np.moveaxis(places, 1, 0), strict=True))
-    up = floor_plane("z", None).normal  # no matter for lags
+    up = floor_plane("z", floor).normal
     read = read_beside(known, imported.joints_world[frames], frames, up, fps, ignores_offsets=True)
-    lag = read.lag(Reading(JointMap("the import", {n: n for n in known})))
-    return 0 if lag is None else -lag.frames
+    return Judgement(person, out, offsets, spread, imported, tracked, *_throughout(read))
+
+
+def _throughout(read: ReadPoints) -> tuple[int, tuple[str, ...]]:
+    """Return by how many frames joints lag behind tracked ones, 0 if that is not clear, and how they are misread."""
+    own = Reading(JointMap("the import", {name: name for name in read.names}))
+    lag, found = read.lag(own), contradictions(read, own, [own.joint_map], 0, in_space=True)
+    of_limbs = ("shift_points", "check_world_of_file")  # lags and places, which are judged anyway
+    misread = tuple(str(f) for f in found if f.remedy is None or f.remedy.code not in of_limbs)
+    return 0 if lag is None else -lag.frames, misread
 
 
 def _steps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:

@@ -19,6 +19,7 @@ MODEL, N = load_model("gavrila38", 1.7), 24
 NAMES = tuple(j for joints in LIMBS.values() for j in joints)
 POINTS = [MODEL.point_names.index(n) for n in NAMES]
 AT = {n: i for i, n in enumerate(NAMES)}
+OTHER_SIDE = {"left": "right_", "righ": "left_"}
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +66,20 @@ def test_an_offset_throughout_is_a_sentence_and_no_doubt(joints, tracked):
     assert len(found.sentences) == 2
     assert "left hip off by 4 cm throughout: 4 cm down" in found.sentences
     assert found.spread_m["left_hip"] < 0.03
+
+
+@pytest.mark.parametrize(
+    ("turned", "sentence"),
+    [
+        (lambda joints: joints[..., [1, 2, 0]], "they fit with the axes z,x,y"),
+        (lambda joints: 0.3048 * joints, "times 3.281 the points fit one of 1."),
+        (lambda joints: joints[:, [AT[OTHER_SIDE[n[:4]] + n.split("_")[1]] for n in NAMES]], "with left for right"),
+        (lambda joints: joints[:, [*range(1, len(NAMES)), 0]], "found that the "),
+    ],
+    ids=["axes", "unit", "sides", "names"],
+)  # fmt: skip
+def test_joints_that_are_read_as_others_are_a_sentence(joints, tracked, turned, sentence):
+    assert any(sentence in own for own in judged(turned(joints), tracked).sentences)
 
 
 @pytest.mark.parametrize("lag", [-3, 2, 5])
