@@ -1,5 +1,6 @@
 """Find by how many frames motions that should be one lie apart, and how far that is known."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,16 @@ class Lag(NamedTuple):
         n, ends = abs(self.frames), sorted(map(abs, (self.low, self.high)))
         known = "" if ends == [n, n] else f" ({ends[0]} to {ends[1]})"
         return f"{n} frame{'s' * (n != 1)} {'later' if self.frames > 0 else 'earlier'}{known}"
+
+
+def combined_lag(found: Sequence[Lag | None]) -> Lag | None:
+    """Return the lag that no kind of evidence excludes, likeliest by the one that limits it most; None without one."""
+    known = [lag for lag in found if lag is not None]
+    low, high = max((lag.low for lag in known), default=0), min((lag.high for lag in known), default=-1)
+    if low > high:
+        return None
+    best = min(known, key=lambda lag: lag.high - lag.low).best
+    return Lag(float(np.clip(best, low, high)), low, high)
 
 
 def find_lag(errors: Array, reach: float, n_rows: float, n_tried: int = 0) -> Lag | None:

@@ -25,7 +25,7 @@ from tracker.plausibility.body_likelihood import (
     stature_nats,
     upright_nats,
 )
-from tracker.plausibility.lags import Lag, find_lag
+from tracker.plausibility.lags import Lag, combined_lag, find_lag
 
 
 class KnownPeople(Protocol):
@@ -53,7 +53,7 @@ class KnownPeople(Protocol):
     def lag_errors_m(self, places: Places, most: int) -> Sequence[Array]:
         """Return how far a person is from it on other frames, (n_lags, ..., n), metres; NaN where unknown.
 
-        Each kind of evidence has its own; one counts where those before it do not show the lag.
+        Each kind of evidence has its own.
 
         Args:
             places: of the person on the frames, metres.
@@ -209,8 +209,8 @@ class ReadPoints:
             return None
         of_people = [self.known_people.lag_errors_m(places, most) for places in self.places(reading)]
         n_rows = PRIORS.posture_s * self.fps / self.step
-        errors = (np.concatenate(kind, axis=-1) for kind in zip(*of_people, strict=True))
-        return next((lag for e in errors if (lag := find_lag(e, most * self.step, n_rows)) is not None), None)
+        errors = [np.concatenate(kind, axis=-1) for kind in zip(*of_people, strict=True)]
+        return combined_lag([find_lag(e, most * self.step, n_rows) for e in errors])
 
     def _place_nats(self, reading: Reading) -> float:
         """Return the log likelihood of a reading by where people are, up to a constant; at most 0."""
