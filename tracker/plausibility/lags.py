@@ -42,7 +42,7 @@ def combined_lag(found: Sequence[Lag | None]) -> Lag | None:
     return Lag(float(np.clip(best, low, high)), low, high)
 
 
-def find_lag(errors: Array, reach: float, n_rows: float, n_tried: int = 0) -> Lag | None:
+def find_lag(errors: Array, reach: float, n_rows: float) -> Lag | None:
     """Find the lag with the least errors; None if these do not limit it on both sides.
 
     Errors count as squares that saturate (Geman-McClure), in units of their median at the best lag. A lag is excluded
@@ -53,7 +53,18 @@ def find_lag(errors: Array, reach: float, n_rows: float, n_tried: int = 0) -> La
         errors: of evenly spaced lags, (n_lags, F, n), those of lag 0 in the middle; NaN where unknown.
         reach: the last lag, frames.
         n_rows: number of rows after which errors are independent of those before.
-        n_tried: number of lags of which these are the nearest, compared again on the rows that they share; 0 for all.
+    """
+    return _find_lag(errors, np.linspace(-reach, reach, len(errors)), n_rows, 0)
+
+
+def _find_lag(errors: Array, lags: Array, n_rows: float, n_tried: int) -> Lag | None:
+    """Find the lag as `find_lag` does; those around the best are compared again on the rows that they share.
+
+    Args:
+        errors: of the lags.
+        lags: frames, evenly spaced.
+        n_rows: see `find_lag`.
+        n_tried: number of lags of which these are around the best; 0 for all.
     """
     known: Mask = np.all(np.isfinite(errors), axis=0)
     if not known.any():
@@ -62,9 +73,10 @@ def find_lag(errors: Array, reach: float, n_rows: float, n_tried: int = 0) -> La
     costs = np.where(known, errors**2 / (errors**2 + scale**2), 0.0)
     mean = costs.sum(axis=(1, 2))
     best, middle = int(mean.argmin()), len(mean) // 2
-    near = max(2 * abs(best - middle), middle // 2)
-    if near < middle and not n_tried:
-        return find_lag(errors[middle - near : middle + near + 1], reach * near / middle, n_rows, len(errors))
+    if not n_tried:  # the middle, which is no lag, is compared too
+        width = max(abs(best - middle) + 1, middle // 2)
+        near = slice(max(best - width, 0), best + width + 1)
+        return _find_lag(errors[near], lags[near], n_rows, len(errors))
     rows_known, cells = np.flatnonzero(np.any(known, axis=1)), list[Array]()
     for rows in np.array_split(rows_known, max(1, round(len(rows_known) / n_rows))):
         n_known = np.sum(known[rows], axis=0)
@@ -77,6 +89,5 @@ def find_lag(errors: Array, reach: float, n_rows: float, n_tried: int = 0) -> La
     likely = np.flatnonzero(more.mean(axis=1) <= least)
     if likely[0] == 0 or likely[-1] == len(more) - 1:
         return None
-    lags = np.linspace(-reach, reach, len(more))
     at = lags[best] + (lags[1] - lags[0]) * vertex(-mean[best - 1 : best + 2])
     return Lag(float(at), int(lags[likely[0]]), int(lags[likely[-1]]))
