@@ -6,7 +6,8 @@ import pytest
 from rigs import cameras, ring
 
 from tracker.plausibility.filmed_motion import MotionFinder
-from tracker.plausibility.lags import Lag, find_lag
+from tracker.plausibility.filmed_people import FilmedPeople
+from tracker.plausibility.lags import Lag, combined_lag, find_lag
 
 N, MOST = 60, 12
 LIMBS = [f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "hip", "knee")]
@@ -63,3 +64,29 @@ def test_lags_of_slow_motion_are_found_in_the_pictures(lag):
     found = find_lag(shown.errors_m(late, 8), 8 * step, 15)
     assert found.low <= -lag <= found.high
     assert found.frames == -lag
+
+
+@pytest.mark.parametrize("lag", [0, 3, -5])
+def test_lags_are_found_by_silhouettes_alone(lag):
+    """An arm that sways, of which no flow is known."""
+    rng, views = np.random.default_rng(1), tuple(c.scaled(0.25) for c in cameras(ring(3)))
+    sway = cv2.GaussianBlur(rng.normal(size=(100, 3)), (1, 0), 1, sigmaY=5) + np.array([0.0, 0.0, 1.0])
+    arm = {"left_elbow": sway, "left_wrist": sway + np.array([0.0, 0.0, 0.2])}
+    distances = []
+    for view in views:
+        ends = [np.round(view.project(place)).astype(int).tolist() for place in arm.values()]
+        masks = [cv2.line(np.ones(view.size[::-1], np.uint8), a, b, 0, 5) for a, b in zip(*ends, strict=True)]
+        shown = [cv2.distanceTransform(mask, cv2.DIST_L2, 3) for mask in masks[20:80]]
+        distances.append(np.minimum(np.round(shown), 255).astype(np.uint8))
+    people = FilmedPeople(views, tuple(distances), np.ones((60, 3), dtype=bool))
+    late = {name: place[20 - lag : 80 - lag] + 0.01 * rng.normal(size=(60, 3)) for name, place in arm.items()}
+    (errors_m,) = people.lag_errors_m(late, MOST)
+    found = find_lag(errors_m, MOST, 6)
+    assert found.low <= -lag <= found.high
+    assert (found.frames != 0) == (lag != 0)
+
+
+def test_evidence_of_two_kinds_limits_a_lag():
+    wide, narrow = Lag(-5.5, -6, 4), Lag(-5.2, -7, -4)
+    assert combined_lag([wide, narrow]) == combined_lag([narrow, None, wide]) == Lag(-5.2, -6, -4)
+    assert combined_lag([narrow, Lag(0.0, -1, 1)]) is combined_lag([None]) is combined_lag([]) is None
