@@ -79,7 +79,10 @@ def test_wrong_people_are_refused(run, footage, tmp_path):
         run(*words(footage, out, "--height", "eve=1.7", files="named")),
         ["people whom the files name, found 'eve' and the people animal0, animal1"],
     )
-    assert_refused(run(*words(footage, out, "--height", "1.7", "1.8", files="named")), ["--height as NAME=VALUE"])
+    assert_refused(
+        run(*words(footage, out, "--height", "1.7", "1.8", files="named")),
+        ["--height once for all people, or as NAME=VALUE for each, found 1.7 and 1.8"],
+    )
     videos = [footage / c.name for c in CAMERAS]
     assert_refused(
         run("calibrate", "--silhouettes", "--videos", *videos, "--out", out, "--height", "ann=1.7"),
