@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import TypeAlias
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +19,7 @@ from tracker.geometry.ground_plane import floor_plane
 from tracker.observations.identities import most_seen_people
 from tracker.observations.observed import ObservationSet, ObservedPoints
 from tracker.observations.stored import list_observations, load_observations, new_folder, save_observations
-from tracker.observations.stored_masks import describe_masks, masks_folder
+from tracker.observations.stored_masks import describe_masks, masks_folder, write_mask
 from tracker.session.session import Session
 
 FORMAT = "detection"
@@ -148,8 +147,7 @@ class _MaskWriter:
                 folder = self._folder / source.camera.name
                 folder.mkdir(parents=True, exist_ok=True)
                 if picture is not None:
-                    data = cv2.imencode(".png", mask)[1].tobytes()
-                    (folder / f"{k + source.offset:06d}.png").write_bytes(data)
+                    write_mask(folder, k + source.offset, mask)
         except OSError as error:
             raise SessionError(f"cannot write {self._folder}: {error}; free some space, and detect again") from error
 

@@ -29,7 +29,7 @@ BEYOND_PX = -32000.0
 """Column of what no lens shows, in maps of OpenCV, which are 16 bit wide."""
 
 ROUNDING_PX2 = 1 / 12
-"""Variance of rounding to whole pixels, px^2."""
+"""Variance of rounding to whole pixels, px^2: that of a uniform distribution one pixel wide."""
 
 Region = tuple[int, int, int, int]
 """A box in an image, px: first column, first row, column after the last, row after the last."""

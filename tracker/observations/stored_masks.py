@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
+import numpy as np
+from numpy.typing import NDArray
 
 from tracker.errors import SessionError, TrackerError
 from tracker.observations.observed import SourceFile, checksum
@@ -132,4 +134,9 @@ def _write_masks(plan: "MaskPlan", camera: str, size: tuple[int, int], folder: P
     folder.mkdir(parents=True)
     for i, picture in enumerate(plan.pictures[camera].tolist()):
         if picture >= 0:
-            (folder / f"{picture:06d}.png").write_bytes(cv2.imencode(".png", plan.mask(camera, i, size))[1].tobytes())
+            write_mask(folder, picture, plan.mask(camera, i, size))
+
+
+def write_mask(folder: Path, picture: int, mask: NDArray[np.uint8]) -> None:
+    """Write the mask of a picture of footage, (H, W), where `tracker.footage.recording.read_mask` reads it."""
+    (folder / f"{picture:06d}.png").write_bytes(cv2.imencode(".png", mask)[1].tobytes())

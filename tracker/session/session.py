@@ -85,7 +85,7 @@ class Session:
 
     @property
     def has_outlines(self) -> bool:
-        """Whether some camera has a background or masks; else only what moves tells people from the scene."""
+        """Whether some camera has a background or masks; else only motion separates people from the scene."""
         return any(c.background or c.masks for c in self.cameras)
 
     @property
