@@ -100,21 +100,21 @@ async def test_the_worst_are_gone_through_by_click_and_key(page, endpoint, secti
     await shows(page, "quadrille.state.target === 9")
 
 
+@pytest.mark.endpoint(has_outlines=False)
 async def test_a_network_is_offered_where_only_what_moves_shows_the_people(page, endpoint):
-    endpoint.has_outlines = False
-    await page.reload()
     await endpoint.broadcast(EMPTY)
     await page.keyboard.press("Alt+i")
     find = page.locator("[data-section=find]")
     await page.evaluate("document.querySelector('[data-section=find]').open = true")
     await find.get_by_text("No camera has a background").wait_for()
     await find.get_by_role("button", name="Detect and track").click()
-    await until(lambda: endpoint.received == [{"type": "observations", "action": "detect_track", "name": ""}])
+    asked = {"type": "observations", "name": ""}
+    await until(lambda: endpoint.heard("observations") == [asked | {"action": "detect_track"}])
     await endpoint.broadcast(EMPTY | {"running": True, "stage": "detecting people", "share": 0.4})
     await find.get_by_text("detecting people").wait_for()
     assert not await find.get_by_role("button", name="Detect and track").is_visible()
     await find.get_by_role("button", name="Stop").click()
-    await until(lambda: endpoint.received[-1] == {"type": "observations", "action": "stop", "name": ""})
+    await until(lambda: endpoint.heard("observations")[-1] == asked | {"action": "stop"})
 
 
 async def test_problems_of_files_forbid_the_import(fresh_page, endpoint):
