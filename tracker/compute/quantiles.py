@@ -30,6 +30,14 @@ def quantiles(values: NDArray[np.floating], shares: Sequence[float]) -> NDArray[
     )
 
 
+def known_median(values: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Compute the median of what is known along the first axis, (n, ...) to (...); NaN where nothing is."""
+    ordered = np.sort(np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)]), axis=0)  # NaN last
+    n = np.isfinite(values).sum(axis=0)
+    low, high = (np.take_along_axis(ordered, np.maximum(at, 0)[None], axis=0)[0] for at in ((n - 1) // 2, n // 2))
+    return np.asarray(np.where(n > 0, (low + high) / 2, np.nan))
+
+
 def median(values: NDArray[np.floating]) -> NDArray[np.float64]:
     """Compute the median along the first axis, (n, ...) to (...)."""
     return np.asarray(quantiles(values, (0.5,))[0])

@@ -16,7 +16,8 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import JointMap, known_joint_maps
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.ground_plane import floor_plane
-from tracker.observations.identities import most_seen_people
+from tracker.observations.identities import everybody
+from tracker.observations.joints import bones_of
 from tracker.observations.observed import ObservationSet, ObservedPoints
 from tracker.observations.stored import list_observations, load_observations, new_folder, save_observations
 from tracker.observations.stored_masks import describe_masks, masks_folder, write_mask
@@ -98,7 +99,7 @@ def detect_people(
                 masks.write(k, [people.mask(k, v, own) for v, own in enumerate(figures)], pictures)
             found[k] = [[replace(figure, mask=None) for figure in own] for own in figures]  # masks fill the memory
             here, only = {k: found[k]}, range(k, k + 1)
-            show(k, lambda here=here, only=only: _observations(session, plan, convention, here, only, ()))
+            show(k, lambda here=here, only=only: _observations(session, plan, convention, here, only))
     except KeyboardInterrupt:
         pass
     if not any(own for views in found.values() for own in views):
@@ -113,10 +114,9 @@ def detect_people(
             "check the calibration and the offsets of the views, or try another model"
         )
     done = range(plan.frames.start, max(found) + 1)
-    notes = _notes(people, len(session.people), done)
-    save_observations(
-        session, _observations(session, plan, convention, found, done, notes), {}, replaces=before is not None
-    )
+    observations = _observations(session, plan, convention, found, done)
+    notes = _notes(people, observations, len(session.people), done)
+    save_observations(session, replace(observations, notes=notes), {}, replaces=before is not None)
     if masks is not None:
         describe_masks(session, masks.name, FORMAT, {"detector": plan.detector, "detected": _text(done)})
     counts = tuple(sum(bool(views[v]) for views in found.values()) for v in range(len(cameras)))
@@ -208,25 +208,29 @@ def _text(frames: range) -> str:
 
 
 def _observations(
-    session: Session, plan: DetectionPlan, convention: JointMap, found: dict[int, Seen], done: range,
-    notes: tuple[str, ...],
-) -> ObservationSet:  # fmt: skip
+    session: Session, plan: DetectionPlan, convention: JointMap, found: dict[int, Seen], done: range
+) -> ObservationSet:
     names = [c.camera.name for c in session.cameras]
     n = max(len(own) for views in found.values() for own in views)
     shape = session.n_frames, len(names), n, len(convention.points)
-    px, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
+    px, confidence, colors = np.full((*shape, 2), np.nan), np.zeros(shape), np.full((*shape[:3], 6), np.nan)
     for k, seen in found.items():
         px[k], confidence[k] = points_of(seen, len(convention.points), n)
+        for v, own in enumerate(seen):
+            colors[k, v, : len(own)] = [figure.colors for figure in own] or np.empty((0, 6))
     options = ("detector", plan.detector), ("frames", _text(plan.frames)), ("detected", _text(done))
-    points = ObservedPoints(convention.points, tuple(names), px, confidence)
+    points = ObservedPoints(convention.points, tuple(names), px, confidence, colors=colors)
     rows: Array = np.array(sorted(found), dtype=np.float64)
     people = tuple(p.name for p in session.people)
-    return ObservationSet(plan.name, FORMAT, people, convention, points, None, (rows,), (), notes, options)
+    return ObservationSet(plan.name, FORMAT, people, convention, points, None, (rows,), options=options)
 
 
-def _notes(people: PeopleInViews, n: int, done: range) -> tuple[str, ...]:
+def _notes(people: PeopleInViews, observations: ObservationSet, n: int, done: range) -> tuple[str, ...]:
     """Say whether other people than the `n` of the session are seen, and who is not seen all the time."""
-    out, taken = [], most_seen_people(people.tracks, n)
+    points = observations.points
+    assert points is not None
+    assert points.colors is not None
+    out, everyone = [], everybody(people.tracks, bones_of(observations), points.colors)
     if people.number < n:
         out.append(f"{people.number} of {n} people are seen at once by three views or by all")
     elif people.number > n:
@@ -234,14 +238,13 @@ def _notes(people: PeopleInViews, n: int, done: range) -> tuple[str, ...]:
             f"{people.number} people are seen at once by three views or by all, the session has {n}: "
             "those seen most are taken"
         )
-    for tracks in taken:
-        frames = sorted({k for t in tracks for k, _ in t.members})
-        if frames[0] - done.start >= people.every or done.stop - frames[-1] > people.every:
-            out.append(f"a person is seen on frames {frames[0]} to {frames[-1]} alone")
-    known = {id(t) for tracks in taken for t in tracks}
-    for track in people.tracks:
-        if len({k for k, _ in track.members}) >= people.every and (track.is_flat or id(track) not in known):
-            who = "a flat picture of a person" if track.is_flat else "a further person"
-            names = " and ".join(people.names[v] for v in sorted({v for _, v in track.members}))
-            out.append(f"{who} is seen by {names}" + ", and left out" * (id(track) not in known))
+    for person in everyone[:n]:
+        first, last = min(person.members)[0], max(person.members)[0]
+        if first - done.start >= people.every or done.stop - last > people.every:
+            out.append(f"a person is seen on frames {first} to {last} alone")
+    for i, person in enumerate(everyone):
+        if len({k for k, _ in person.members}) >= people.every and (person.is_flat or i >= n):
+            who = "a flat picture of a person" if person.is_flat else "a further person"
+            names = " and ".join(people.names[v] for v in sorted({v for _, v in person.members}))
+            out.append(f"{who} is seen by {names}" + ", and left out" * (i >= n))
     return tuple(out)

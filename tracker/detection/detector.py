@@ -54,6 +54,8 @@ class DetectedPerson:
     """Probability that there is a person, 0 to 1."""
     mask: Callable[[tuple[int, int]], NDArray[np.float32]] | None = None
     """Returns the probability that each pixel of the picture, whose height and width it is given, shows the person."""
+    colors: Array | None = None
+    """Of the clothes, (6,), see `tracker.detection.clothes`; a detector need not give them."""
 
 
 class Detector(Protocol):

@@ -6,12 +6,14 @@ every view around the place that the other views and the frame before show, and 
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.detection.clothes import clothes_colors
 from tracker.detection.detector import ADULT, DetectedPerson, Detector, PictureSquare
 from tracker.footage.mask_image import ANYONE, UNKNOWN
 from tracker.geometry.arrays import Array, Image
@@ -123,11 +125,12 @@ class PeopleInViews:
         """Take over the figures that were seen before, by frame, and follow the people among them."""
         points, out = observations.points, dict[int, Seen]()
         assert points is not None
+        colors = np.full((*points.confidence.shape[:3], 6), np.nan) if points.colors is None else points.colors
         for k in observations.row_frames[0].astype(int).tolist():
             is_seen = points.is_known[k].any(axis=-1)
             out[k] = [
                 [
-                    DetectedPerson(points.points_px[k, v, i], points.confidence[k, v, i], 1.0)
+                    DetectedPerson(points.points_px[k, v, i], points.confidence[k, v, i], 1.0, colors=colors[k, v, i])
                     for i in np.flatnonzero(own)
                 ]
                 for v, own in enumerate(is_seen)
@@ -182,7 +185,8 @@ class PeopleInViews:
             apart = np.linalg.norm(found.points_px - other.points_px, axis=1)
             if np.nanmedian(apart) * ADULT.square_m < INLIER_M * square.side_px:
                 return
-        figures.append(found)
+        colors = clothes_colors(picture, found.points_px[self._torso], found.points_px[self._legs[:, 1]])
+        figures.append(replace(found, colors=colors))
 
     def _is_around(self, square: PictureSquare, figure: DetectedPerson) -> bool:
         """Return whether a square is around the hips of a figure: others behind it are found by other views."""

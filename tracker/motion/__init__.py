@@ -1,12 +1,13 @@
-"""Poses over time, without images: prediction, interpolation, smoothing, inconsistent frames, the floor.
+"""Poses over time, without images: prediction, interpolation, smoothing, inconsistent frames, the floor, who is who.
 
 Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`,
-`smoothing.smooth_poses`, `shortest_step`, `consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`
-and `keyframe_doubts`.
+`smoothing.smooth_poses`, `shortest_step`, `consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`,
+`continuation.who_is_who` and `keyframe_doubts`.
 """
 
 __all__ = [
     "consistency",
+    "continuation",
     "floor_from_feet",
     "interpolation",
     "keyframe_doubts",

@@ -5,10 +5,10 @@ from itertools import combinations
 
 import numpy as np
 
+from tracker.compute.quantiles import known_median
 from tracker.errors import FormatError, Remedy
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservedPoints
 from tracker.observations.shifts import SAMPLES, evenly, point_rays, view_shifts
@@ -70,15 +70,10 @@ def agreement_m(points: ObservedPoints, cameras: Sequence[Camera], scale: float 
     for a, b in combinations(range(len(cameras)), 2):
         apart = views.ray_distances(a, b, rays[:, a, :, None], rays[:, b, None])  # of each pair of detections
         by_pair = apart.reshape(len(apart), -1, apart.shape[-1])
-        medians = np.array([[_median(row) for row in frame] for frame in by_pair])
+        medians = known_median(np.moveaxis(by_pair, 2, 0))
         best = np.where(np.isfinite(medians), medians, np.inf).argmin(axis=1)
         gaps.append(by_pair[np.arange(len(best)), best].ravel())
-    return _median(np.concatenate(gaps)) if gaps else np.nan
-
-
-def _median(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else np.nan
+    return float(known_median(np.concatenate(gaps))) if gaps else np.nan
 
 
 def agreement_problem(points: ObservedPoints, cameras: Sequence[Camera]) -> FormatError | None:
@@ -124,10 +119,9 @@ def timing_problems(
         if name in decided:
             notes.append(f"camera '{name}': of its key points, {found}")
         else:
-            expected = (
-                f"camera '{name}': expected key points that fit the other views on the same frame, found that {found}"
-            )
-            problems.append(FormatError(expected, Remedy("shift_keypoints", camera=name, frames=str(n))))
+            expected = "key points that fit the other views on the same frame"
+            remedy = Remedy("shift_keypoints", camera=name, frames=str(n))
+            problems.append(FormatError.mismatch(f"camera '{name}'", expected, f"that {found}", remedy))
     return problems, notes
 
 

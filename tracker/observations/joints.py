@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
-from tracker.observations.identities import match_people
+from tracker.observations.identities import gather, match_people
 from tracker.observations.observed import ObservationSet, ObservedJoints
 from tracker.observations.sides import exchanged_sides, with_sides_exchanged
-from tracker.observations.triangulation import Triangulated, Views, triangulate_points
+from tracker.observations.triangulation import Views, triangulate_points
 
 _GROUPS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "heel", "toe"))
 """Joints whose sides a detector exchanges together: those of the arms, and those of the legs."""
@@ -65,27 +66,23 @@ def triangulate_observations(
     views = Views(cameras)
     px = views.undistorted(points.points_px)
     people = observations.people
-    identities = match_people(views, px, points.confidence, len(people))
+    identities = match_people(views, px, points.confidence, len(people), bones_of(observations), points.colors)
     detections = np.stack([_detections_of(identities, p) for p in range(len(people))], axis=1)
     groups = side_pairs(observations)
-    found: list[Triangulated] = []
-    exchanged, positions, confidences = [], [], []
+    found = []
     for person in range(len(people)):
-        own_px, own_confidence = _gather(px, points.confidence, detections[:, person])
+        own_px, own_confidence = gather(px, points.confidence, detections[:, person])
         flags = np.zeros((*own_confidence.shape[:2], len(groups)), dtype=bool)
         for g, pairs in enumerate(groups if mend_sides else ()):
             flags[..., g] = exchanged_sides(views, own_px, own_confidence, pairs)
             own_px = with_sides_exchanged(own_px, pairs, flags[..., g])
             own_confidence = with_sides_exchanged(own_confidence, pairs, flags[..., g])
-        found.append(triangulate_points(views, own_px, own_confidence))
-        positions.append(own_px)
-        confidences.append(own_confidence)
-        exchanged.append(flags)
-    world, covariances, residuals_px, is_inlier = (np.stack(part, axis=1) for part in zip(*found, strict=True))
+        found.append((flags, own_px, own_confidence, *triangulate_points(views, own_px, own_confidence)))
+    flags, own_px, own_confidence, *of_joints = (np.stack(part, axis=1) for part in zip(*found, strict=True))
+    world, covariances, residuals_px, is_inlier = of_joints
     joints = ObservedJoints(points.names, people, world, covariances)
-    is_exchanged, positions_px, confidence = (np.stack(part, axis=1) for part in (exchanged, positions, confidences))
     return TriangulatedObservations(
-        joints, identities, detections, is_exchanged, is_inlier, residuals_px, positions_px, confidence
+        joints, identities, detections, flags, is_inlier, residuals_px, own_px, own_confidence
     )
 
 
@@ -98,17 +95,13 @@ def side_pairs(observations: ObservationSet) -> list[list[tuple[int, int]]]:
     ]
 
 
+def bones_of(observations: ObservationSet) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Return the columns of both sides of each bone of the arms and legs, and from the shoulders to the hips."""
+    groups = side_pairs(observations)
+    return [*pairwise(g[0] for g in groups if g), *(bone for g in groups for bone in pairwise(g))]
+
+
 def _detections_of(identities: IntArray, person: int) -> IntArray:
     """Return the detection of a person in each frame and view, (n_frames, n_views); -1 where there is none."""
     own = identities == person
     return np.where(own.any(axis=-1), own.argmax(axis=-1), -1)
-
-
-def _gather(px: Array, confidence: Array, detections: IntArray) -> tuple[Array, Array]:
-    """Return points, (n_frames, n_views, n_points, 2), and confidence of one detection in each frame and view."""
-    at = np.maximum(detections, 0)[..., None, None]
-    own = np.take_along_axis(confidence, at, axis=2)[:, :, 0]
-    own_px = np.take_along_axis(px, at[..., None], axis=2)[:, :, 0]
-    known = (detections >= 0)[..., None]
-    own = np.where(known & np.isfinite(own_px).all(axis=-1), own, 0.0)
-    return np.where(own[..., None] > 0, own_px, np.nan), own

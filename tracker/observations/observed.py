@@ -32,11 +32,15 @@ class ObservedPoints:
     tracks: NDArray[np.str_] | None = None
     """Name that the file of a camera gives each detection, (n_frames, n_views, n_detections); empty without one. It may
     differ between cameras. None for stored observations."""
+    colors: Array | None = None
+    """Colors of the clothes of each detection, (n_frames, n_views, n_detections, n_colors); NaN where unknown. None if
+    nothing is known of them."""
 
     def __post_init__(self) -> None:
         n_frames, n_views, n_detections, n_points = self.confidence.shape
         assert (n_views, n_points) == (len(self.cameras), len(self.names)), self.confidence.shape
         assert self.points_px.shape == (n_frames, n_views, n_detections, n_points, 2), self.points_px.shape
+        assert self.colors is None or self.colors.shape[:-1] == self.confidence.shape[:-1]
 
     @cached_property
     def is_known(self) -> Mask:

@@ -10,6 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
+from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservedPoints
@@ -102,7 +103,7 @@ def _pair_costs(
         for row in range(len(found)):
             gaps = _gaps(first, across, rays[frames + row - margin, b])
             with np.errstate(invalid="ignore"):
-                squares = np.minimum((gaps - median_over_time(gaps)) / INLIER_M, 1.0)
+                squares = np.minimum((gaps - known_median(gaps)) / INLIER_M, 1.0)
                 squares = np.maximum(squares, -1.0) ** 2
             found[row] = [_mean(block) for block in np.array_split(squares, found.shape[1])]
         costs[a, b] = found
@@ -145,14 +146,6 @@ def _gaps(first: Array, across: Array, second: Array) -> Array:
     sums = np.where(is_known, np.minimum(np.abs(by_pair), INLIER_M), 0.0).sum(axis=-1)
     best = np.where(is_known.any(axis=-1), sums / np.maximum(is_known.sum(axis=-1), 1), np.inf).argmin(axis=1)
     return by_pair[np.arange(len(best)), best]
-
-
-def median_over_time(gaps: Array) -> Array:
-    """Return the median of each point over time, (n_points,); NaN where it is never known."""
-    ordered = np.sort(gaps, axis=0)  # NaN last
-    n = np.isfinite(gaps).sum(axis=0)
-    middle = [np.take_along_axis(ordered, np.maximum(at, 0)[None], axis=0)[0] for at in ((n - 1) // 2, n // 2)]
-    return np.where(n > 0, (middle[0] + middle[1]) / 2, np.nan)
 
 
 def _mean(values: Array) -> float:

@@ -216,6 +216,8 @@ def _arrays(observations: ObservationSet) -> dict[str, Array]:
     found: dict[str, Array] = {_rows_of(i): rows for i, rows in enumerate(observations.row_frames)}
     if observations.points is not None:
         found |= {"points_px": observations.points.points_px, "confidence": observations.points.confidence}
+        if observations.points.colors is not None:
+            found["colors"] = observations.points.colors
     if observations.joints is not None:
         found["joints_world"] = observations.joints.joints_world
         if observations.joints.covariances is not None:
@@ -242,7 +244,8 @@ def _from_arrays(
         joints = ObservedJoints(row.points, row.people, arrays["joints_world"], arrays.get("covariances"))
         n_frames = joints.n_frames
     else:
-        points = ObservedPoints(row.points, row.cameras, arrays["points_px"], arrays["confidence"])
+        px, confidence = arrays["points_px"], arrays["confidence"]
+        points = ObservedPoints(row.points, row.cameras, px, confidence, colors=arrays.get("colors"))
         if row.cameras != session.camera_names:
             raise ValueError(f"cameras {', '.join(row.cameras)}")
         n_frames = points.n_frames

@@ -6,9 +6,9 @@ from math import gcd
 
 import numpy as np
 
+from tracker.compute.quantiles import known_median
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
-from tracker.observations.shifts import median_over_time
 from tracker.observations.triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import Places, bones
 from tracker.plausibility.readings import ReadPoints
@@ -51,7 +51,7 @@ class PosedPerson:
         inside = (at + shift >= 0) & (at + shift < known.shape[1])
         steps[:, inside] = given[:, inside] - known[:, at[inside] + shift]
         steps = np.swapaxes(steps, 0, 1)
-        return np.linalg.norm(steps - median_over_time(steps) * self.ignores_offsets, axis=-1)
+        return np.linalg.norm(steps - known_median(steps) * self.ignores_offsets, axis=-1)
 
 
 def read_beside(

@@ -78,6 +78,8 @@ def test_a_stopped_detection_goes_on_and_ends_like_one_that_was_not(couple):
     run(session, detector, name="whole")
     one, other = (load_observations(session, name).points for name in ("net", "whole"))
     np.testing.assert_array_equal(one.points_px, other.points_px)
+    np.testing.assert_array_equal(one.colors, other.colors)
+    assert np.isfinite(one.colors[one.is_known.any(axis=-1)]).all()
     with pytest.raises(TrackerError, match="which is complete"):
         run(session, detector)
 
