@@ -68,7 +68,10 @@ def who_is_who(paths: Sequence[PersonPath], near_m: float) -> list[IntArray]:
     paths = [PersonPath(np.searchsorted(seen, p.frames), _filled(p.points_world), p.traits) for p in paths]
     begins = [np.diff(p.frames, prepend=-2) > 1 for p in paths]
     is_near = [np.zeros(len(p.frames), dtype=bool) for p in paths]
+    spans = [(int(p.frames[0]), int(p.frames[-1])) for p in paths]
     for a, b in combinations(range(len(paths)), 2):
+        if max(spans[a][0], spans[b][0]) > min(spans[a][1], spans[b][1]):
+            continue
         _cut(paths[a], paths[b], near_m, (begins[a], begins[b]), (is_near[a], is_near[b]))
     stretches = []
     for i, (path, starts, near) in enumerate(zip(paths, begins, is_near, strict=True)):
