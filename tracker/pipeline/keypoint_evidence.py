@@ -115,7 +115,7 @@ def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[
     bodies, costs = dict[int, Mapping[int, PosedBody]](), dict[int, dict[int, float]]()
     for person in people:
         seen = points[person]
-        bodies[person] = fit_to_keypoints(_at_height(session.people[person].model, seen), seen, tried)
+        bodies[person] = fit_to_keypoints(at_observed_height(session.people[person].model, seen), seen, tried)
         costs[person] = learn_seen_body(bodies[person], seen, cameras).costs(bodies[person], seen, cameras)
     frame = min(tried, key=lambda k: sum(own[k] for own in costs.values()))
     starts = {i: Hypothesis(bodies[i][frame], SOURCE, costs[i][frame], is_measured=False) for i in people}
@@ -124,7 +124,7 @@ def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[
     )
 
 
-def _at_height(model: BodyModel, points: BodyPoints) -> BodyModel:
+def at_observed_height(model: BodyModel, points: BodyPoints) -> BodyModel:
     """Return a body in preset sizes at the height at which most of its segments are as long as those observed."""
     if not has_preset_sizes(model):
         return model
