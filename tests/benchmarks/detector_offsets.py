@@ -182,7 +182,9 @@ def posed(person: Detected) -> BodyPoints:
 def recording_rows(data: Path, folder: Path, offsets: Offsets) -> Iterator[tuple[str, list[str]]]:
     """Detect the recordings; yield the cells of each person."""
     for recording in recorded(data, [*RECORDED]):
-        session = detected(load_session(new_session(replace(recording, background=None), folder / recording.name)))
+        at = folder / recording.name / recording.name
+        made = at if at.exists() else new_session(replace(recording, background=None), at.parent)
+        session = detected(load_session(made))
         points = read_points(session, NAME)
         for i, (name, reference) in enumerate(recording.references.items()):
             joints = read_joints(reference, session.fps)
