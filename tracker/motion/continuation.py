@@ -65,7 +65,8 @@ def who_is_who(paths: Sequence[PersonPath], near_m: float) -> list[IntArray]:
         near_m: distance of two people below which they may be taken for each other, metres.
     """
     seen = np.unique(np.concatenate([np.empty(0, np.int64), *(p.frames for p in paths)]))
-    paths = [PersonPath(np.searchsorted(seen, p.frames), _filled(p.points_world), p.traits) for p in paths]
+    every = int(np.diff(seen).min()) if len(seen) > 1 else 1  # of footage at a lower rate
+    paths = [PersonPath(p.frames // every, _filled(p.points_world), p.traits) for p in paths]
     begins = [np.diff(p.frames, prepend=-2) > 1 for p in paths]
     is_near = [np.zeros(len(p.frames), dtype=bool) for p in paths]
     spans = [(int(p.frames[0]), int(p.frames[-1])) for p in paths]

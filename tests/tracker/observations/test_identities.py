@@ -33,6 +33,16 @@ def leaving(scales=(1.06, 0.98)):
     return [stays, leaves]
 
 
+def exchanging(scales=(1.06, 0.98)):
+    """Both are unseen for a while, and each comes back where the other was."""
+    frames = np.arange(N)[:, None, None]
+    side = np.array([0.5, 0.0, 0.0]) * np.where(frames < 10, 1.0, -1.0) + np.array([0.0, 0.1, 0.0]) * (frames % 2)
+    motions = [scale * standing_points() + sign * side for scale, sign in zip(scales, (1, -1), strict=True)]
+    for motion in motions:
+        motion[8:14] = np.nan
+    return motions
+
+
 def people_of(session, motions, colors=None, noise_px=1.0, seed=1):
     """Whose each detection is by the program and by the truth, (n_frames, n_views, 2), those that show someone."""
     points = seen(session, motions, noise_px=noise_px)
@@ -61,17 +71,25 @@ def share_in_order(found, true):
     return max(share, 1 - share)
 
 
-@pytest.mark.parametrize("motions", [crossing(), crossing((0.95, 1.1)), leaving(), leaving((0.98, 1.06))])
+@pytest.mark.parametrize("motions", [crossing(), crossing((0.95, 1.1)), leaving(), leaving((0.98, 1.06)), exchanging()])
 def test_sizes_tell_who_is_who(session, motions):
     assert share_in_order(*people_of(session, motions)) > 0.95
 
 
-@pytest.mark.parametrize("motions", [crossing((1.0, 1.0)), leaving((1.0, 1.0))])
+@pytest.mark.parametrize("motions", [crossing((1.0, 1.0)), leaving((1.0, 1.0)), exchanging((1.0, 1.0))])
 def test_colors_tell_who_is_who_of_one_size(session, motions):
     random = np.random.default_rng(3)
     usual, of_cameras = np.array([[90.0, 140.0, 120.0], [120.0, 128.0, 128.0]]), random.normal(0, 20, (4, 1, 3))
     colors = usual + of_cameras + random.normal(0, 8, (N, 4, 2, 3))
     assert share_in_order(*people_of(session, motions, colors)) > 0.95
+
+
+@pytest.mark.parametrize("motions", [crossing(), exchanging()])
+def test_at_a_lower_rate_than_the_session_nothing_else_is_decided(session, motions):
+    sparse = [np.full((N, *m.shape[1:]), np.nan) for m in motions]
+    for own, motion in zip(sparse, motions, strict=True):
+        own[::2] = motion[6:18]
+    assert share_in_order(*people_of(session, sparse)) > 0.95
 
 
 def test_people_of_one_look_who_come_near_each_other_stay_where_they_are(session):
