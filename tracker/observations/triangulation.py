@@ -283,8 +283,9 @@ def _sigma(views: Views, points: Array, points_px: Array, weights: Array) -> flo
 
     Distances of two Gaussian coordinates have the median 1.177 standard deviations.
     """
-    counts = weights > 0
-    angles = (views.errors(points, points_px)[0] / views.focal_px)[counts]
+    apart = views.errors(points, points_px)[0] / views.focal_px
+    counts = (weights > 0) & np.isfinite(apart)  # rays along one line end behind a camera
+    angles = apart[counts]
     if not len(angles):
         return 0.0
     # Of two coordinates in n views, the point takes three: the residuals are smaller than the errors by that share.

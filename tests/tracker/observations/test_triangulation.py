@@ -60,6 +60,16 @@ def test_one_view_gives_no_point(rig):
     assert np.isfinite(np.delete(found.points_world[3], 7, axis=0)).all()
 
 
+def test_a_point_that_ends_beside_a_camera_spoils_no_other(tmp_path):
+    session, truth = make_session(tmp_path / "s", 20, distortion=np.zeros(5)), walking(20)
+    views = Views([c.camera for c in session.cameras])
+    points = seen(session, [truth], noise_px=2.0)[:, :, 0]
+    points[3, 1::2, 6] = (np.nan, np.nan, 0.0)
+    points[3, ::2, 6, :2] = (313.12173629, 180.97096315), (313.01416937, 183.27791755)  # rays along one line
+    found = triangulated(views, points).points_world
+    assert np.linalg.norm(np.delete(found, 6, axis=1) - np.delete(truth, 6, axis=1), axis=-1).max() < 0.05
+
+
 def test_covariances_are_as_large_as_the_errors(rig):
     session, views = rig
     truth = walking(20)
