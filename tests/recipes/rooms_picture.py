@@ -49,7 +49,7 @@ HOUSE = {
         ["tracking/chamfer, tracking/contour, tracking/voxel"],
         ["tracking/estimation"],
         ["tracking", "initialization/generators"],
-        ["search", "appearance"],
+        ["search", "appearance", "trajectory"],
         ["fitting", "voxels", "detection"],
         ["evidence", "observations"],
         ["contours", "images", "store"],

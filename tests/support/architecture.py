@@ -29,6 +29,7 @@ ROOMS = [
     "tracker.evidence",
     "tracker.voxels",
     "tracker.fitting",
+    "tracker.trajectory",
     "tracker.appearance",
     "tracker.search",
     "tracker.tracking",
