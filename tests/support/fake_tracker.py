@@ -38,6 +38,9 @@ class Walker:
                 (None,) * n, ((),) * n, self.settings.method,
             )  # fmt: skip
 
+    def evidence(self, observer, bodies):
+        return None
+
     def backward_pass(self, run, tracked):
         return iter(())
 
@@ -91,6 +94,9 @@ class FakeTracker:
                 (part_costs_px,) * n, tuple(np.eye(m.n_dofs) for m in models), (LIMBS,) * n, ((),) * n, "chamfer",
             )  # fmt: skip
             yield self.last[frame]
+
+    def evidence(self, observer, bodies):
+        return None
 
     def backward_pass(self, run, tracked):
         if self.back is not None and self.settings.backward_pass:

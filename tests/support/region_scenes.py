@@ -1,6 +1,7 @@
 """A figure in its clothes that walks past two cameras, tracked with a leg that is wrong on some frames."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 from staging import cameras_around, own_evidence, painted, posed
@@ -44,6 +45,24 @@ class Walk:
 
     def score(self, k, bodies):
         return self.known.score(self.known.frame(self.views[k], bodies), bodies)
+
+
+class Filmed:
+    """Gives the evidence of a walk, as an observer does."""
+
+    working_cameras = CAMERAS
+
+    def __init__(self, walk):
+        self.walk, self.cameras = walk, [SimpleNamespace(camera=SimpleNamespace(name=n)) for n in ("LEFT", "RIGHT")]
+
+    def ahead_frames(self, frame):
+        return (0.0,) * len(CAMERAS)
+
+    def empty_scenes(self):
+        return (None,) * len(CAMERAS)
+
+    def evidence(self, frame, regions, *args, **kwargs):
+        return self.walk.views[frame]
 
 
 def _filmed(bodies, suit, rng):

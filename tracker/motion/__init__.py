@@ -1,8 +1,8 @@
-"""Poses over time, without images: prediction, interpolation, smoothing, inconsistent frames, the floor, who is who.
+"""Poses over time, without images: prediction, interpolation, inconsistent frames, the floor, who is who.
 
-Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`,
-`smoothing.smooth_poses`, `shortest_step`, `consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`,
-`continuation.who_is_who` and `keyframe_doubts`.
+Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`, `shortest_step`,
+`consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`, `continuation.who_is_who` and
+`keyframe_doubts`.
 """
 
 __all__ = [
@@ -14,6 +14,5 @@ __all__ = [
     "pose_path",
     "prediction",
     "shortest_step",
-    "smoothing",
     "velocity",
 ]

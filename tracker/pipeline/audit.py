@@ -23,7 +23,6 @@ from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
-from tracker.tracking.estimation.pose_score import covariance_by_contours
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
@@ -133,17 +132,12 @@ def _repaired(
     }
     by_person = {i: {k: tracks[k][i] for k in frames} for i in plan.people}
 
-    def covariance_of(frame: int, person: int) -> Array:
-        return covariance_by_contours(observer, frame, bodies[frame], person, settings)
-
     known = {
         (k, i): [a.values for a in store.alternatives(session.people[i].name, k) if len(a.values) == len(own[k].values)]
         for i, own in records.items()
         for k in frames
     }
-    repair = RunRepair(
-        observer, subjects, settings, bodies, by_person, covariance_of if plan.takes_consensus else None, known
-    )
+    repair = RunRepair(observer, subjects, settings, bodies, by_person, known, plan.takes_consensus)
     found: Mapping[int, Mapping[int, RepairedPose]] = {}
     for step in repair.steps():
         report("comparing with the colours of the run", step.done / step.total)

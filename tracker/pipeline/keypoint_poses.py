@@ -14,12 +14,12 @@ from tracker.fitting.interpenetration import SelfPenetration
 from tracker.fitting.keypoints import KeypointBlock
 from tracker.formats.model_toml import format_model
 from tracker.geometry.cameras import Camera
-from tracker.motion.smoothing import PoseTrack, acceleration_density, smooth_poses
 from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
+from tracker.trajectory.pose_track import PoseTrack, smooth_poses
 
 
 def store_keypoint_poses(
@@ -113,7 +113,7 @@ def keypoint_poses(
         np.array([covariance(model, fits[k]) for k in frames]), np.zeros(len(frames), np.bool_),
         np.ones((len(frames), n), np.bool_),
     )  # fmt: skip
-    poses = smooth_poses(track, acceleration_density(track))
+    poses = smooth_poses(track)
     return {k: PosedBody(model, pose) for k, pose in zip(frames, poses, strict=True)}
 
 

@@ -8,7 +8,7 @@ searched first. A limb that is found is tried on the frames before and after, so
 
 from bisect import bisect
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
@@ -25,7 +25,6 @@ from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
-from tracker.fitting.gauss_newton import covariance
 from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M, Hypothesis, distance_m, limbs_elsewhere
 from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
@@ -35,10 +34,9 @@ from tracker.tracking.estimation.limb_repair import (
     Repair,
     better_limbs,
     limbs_to_search,
-    refined_by_regions,
 )
 from tracker.tracking.estimation.pose_paths import select_alternatives
-from tracker.tracking.estimation.pose_score import common_evidence, covariance_by_contours
+from tracker.tracking.estimation.pose_score import common_evidence
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.view_regions import regions
@@ -63,8 +61,6 @@ class RepairedPose(NamedTuple):
     """For each limb, the part and the view that speak most against it, for people to read."""
     trace: tuple[Search, ...] = ()
     """The searches of the repair: those that were taken, and the last one."""
-    covariance: Array | None = None
-    """Of the pose, (n_dofs, n_dofs), rad and metres; None where it stayed as tracked."""
     alternatives: tuple[Hypothesis, ...] = ()
     """Other poses with a limb elsewhere that are about as good by contours and colours together, or better where the
     pose stays. Their costs are relative to that of the pose, nats."""
@@ -89,8 +85,8 @@ class RunRepair:
 
     def __init__(
         self, observer: Observer, subjects: Subjects, settings: EstimationSettings, bodies: Mapping[int, Bodies],
-        tracks: Mapping[int, Mapping[int, FrameTracks]], covariance_of: Callable[[int, int], Array] | None = None,
-        alternatives: Mapping[tuple[int, int], Sequence[Array]] | None = None,
+        tracks: Mapping[int, Mapping[int, FrameTracks]],
+        alternatives: Mapping[tuple[int, int], Sequence[Array]] | None = None, replaces: bool = True,
     ) -> None:  # fmt: skip
         """Prepare; nothing is computed yet.
 
@@ -100,12 +96,11 @@ class RunRepair:
             settings: of the tracker.
             bodies: all people by frame, in the poses that are compared.
             tracks: by person and frame, their poses by tracks without a view each.
-            covariance_of: gives the covariance of the pose of a person on a frame, by frame and person, (n_dofs,
-                n_dofs). Without it the poses stay, and are compared only.
             alternatives: other poses that the tracker found about as good, by frame and person, (n_values,) each.
+            replaces: whether better poses take the place of those that are compared; else all stay.
         """
         self._alternatives = alternatives or {}
-        self._covariance_of = covariance_of
+        self._replaces = replaces
         self._observer, self._subjects, self._settings = observer, subjects, settings
         self._bodies, self._tracks = dict(bodies), tracks
         self._learning: dict[int, tuple[ViewEvidence, ...]] = {}
@@ -113,8 +108,6 @@ class RunRepair:
         self._first = np.cumsum([0, *(len(limbs(m)) for m in subjects.models)])
         self._found: dict[tuple[int, int], Repair] = {}
         self._traces: dict[tuple[int, int], tuple[Search, ...]] = {}
-        self._covariances: dict[tuple[int, int], Array] = {}
-        self._moved = set[tuple[int, int]]()
         self._searched: dict[tuple[int, int], tuple[str, ...]] = {}
 
     def steps(self) -> Iterator[RepairStep]:
@@ -125,22 +118,17 @@ class RunRepair:
             known, scores, before = self._learn(), dict[int, Array](), dict(self._bodies)
             for k in self._frames:
                 scores[k] = known.score(self._regions(known, k), self._bodies[k]).nats
-                yield RepairStep(first + len(scores), first + 3 * n)
+                yield RepairStep(first + len(scores), first + 2 * n)
             for done in self._repair(known, self._elsewhere(scores)[0]):
-                yield RepairStep(first + n + min(done, n), first + 3 * n)
-            if self._covariance_of is None:
-                break
+                yield RepairStep(first + n + min(done, n), first + 2 * n)
             self._select_alternatives()
             changed = [k for k in self._frames if self._bodies[k] is not before[k]]
             if not changed or first == 2 * n * (_MAX_TRIES - 1):
                 break
             first += 2 * n
-        if self._covariance_of is not None:
-            self._observe(changed)
-            for done, k in enumerate(self._frames):
-                scores[k] = self._refine(known, k, self._covariance_of)
-                yield RepairStep(first + 2 * n + done, first + 3 * n)
-        yield RepairStep(first + 3 * n, first + 3 * n, self._results(scores))
+        for k in changed:
+            scores[k] = known.score(self._regions(known, k), self._bodies[k]).nats
+        yield RepairStep(first + 2 * n, first + 2 * n, self._results(scores))
 
     def _colors_at(self, frame: int) -> tuple[ViewEvidence, ...]:
         cameras = self._observer.working_cameras
@@ -159,19 +147,6 @@ class RunRepair:
 
     def _regions(self, known: RegionModel, frame: int) -> RegionFrame:
         return known.frame(self._learning.get(frame) or self._colors_at(frame), self._bodies[frame])
-
-    def _refine(self, known: RegionModel, frame: int, covariance_of: Callable[[int, int], Array]) -> Array:
-        """Refine the poses on a frame by region evidence; return that of each part in each view, (V, P), nats."""
-        bodies, regions = self._bodies[frame], self._regions(known, frame)
-        for i in self._free(frame):
-            before = covariance_of(frame, i)
-            if (frame, i) in self._moved:
-                before = covariance_by_contours(self._observer, frame, bodies, i, self._settings)
-            fit = refined_by_regions(known, regions, bodies, i, before, self._subjects.active_dofs[i])
-            bodies = with_body(bodies, i, PosedBody(bodies[i].model, fit.pose))
-            self._covariances[frame, i] = covariance(bodies[i].model, fit)
-        self._bodies[frame] = bodies
-        return known.score(regions, bodies).nats
 
     def _elsewhere(self, scores: Mapping[int, Array]) -> tuple[dict[int, Array], IntArray]:
         """Return how much likelier each limb of all people is elsewhere on each frame, (n_limbs,), nats, and the part
@@ -221,7 +196,7 @@ class RunRepair:
 
     def _free(self, frame: int) -> list[int]:
         """Return the tracked people whose pose on a frame may be replaced: who have no keyframe there."""
-        if self._covariance_of is None:
+        if not self._replaces:
             return []
         return [i for i in self._subjects.tracked if i not in self._subjects.keyframes_at(frame)]
 
@@ -273,7 +248,6 @@ class RunRepair:
         if search or found.is_better:
             self._searched[frame, person] = tuple(limb.name for limb in search)
         if found.is_better and not is_staying:
-            self._moved.add((frame, person))
             self._bodies[frame] = with_body(bodies, person, PosedBody(model, found.pose))
         return found.is_better
 
@@ -284,7 +258,6 @@ class RunRepair:
             selected = select_alternatives(frames, MIN_GAIN_NATS)
             for k, found, chosen in zip(self._frames, frames, selected, strict=True):
                 if chosen:
-                    self._moved.add((k, i))
                     best, *others = found[chosen], *found[:chosen], *found[chosen + 1 :]
                     self._bodies[k] = with_body(self._bodies[k], i, best.body)
                     likely = tuple(h for h in others if h.cost < best.cost + CLEAR_NATS)
@@ -311,11 +284,9 @@ class RunRepair:
                 examined = self._found.get((k, i))
                 refined = None if examined is None else examined.refined
                 trust, pose = self._trusted(k, i, tracks), self._bodies[k][i].values
-                known = elsewhere[k][own], tuple(against[k][own])
-                out[i][k] = RepairedPose(
-                    pose, trust, *known, self._traces.get((k, i), ()), self._covariances.get((k, i)),
-                    self._rivals(k, i), self._searched.get((k, i), ()), refined,
-                )  # fmt: skip
+                trace, searched = self._traces.get((k, i), ()), self._searched.get((k, i), ())
+                known = elsewhere[k][own], tuple(against[k][own]), trace, self._rivals(k, i), searched
+                out[i][k] = RepairedPose(pose, trust, *known, refined)
         return out
 
     def _rivals(self, frame: int, person: int) -> tuple[Hypothesis, ...]:

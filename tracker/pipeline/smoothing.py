@@ -18,7 +18,6 @@ from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.motion.shortest_step import nearest_equivalent
-from tracker.motion.smoothing import PoseTrack, acceleration_density, smooth_poses
 from tracker.pipeline.assessed_poses import (
     assessed_by_features,
     assessed_by_tracks,
@@ -33,7 +32,9 @@ from tracker.tracking.confidence import PoseQuality, frame_features
 from tracker.tracking.estimate import OtherPass
 from tracker.tracking.run_confidence import LOST_FROM, run_features, smoothing_steps
 from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import PathEvidence
 from tracker.tracking.view_tracks import FrameTracks
+from tracker.trajectory.pose_track import PoseTrack, smooth_poses
 
 
 class TrackedRows:
@@ -49,6 +50,10 @@ class TrackedRows:
         """By frame, the poses by tracks without a view each."""
         self._repaired: Mapping[int, RepairedPose] = {}
         self._other_poses: dict[int, tuple[tuple[int, int], Array]] = {}  # with the keyframes that they lie between
+
+    def __contains__(self, frame: int) -> bool:
+        """Return whether there is a row of a frame."""
+        return frame in self._changes
 
     def add(self, change: PoseChange, covariance: Array, quality: PoseQuality | None) -> None:
         """Add a row, or replace that of the same frame.
@@ -112,7 +117,9 @@ class TrackedRows:
         elif change.pose is not None and change.pose.status == "lost":
             self._unseen.add(change.frame)
 
-    def finished(self, subjects: Subjects, person: int, fps: float, smooth: bool = True) -> list[PoseChange]:
+    def finished(
+        self, subjects: Subjects, person: int, fps: float, smooth: bool = True, evidence: PathEvidence | None = None
+    ) -> list[PoseChange]:
         """Return the rows with consensus poses, smoothed, and their final statuses, in the order of time.
 
         Costs stay those of the tracked pose, and so does the status of a pose whose limbs were not assessed.
@@ -123,6 +130,7 @@ class TrackedRows:
             person: index of the person.
             fps: frame rate, 1/s.
             smooth: whether the poses are smoothed.
+            evidence: of the frames, around the poses before smoothing; None for their estimates alone.
         """
         model, active = subjects.models[person], subjects.active_dofs[person]
         seams = self._seams(model, {k: of_one[person] for k, of_one in subjects.keyframes.items() if person in of_one})
@@ -132,7 +140,9 @@ class TrackedRows:
             trust = tracks.trust * repaired.trust
             agreed[frame] = agreement(model, repaired.pose, tracks.poses, trust)
         tracked, self._changes = self._changes, self._with_poses(model, agreed, active)
-        smoothed, by_motion = self.smoothed(subjects, person, fps) if smooth else ([*self._changes.values()], None)
+        smoothed, by_motion = [*self._changes.values()], None
+        if smooth:
+            smoothed, by_motion = self.smoothed(subjects, person, fps, evidence)
         self._changes = tracked
         features = self.run_features(model, by_motion)
         out = []
@@ -171,12 +181,6 @@ class TrackedRows:
         )
         return [change for change in found if change is not None]
 
-    def _final_covariance(self, frame: int, n_dofs: int) -> Array:
-        """Return the covariance of the pose of a frame, after its repair if there is one, (n_dofs, n_dofs)."""
-        repaired = self._repaired.get(frame)
-        known = None if repaired is None else repaired.covariance
-        return self.covariance(frame, n_dofs) if known is None else known
-
     def consensus(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Consensus:
         """Return the consensus of the tracked pose of a frame and of those by tracks without a view each.
 
@@ -184,6 +188,12 @@ class TrackedRows:
         """
         tracks = self.tracks[frame]
         return agreement(model, self._agreed_pose(model, frame, active), tracks.poses, tracks.trust)
+
+    def best_pose(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Array:
+        """Return the pose of a frame by all that is known before smoothing, (n_values,)."""
+        if frame in self._repaired:
+            return self._repaired[frame].pose
+        return self._agreed_pose(model, frame, active)
 
     def _agreed_pose(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Array:
         """Return the pose on which all that is known of a frame agrees, (n_values,)."""
@@ -197,6 +207,8 @@ class TrackedRows:
             others.append(self._other_poses[frame][1])
             apart = limbs_elsewhere(PosedBody(model, pose.values), PosedBody(model, others[-1]))
             trust.append(trust[0] * [limb.name not in apart for limb in limbs(model)])  # alike: the mean of both
+        if not others:
+            return pose.values
         return consensus(model, pose.values, np.array(others), np.array(trust), active).pose
 
     def _seams(self, model: BodyModel, keyframes: Mapping[int, Array]) -> dict[int, Seam]:
@@ -249,7 +261,9 @@ class TrackedRows:
         found = run_features(np.array([self._features[f] for f in before], dtype=np.float64), steps)
         return dict(zip(before, found, strict=True))
 
-    def smoothed(self, subjects: Subjects, person: int, fps: float) -> tuple[list[PoseChange], dict[int, Array]]:
+    def smoothed(
+        self, subjects: Subjects, person: int, fps: float, evidence: PathEvidence | None = None
+    ) -> tuple[list[PoseChange], dict[int, Array]]:
         """Return the rows with smoothed poses, in the order of time, and the poses with doubted limbs by motion alone.
 
         Everything else stays. A repaired pose is a measurement. Of others, a limb that is lost by the tracks without a
@@ -271,13 +285,14 @@ class TrackedRows:
             model,
             np.array(at) / fps,
             np.array([keyframes[f] if f in keyframes else rows[f].values for f in at]),
-            np.array([np.zeros((n, n)) if f in keyframes else self._final_covariance(f, n) for f in at]),
+            np.array([np.zeros((n, n)) if f in keyframes else self.covariance(f, n) for f in at]),
             np.array([f in keyframes for f in at]),
             np.array([m if f in self.tracks else m | m.any() for f, m in zip(at, measured, strict=True)]),
         )
-        without_doubts = replace(track, trusted=measured)
-        density = acceleration_density(without_doubts)
-        found, by_motion = smooth_poses(track, density), smooth_poses(without_doubts, density, kept_hz=0.0)
+        by_motion = smooth_poses(replace(track, trusted=measured), np.inf)
+        if evidence is not None:
+            track = replace(track, evidence=lambda t: evidence(at[t], person))
+        found = smooth_poses(track)
         out, here = [], found[0]
         for frame, pose in zip(at, found, strict=True):
             if frame in rows:

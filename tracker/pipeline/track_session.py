@@ -16,6 +16,7 @@ from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson
 from tracker.store.records import AssessmentChange, PoseChange
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
+from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
@@ -214,31 +215,34 @@ class TrackSession:
         frames = [k for leg in self.legs for k in leg.whole if all(k in r.tracks for r in self._rows.values())]
         if not frames or not isinstance(settings, EstimationSettings):
             return
-        bodies, known = {}, {}
-        for k in frames:
-            poses = [*self.tracked[k].poses]
-            for i, rows in self._rows.items():
-                if i not in subjects.keyframes_at(k):
-                    poses[i] = rows.consensus(subjects.models[i], k, subjects.active_dofs[i]).pose
-            known[k] = poses
-        velocities = velocities_of(subjects.models, known)
-        for k in frames:
-            moving = velocities(k) if any(self.observer.ahead_frames(k)) else [None] * len(subjects.models)
-            bodies[k] = tuple(map(PosedBody, subjects.models, known[k], moving))
+        bodies = self._bodies(frames)
         tracks = {i: rows.tracks for i, rows in self._rows.items()}
 
-        def covariance_of(frame: int, person: int) -> Array:
-            return self._rows[person].covariance(frame, subjects.models[person].n_dofs)
-
         others = {(k, i): poses for k in frames for i, poses in enumerate(self.tracked[k].alternatives)}
-        yield from RunRepair(self.observer, subjects, settings, bodies, tracks, covariance_of, others).steps()
+        yield from RunRepair(self.observer, subjects, settings, bodies, tracks, others).steps()
+
+    def _bodies(self, frames: Sequence[int]) -> dict[int, Bodies]:
+        """Return all people on some frames, by all that is known so far."""
+        subjects, known = self._held, dict[int, list[Array]]()
+        for k in frames:
+            known[k] = [*self.tracked[k].poses]
+            for i, rows in self._rows.items():
+                if i not in subjects.keyframes_at(k) and k in rows:
+                    known[k][i] = rows.best_pose(subjects.models[i], k, subjects.active_dofs[i])
+        velocities = velocities_of(subjects.models, known)
+        out = dict[int, Bodies]()
+        for k in frames:
+            moving = velocities(k) if any(self.observer.ahead_frames(k)) else [None] * len(subjects.models)
+            out[k] = tuple(map(PosedBody, subjects.models, known[k], moving))
+        return out
 
     def smoothing(self) -> Iterator[SmoothedRows]:
         """Take the consensus of all tracks, smooth it and assess it, as a single step: as a whole or not at all."""
         smooth = self.tracker.settings.smooth
         if smooth or any(rows.is_compared for rows in self._rows.values()):
             held, fps = self._held, self.legs[0].run.fps
-            found = (rows.finished(held, person, fps, smooth) for person, rows in self._rows.items())
+            evidence = self.tracker.evidence(self.observer, lambda: self._bodies(sorted(self.tracked)))
+            found = (rows.finished(held, person, fps, smooth, evidence) for person, rows in self._rows.items())
             assessed = (self._assessed_keyframes(person) for person in self._rows)
             yield SmoothedRows(
                 tuple(change for changes in found for change in changes),

@@ -1,13 +1,15 @@
 """The interface of a tracker: settings, a generator of pose estimates, and an optional backward pass."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeAlias
 
 import numpy as np
 
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
+from tracker.fitting.gauss_newton import ResidualBlock
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Region
 from tracker.geometry.ground_plane import GroundPlane
@@ -73,6 +75,12 @@ class TrackingRun:
                 _require_numbers(pose, f"keyframe of person {person + 1} at frame {frame}")
 
 
+BodiesByFrame: TypeAlias = Mapping[int, Sequence[PosedBody]]
+"""All people by frame."""
+PathEvidence: TypeAlias = Callable[[int, int], Sequence[ResidualBlock]]
+"""Returns the evidence of a frame for the pose of a person, by their numbers; others stay where they are."""
+
+
 class Tracker(Protocol):
     """A tracking method with its settings."""
 
@@ -89,6 +97,14 @@ class Tracker(Protocol):
         Args:
             run: the run whose frames were tracked; `start` and `frames` are not used.
             tracked: all frames, in the order of tracking, also those of an interrupted run.
+        """
+
+    def evidence(self, observer: Observer, bodies: Callable[[], BodiesByFrame]) -> PathEvidence | None:
+        """Return the evidence by which the whole path of a person is solved; None if the estimates tell all.
+
+        Args:
+            observer: of the cameras that were tracked with.
+            bodies: returns all people by frame, near their poses. It is called when evidence is asked for.
         """
 
 

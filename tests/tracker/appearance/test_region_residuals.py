@@ -10,7 +10,7 @@ from staging import SUIT
 from tracker.appearance.region_kernels import RegionTables
 from tracker.appearance.region_residuals import region_residuals
 from tracker.body.model import PosedBody
-from tracker.tracking.estimation.limb_repair import refined_by_regions
+from tracker.fitting.gauss_newton import GaussianPrior, solve
 
 pytestmark = pytest.mark.slow  # its kernels are compiled for the benchmark alone
 
@@ -33,6 +33,13 @@ def displaced(run, seed):
 def linear(run, known, regions, bodies, person, pose):
     block = region_residuals(known, regions, bodies, person)
     return block.linearize(run.model, pose, run.model.kinematics(pose))
+
+
+def refined(run, regions, bodies, covariance, active=None):
+    """The likeliest pose by region evidence and the covariance of where it starts."""
+    start = bodies[0].values
+    blocks = [GaussianPrior(start, np.linalg.inv(covariance)), region_residuals(run.known, regions, bodies, 0)]
+    return solve(run.model, start, blocks, active).pose
 
 
 def off_m(run, pose):
@@ -68,7 +75,7 @@ def test_a_displaced_pose_comes_back(run):
     for seed in range(4):
         bodies = (PosedBody(model, displaced(run, seed)),)
         before.append(off_m(run, bodies[0].values))
-        after.append(off_m(run, refined_by_regions(run.known, regions, bodies, 0, covariance).pose))
+        after.append(off_m(run, refined(run, regions, bodies, covariance)))
     assert np.mean(before) > 0.03 > 2 * np.mean(after)
 
 
@@ -77,7 +84,7 @@ def test_locked_degrees_of_freedom_stay(run):
     active = np.arange(model.n_dofs) % 3 > 0
     bodies = (PosedBody(model, displaced(run, 0)),)
     covariance = np.diag(np.where(model.dof_is_length, *STEPS) ** 2)
-    found = refined_by_regions(run.known, regions, bodies, 0, covariance, active).pose
+    found = refined(run, regions, bodies, covariance, active)
     assert np.array_equal(found[model.dof_value[~active]], bodies[0].values[model.dof_value[~active]])
     assert not np.allclose(found, bodies[0].values)
 

@@ -55,6 +55,9 @@ class Stands:
                 ((),), "chamfer",
             )  # fmt: skip
 
+    def evidence(self, observer, bodies):
+        return None
+
     def backward_pass(self, run, tracked):
         return iter(())
 

@@ -41,6 +41,9 @@ class TwoPasses:
                 "chamfer",
             )  # fmt: skip
 
+    def evidence(self, observer, bodies):
+        return None
+
     def backward_pass(self, run, tracked):
         frames = [f.frame for f in tracked]
         for first, last in pairwise(KEYFRAMES):

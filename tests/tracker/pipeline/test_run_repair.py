@@ -1,11 +1,10 @@
 """Repair of a run whose tracks all have a leg elsewhere on some frames."""
 
 from collections import Counter
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from region_scenes import CAMERAS, N_FRAMES, Walk, limb_of
+from region_scenes import N_FRAMES, Filmed, Walk, limb_of
 from staging import SUIT
 
 from tracker.body.limbs import limbs
@@ -20,44 +19,16 @@ from tracker.tracking.subjects import Subjects
 from tracker.tracking.view_tracks import FrameTracks
 
 
-class Filmed:
-    """Gives the evidence of a walk, as an observer does."""
-
-    working_cameras = CAMERAS
-
-    def __init__(self, walk):
-        self.walk, self.cameras = walk, [SimpleNamespace(camera=SimpleNamespace(name=n)) for n in ("LEFT", "RIGHT")]
-
-    def ahead_frames(self, frame):
-        return (0.0,) * len(CAMERAS)
-
-    def empty_scenes(self):
-        return (None,) * len(CAMERAS)
-
-    def evidence(self, frame, regions, *args, **kwargs):
-        return self.walk.views[frame]
-
-
 @pytest.fixture(scope="module")
 def walk(gavrila):
     return Walk(gavrila, SUIT)
 
 
-@pytest.fixture(autouse=True)
-def contours(monkeypatch):
-    """The frames have no edges. Contours would say as much about poses that were found as about tracked ones."""
-
-    def known(observer, frame, bodies, person, settings):
-        return 0.01**2 * np.eye(bodies[person].model.n_dofs)
-
-    monkeypatch.setattr(run_repair, "covariance_by_contours", known)
-
-
-def repaired(walk, keyframes=None, deviation=0.01, active=None, alternatives=None, seen=None):
+def repaired(walk, keyframes=None, replaces=True, active=None, alternatives=None, seen=None):
     """The steps of a repair whose tracks agree with one another on the wrong leg.
 
     `keyframes` are poses by frame that a person has set, `seen` those of the tracks where they are other ones.
-    `deviation` is the standard deviation of the tracked poses, rad and metres; None to compare them only.
+    `replaces` is whether better poses take their place.
     `alternatives` are poses by frame that the tracker found about as good.
     """
     others = {(k, 0): [pose] for k, pose in (alternatives or {}).items()}
@@ -69,8 +40,7 @@ def repaired(walk, keyframes=None, deviation=0.01, active=None, alternatives=Non
     }
     subjects = Subjects.of([walk.model], None, [active], {k: {0: pose} for k, pose in (keyframes or {}).items()})
     bodies = {k: (PosedBody(walk.model, pose),) for k, pose in (tracked | (keyframes or {})).items()}
-    known = None if deviation is None else lambda frame, person: deviation**2 * np.eye(walk.model.n_dofs)
-    return list(RunRepair(Filmed(walk), subjects, TrackSettings(), bodies, {0: tracks}, known, others).steps())
+    return list(RunRepair(Filmed(walk), subjects, TrackSettings(), bodies, {0: tracks}, others, replaces).steps())
 
 
 def off_m(walk, k, pose):
@@ -130,18 +100,18 @@ def test_a_keyframe_stays_and_is_doubted(walk):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("deviation", [0.01, None])
-def test_a_keyframe_is_compared_with_the_places_of_tracks_and_stays(walk, deviation):
+@pytest.mark.parametrize("replaces", [True, False])
+def test_a_keyframe_is_compared_with_the_places_of_tracks_and_stays(walk, replaces):
     """Also where poses are compared only."""
     leg = [x.name for x in limbs(walk.model)].index("right_calf")
     k = int(np.flatnonzero(walk.wrong)[0])
     true, wrong = walk.true[k][0].values, walk.tracked[k][0].values
-    right = repaired(walk, {k: true}, deviation)[-1].found[0][k]
+    right = repaired(walk, {k: true}, replaces)[-1].found[0][k]
     assert np.array_equal(right.pose, true)
     assert not right.trust[:, leg].any()
     assert right.alternatives == ()
     assert off_m(walk, k, right.refined) < 0.05
-    off = repaired(walk, {k: wrong}, deviation, seen={k: true})[-1].found[0][k]
+    off = repaired(walk, {k: wrong}, replaces, seen={k: true})[-1].found[0][k]
     assert np.array_equal(off.pose, wrong)
     (better,), (entry,) = off.alternatives, off.trace
     assert better.cost < -MIN_GAIN_NATS
@@ -168,26 +138,8 @@ def test_frames_beside_a_keyframe_that_is_wrong_are_examined_once(walk, monkeypa
 
 @pytest.mark.slow
 def test_poses_that_are_compared_only_stay(walk):
-    found = repaired(walk, deviation=None)[-1].found[0]
+    found = repaired(walk, replaces=False)[-1].found[0]
     assert all(np.array_equal(found[k].pose, body.values) for k, (body,) in enumerate(walk.tracked))
-
-
-@pytest.mark.slow
-def test_poses_are_refined_by_the_colors_of_the_run(walk, monkeypatch):
-    rng, model = np.random.default_rng(2), walk.model
-    steps = rng.normal(0, np.where(model.dof_is_length, 0.01, 0.02), (N_FRAMES, model.n_dofs))
-    off = [
-        [PosedBody(model, model.clip(model.retract(true.values, s)))]
-        for (true,), s in zip(walk.true, steps, strict=True)
-    ]
-    monkeypatch.setattr(walk, "tracked", off)
-    found = repaired(walk, deviation=0.02)[-1].found[0]
-    poses = [b.values for (b,) in off], [found[k].pose for k in range(N_FRAMES)]
-    before, after = (
-        np.mean([np.abs(model.points_world(p) - t.points_world).mean() for p, (t,) in zip(own, walk.true, strict=True)])
-        for own in poses
-    )
-    assert after < 0.7 * before
 
 
 @pytest.mark.slow
@@ -223,5 +175,5 @@ def test_alternatives_of_the_tracker_are_compared_again(walk, monkeypatch):
         (rival,) = found[k].alternatives  # neither the same pose, nor one that is clearly worse
         assert rival.cost == pytest.approx(1.5)
     assert all(found[k].alternatives == () for k in fine[2:])
-    (rival,) = repaired(walk, deviation=None)[-1].found[0][fine[0]].alternatives  # also of poses that are compared only
+    (rival,) = repaired(walk, replaces=False)[-1].found[0][fine[0]].alternatives  # also of poses that are compared only
     assert rival.cost == pytest.approx(1.5)

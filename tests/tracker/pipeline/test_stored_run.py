@@ -36,6 +36,9 @@ class Walker:
                 poses[i] = run.subjects.keyframes_at(frame).get(i, poses[i] + STEP_M * (np.arange(len(poses[i])) == 0))
             yield self.estimate(frame, poses, "lost" if frame == 3 else "good")
 
+    def evidence(self, observer, bodies):
+        return None
+
     def backward_pass(self, run, tracked):
         (lost,) = (f for f in tracked if "lost" in f.statuses)
         yield BackwardStep(lost.frame, 0, 1, 2)

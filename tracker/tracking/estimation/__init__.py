@@ -17,6 +17,7 @@ __all__ = [
     "limb_repair",
     "options",
     "part_evidence",
+    "path_evidence",
     "pose_paths",
     "pose_score",
     "settings",

@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 from tracker.appearance.part_colors import PartColors
 from tracker.appearance.region_limb_scorer import RegionLimbScorer
 from tracker.appearance.region_model import RegionFrame, RegionModel
-from tracker.appearance.region_residuals import region_residuals
 from tracker.body.limbs import Limb, limbs, movable
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.searches import Search
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
-from tracker.fitting.gauss_newton import Fit, GaussianPrior, solve
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
@@ -161,28 +159,6 @@ def better_limbs(
     if is_better:
         return Repair(best.pose, best.cost, gain, tuple(rest), entry, start.pose)
     return Repair(tracked, start.cost, gain, (best, *rest), entry, start.pose)
-
-
-def refined_by_regions(
-    known: RegionModel, regions: RegionFrame, bodies: Bodies, person: int, covariance: Array,
-    active_dofs: NDArray[np.bool_] | None = None,
-) -> Fit:  # fmt: skip
-    """Fit the likeliest pose of a person by what is known of it and by region evidence.
-
-    Args:
-        known: appearance of the people and places of the run.
-        regions: region evidence of the frame.
-        bodies: all people as tracked by contours; the others stay.
-        person: index of the person.
-        covariance: of the tracked pose, (n_dofs, n_dofs).
-        active_dofs: degrees of freedom that may move, (n_dofs,); None: all.
-    """
-    model, start = bodies[person].model, bodies[person].values
-    blocks = [
-        GaussianPrior(start, np.asarray(np.linalg.inv(covariance), dtype=np.float64)),
-        region_residuals(known, regions, bodies, person),
-    ]
-    return solve(model, start, blocks, active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
 
 
 def _with_regions(

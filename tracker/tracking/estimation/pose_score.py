@@ -16,7 +16,7 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.clocked_residuals import PersonResiduals, person_residuals
 from tracker.fitting.contour_residuals import MIN_DECREASE
-from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, covariance
+from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.fitting.interpenetration import SelfPenetration
@@ -157,23 +157,3 @@ def scorer_without_prediction(
     known = None if settings.recover is None else part_colors
     recover = settings.recover or RecoverSettings()
     return PoseScorer.of(residuals, priors, Colors(views, bodies, person), known, recover, active_dofs)
-
-
-def covariance_by_contours(
-    observer: Observer, frame: int, bodies: Bodies, person: int, settings: EstimationSettings
-) -> Array:
-    """Return the covariance of the pose of a person on a frame, by its contours and what is known of every frame.
-
-    Args:
-        observer: of the recording.
-        frame: frame number.
-        bodies: all people.
-        person: index of the person.
-        settings: of the tracker.
-
-    Returns:
-        (n_dofs, n_dofs), rad and metres.
-    """
-    model, pose = bodies[person].model, bodies[person].values
-    scorer = scorer_without_prediction(common_evidence(observer, frame, [bodies], settings), bodies, person, settings)
-    return covariance(model, solver_of(model)(model, pose, scorer.blocks, max_iterations=0))

@@ -19,7 +19,6 @@ from tracker.fitting.gauss_newton import (
 )
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.motion.smoothing import START_VELOCITY
 from tracker.tracking.voxel.figure import (
     N_PARTS,
     figure_of,
@@ -31,6 +30,10 @@ from tracker.tracking.voxel.figure import (
 from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState, Layout, point_jacobians
+
+_START_VELOCITY = 5.0
+"""Standard deviation of a velocity before the first frame, rad/s or m/s. With 2 rad/s and 0.5 m/s, the tracker is off
+by 43.9 mm on `walk`, with this by 43.6."""
 
 
 class BodyPose(NamedTuple):
@@ -67,8 +70,8 @@ def state_of(model: BodyModel, past: Sequence[Array], dt: float, settings: Voxel
     variances[layout.turns_at] = settings.start_turn**2
     variances[layout.center_at] = settings.start_m**2
     variances[layout.sizes_at] = settings.start_size_m**2
-    variances[layout.velocity_at] = START_VELOCITY**2
-    variances[layout.turn_rates_at] = START_VELOCITY**2
+    variances[layout.velocity_at] = _START_VELOCITY**2
+    variances[layout.turn_rates_at] = _START_VELOCITY**2
     return FilterState(
         with_shoulders_of(of, body, rotations[0], center), layout, rigid.quaternion_from_matrix(rotations),
         of.sizes.copy(), center, velocity, rates, np.diag(variances),
