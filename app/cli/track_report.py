@@ -10,7 +10,7 @@ from app.runtime.progress import Reporter
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import Remedy
 from tracker.pipeline.run_repair import RepairStep
-from tracker.pipeline.track_session import AuditStep
+from tracker.pipeline.track_session import AuditStep, SolveStep
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 if TYPE_CHECKING:
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from tracker.session.session import Session
 
 _PASSES = {
-    BackwardStep: "tracking back", AuditStep: "checking each camera", RepairStep: "comparing with the run's colours"
+    BackwardStep: "tracking back", AuditStep: "checking each camera", RepairStep: "comparing with the run's colours",
+    SolveStep: "solving the whole path",
 }  # fmt: skip
 """Passes after the first, by their steps."""
 
@@ -70,7 +71,7 @@ class ChainProgress:
             if len(run.costs_px) == 1:
                 self._count(len(run.frames), "tracking")
             self._tick()
-        elif isinstance(step, BackwardStep | AuditStep | RepairStep):
+        elif isinstance(step, BackwardStep | AuditStep | RepairStep | SolveStep):
             if self._pass != (type(step), step.total):  # the repair begins again where it has found something
                 self._pass = type(step), step.total
                 self._count(step.total - step.done + 1, _PASSES[type(step)])

@@ -10,7 +10,7 @@ Line = tuple[float, float, float, float]
 """x0, y0, x1, y1, undistorted px."""
 
 
-TrackStage = Literal["tracking", "back", "audit"]
+TrackStage = Literal["tracking", "back", "audit", "solve"]
 """Stages of a run: all frames, lost people backward, and all frames without each camera in turn."""
 
 

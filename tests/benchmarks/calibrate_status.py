@@ -29,6 +29,7 @@ from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_
 from tracker.acquisition.from_joints import height_from_joints, place_joints
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.progress import result_of
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import fit_to_points
@@ -181,7 +182,7 @@ def _rows_of(
     for found in final:
         for change in tracked_changes([found], stored, [person], subjects.keyframes, settings):
             kept.add(change, found.covariances[person], found.qualities[person])
-    features = kept.run_features(model, kept.smoothed(subjects, person, footage.fps)[1])
+    features = kept.run_features(model, result_of(kept.smoothed(subjects, person, footage.fps))[1])
     joints = {int(f): dict(zip(truth.names, p, strict=True)) for f, p in zip(truth.frames, truth.points, strict=True)}
     for found in final:
         if found.qualities[person] is not None and found.frame in joints:

@@ -1,7 +1,9 @@
 """How long work reports its progress."""
 
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Generator
+from typing import Protocol, TypeVar
+
+T = TypeVar("T")
 
 
 class Report(Protocol):
@@ -44,3 +46,13 @@ def stages(report: Report, *names: str) -> list[Callable[[float], None]]:
 
 def unreported(stage: str, share: float, text: str = "", /) -> None:
     """Show no progress."""
+
+
+def result_of(steps: Generator[object, None, T]) -> T:
+    """Do all steps of some work; return its result."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            result: T = end.value
+            return result

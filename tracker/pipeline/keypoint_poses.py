@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.acquisition.from_keypoints import fit_to_keypoints, learn_seen_body
 from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.progress import Report, part_of, unreported
+from tracker.compute.progress import Report, part_of, result_of, unreported
 from tracker.errors import TrackerError
 from tracker.evidence.keypoints import PersonKeypoints
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, covariance, solve, weak_pull
@@ -113,7 +113,7 @@ def keypoint_poses(
         np.array([covariance(model, fits[k]) for k in frames]), np.zeros(len(frames), np.bool_),
         np.ones((len(frames), n), np.bool_),
     )  # fmt: skip
-    poses = smooth_poses(track)
+    poses = result_of(smooth_poses(track))
     return {k: PosedBody(model, pose) for k, pose in zip(frames, poses, strict=True)}
 
 

@@ -126,6 +126,7 @@ class RunRepair:
             if not changed or first == 2 * n * (_MAX_TRIES - 1):
                 break
             first += 2 * n
+        self._observe(changed)
         for k in changed:
             scores[k] = known.score(self._regions(known, k), self._bodies[k]).nats
         yield RepairStep(first + 2 * n, first + 2 * n, self._results(scores))

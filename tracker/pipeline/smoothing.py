@@ -4,7 +4,7 @@ A run keeps covariances and features of its frames. It gets rows that replace th
 """
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.progress import result_of
 from tracker.errors import DamagedStoreError
 from tracker.fitting.consensus import Consensus, agreement, consensus
 from tracker.fitting.gauss_newton import with_locked_dofs
@@ -119,8 +120,8 @@ class TrackedRows:
 
     def finished(
         self, subjects: Subjects, person: int, fps: float, smooth: bool = True, evidence: PathEvidence | None = None
-    ) -> list[PoseChange]:
-        """Return the rows with consensus poses, smoothed, and their final statuses, in the order of time.
+    ) -> Generator[int, None, list[PoseChange]]:
+        """Find the consensus poses, smoothed, and their final statuses.
 
         Costs stay those of the tracked pose, and so does the status of a pose whose limbs were not assessed.
         Alternatives stay where the repair has not compared them.
@@ -131,6 +132,12 @@ class TrackedRows:
             fps: frame rate, 1/s.
             smooth: whether the poses are smoothed.
             evidence: of the frames, around the poses before smoothing; None for their estimates alone.
+
+        Yields:
+            The number of frames whose evidence was read so far.
+
+        Returns:
+            Their rows, in the order of time.
         """
         model, active = subjects.models[person], subjects.active_dofs[person]
         seams = self._seams(model, {k: of_one[person] for k, of_one in subjects.keyframes.items() if person in of_one})
@@ -139,11 +146,10 @@ class TrackedRows:
             tracks, repaired = self.tracks[frame], self._repaired[frame]
             trust = tracks.trust * repaired.trust
             agreed[frame] = agreement(model, repaired.pose, tracks.poses, trust)
-        tracked, self._changes = self._changes, self._with_poses(model, agreed, active)
-        smoothed, by_motion = [*self._changes.values()], None
+        changes = self._with_poses(model, agreed, active)
+        smoothed, by_motion = [*changes.values()], None
         if smooth:
-            smoothed, by_motion = self.smoothed(subjects, person, fps, evidence)
-        self._changes = tracked
+            smoothed, by_motion = yield from self.smoothed(subjects, person, fps, evidence, changes)
         features = self.run_features(model, by_motion)
         out = []
         for change in smoothed:
@@ -262,19 +268,30 @@ class TrackedRows:
         return dict(zip(before, found, strict=True))
 
     def smoothed(
-        self, subjects: Subjects, person: int, fps: float, evidence: PathEvidence | None = None
-    ) -> tuple[list[PoseChange], dict[int, Array]]:
-        """Return the rows with smoothed poses, in the order of time, and the poses with doubted limbs by motion alone.
+        self, subjects: Subjects, person: int, fps: float, evidence: PathEvidence | None = None,
+        changes: Mapping[int, PoseChange] | None = None,
+    ) -> Generator[int, None, tuple[list[PoseChange], dict[int, Array]]]:  # fmt: skip
+        """Smooth the poses; see `finished`.
 
         Everything else stays. A repaired pose is a measurement. Of others, a limb that is lost by the tracks without a
         view each is none. One that its own frame alone calls lost is: most of these are right, and the steps to their
         motion before and after, in which fast motion is not kept, tell more about them. Nothing of a lost frame is a
-        measurement if no limb is known to be lost. Locked degrees of freedom keep their values. The arguments are those
-        of `finished`.
+        measurement if no limb is known to be lost. Locked degrees of freedom keep their values.
+
+        Args:
+            subjects: of the run.
+            person: index of the person.
+            fps: frame rate, 1/s.
+            evidence: see `finished`.
+            changes: the rows to smooth, by frame; those of the tracker by default.
+
+        Returns:
+            The rows with smoothed poses, in the order of time, and the poses with doubted limbs by motion alone.
         """
         model, active = subjects.models[person], subjects.active_dofs[person]
         keyframes = {f: of_people[person] for f, of_people in subjects.keyframes.items() if person in of_people}
-        rows = {f: c.pose for f, c in self._changes.items() if f not in keyframes and c.pose is not None}
+        changes = self._changes if changes is None else changes
+        rows = {f: c.pose for f, c in changes.items() if f not in keyframes and c.pose is not None}
         if not rows:
             return [], {}
         at = sorted({*rows, *keyframes})
@@ -288,17 +305,17 @@ class TrackedRows:
             np.array([np.zeros((n, n)) if f in keyframes else self.covariance(f, n) for f in at]),
             np.array([f in keyframes for f in at]),
             np.array([m if f in self.tracks else m | m.any() for f, m in zip(at, measured, strict=True)]),
+            active,
+            None if evidence is None else lambda t: evidence(at[t], person),
         )
-        by_motion = smooth_poses(replace(track, trusted=measured), np.inf)
-        if evidence is not None:
-            track = replace(track, evidence=lambda t: evidence(at[t], person))
-        found = smooth_poses(track)
+        by_motion = result_of(smooth_poses(replace(track, trusted=measured, evidence=None), np.inf))
+        found = yield from smooth_poses(track)
         out, here = [], found[0]
         for frame, pose in zip(at, found, strict=True):
             if frame in rows:
                 near = nearest_equivalent(model, pose, here, active)
                 here = with_locked_dofs(model, near, rows[frame].values, active)
-                out.append(replace(self._changes[frame], pose=replace(rows[frame], values=here)))
+                out.append(replace(changes[frame], pose=replace(rows[frame], values=here)))
             else:
                 here = pose
         return out, dict(zip(at, by_motion, strict=True))

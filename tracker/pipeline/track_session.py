@@ -1,7 +1,7 @@
 """Drive one run of a tracker over a session: both passes, smoothing, and saving as one entry of the history."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -44,6 +44,14 @@ class AuditStep(NamedTuple):
     total: int
 
 
+class SolveStep(NamedTuple):
+    """Progress of the solve of the paths."""
+
+    done: int
+    """Frames so far."""
+    total: int
+
+
 class CameraStep(NamedTuple):
     """The poses of a finished run contradict the calibration."""
 
@@ -51,7 +59,7 @@ class CameraStep(NamedTuple):
     """A sentence for the user."""
 
 
-Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SmoothedRows | CameraStep
+Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SolveStep | SmoothedRows | CameraStep
 """A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit or of the
 repair, all smoothed poses, or a camera that is off."""
 
@@ -98,6 +106,18 @@ def _with_starts(legs: Sequence[Leg]) -> Subjects:
             if frame == leg.start:
                 keyframes[frame] = {**dict(enumerate(poses)), **keyframes.get(frame, {})}
     return replace(subjects, keyframes=keyframes)
+
+
+def _solve_steps(
+    steps: Generator[int, None, list[PoseChange]], before: int, total: int
+) -> Generator[SolveStep, None, list[PoseChange]]:
+    """Report how many frames of all people steps have read; return their result."""
+    while True:
+        try:
+            yield SolveStep(before + next(steps), total)
+        except StopIteration as end:
+            found: list[PoseChange] = end.value
+            return found
 
 
 class TrackSession:
@@ -236,18 +256,18 @@ class TrackSession:
             out[k] = tuple(map(PosedBody, subjects.models, known[k], moving))
         return out
 
-    def smoothing(self) -> Iterator[SmoothedRows]:
-        """Take the consensus of all tracks, smooth it and assess it, as a single step: as a whole or not at all."""
+    def smoothing(self) -> Iterator[SolveStep | SmoothedRows]:
+        """Solve the paths of all people and assess them. Their rows come last: as a whole or not at all."""
         smooth = self.tracker.settings.smooth
         if smooth or any(rows.is_compared for rows in self._rows.values()):
-            held, fps = self._held, self.legs[0].run.fps
+            held, fps, changes = self._held, self.legs[0].run.fps, list[PoseChange]()
             evidence = self.tracker.evidence(self.observer, lambda: self._bodies(sorted(self.tracked)))
-            found = (rows.finished(held, person, fps, smooth, evidence) for person, rows in self._rows.items())
+            n = len(self.tracked)
+            for i, (person, rows) in enumerate(self._rows.items()):
+                steps = rows.finished(held, person, fps, smooth, evidence)
+                changes += yield from _solve_steps(steps, i * n, len(self._rows) * n)
             assessed = (self._assessed_keyframes(person) for person in self._rows)
-            yield SmoothedRows(
-                tuple(change for changes in found for change in changes),
-                tuple(change for changes in assessed for change in changes),
-            )
+            yield SmoothedRows(tuple(changes), tuple(change for found in assessed for change in found))
         self.finished = True
 
     def cameras(self) -> Iterator[CameraStep]:
@@ -275,6 +295,8 @@ class TrackSession:
             return
         if isinstance(step, CameraStep):
             self.contradiction = step.contradiction
+            return
+        if isinstance(step, SolveStep):
             return
         if isinstance(step, AuditStep):
             for person, tracks in step.tracks.items():

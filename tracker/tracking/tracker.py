@@ -78,7 +78,8 @@ class TrackingRun:
 BodiesByFrame: TypeAlias = Mapping[int, Sequence[PosedBody]]
 """All people by frame."""
 PathEvidence: TypeAlias = Callable[[int, int], Sequence[ResidualBlock]]
-"""Returns the evidence of a frame for the pose of a person, by their numbers; others stay where they are."""
+"""Returns the evidence of a frame for the pose of a person, by their numbers; others stay where they are. There is none
+on frames without bodies."""
 
 
 class Tracker(Protocol):

@@ -36,7 +36,7 @@ class Group(NamedTuple):
     points: Mask
     """Which of the points belong to it, (P,)."""
     n_dofs: float
-    """Number of degrees of freedom that move it in the trunk, or against it."""
+    """Number of degrees of freedom of the limb, or of the rest of the body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class MotionModel:
         return np.array([g.n_dofs for g in self.groups])
 
     def weights(self, squares_m2: Array) -> Array:
-        """Return the weights by which Student's t counts squared accelerations, (T, P), 1 for usual ones, (T, P)."""
+        """Return the weights by which Student's t counts squared accelerations, (T, P)."""
         if np.isinf(self.freedom):
             return np.ones_like(squares_m2)
         of_groups = (self.freedom + self._n_dofs) / (self.freedom + self._sums(squares_m2))

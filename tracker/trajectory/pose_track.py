@@ -4,7 +4,7 @@ A pose is a measurement with the covariance of its estimate. A limb that is not 
 after. See `tracker.trajectory.solve`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +36,15 @@ class PoseTrack:
     """Whether a pose is exact, (T,): a keyframe."""
     trusted: Mask
     """Whether a degree of freedom is measured, (T, n_dofs): not in a lost limb. All of a fixed pose are."""
+    active_dofs: Mask | None = None
+    """Degrees of freedom that may change, (n_dofs,); None: all."""
     evidence: Callable[[int], Sequence[ResidualBlock]] | None = None
-    """Returns the evidence of a frame, by its place, that tells more than the estimate where all is trusted."""
+    """Returns the evidence of a frame, by its place, that tells more than the estimate where all is trusted; none where
+    there is no more."""
 
 
-def smooth_poses(track: PoseTrack, freedom: float = FREEDOM) -> Array:
-    """Return the smoothed poses within the joint limits, (T, n_values); fixed poses are returned as they are.
+def smooth_poses(track: PoseTrack, freedom: float = FREEDOM) -> Generator[int, None, Array]:
+    """Smooth poses within the joint limits; fixed poses are returned as they are.
 
     Frames of which nothing is trusted are interpolated where trusted ones lie on both sides; before the first and after
     the last trusted frame they stay as they are. So do all where too few are trusted to show any motion.
@@ -49,6 +52,12 @@ def smooth_poses(track: PoseTrack, freedom: float = FREEDOM) -> Array:
     Args:
         track: the poses.
         freedom: see `PosedPath.freedom`.
+
+    Yields:
+        The number of frames whose evidence was read so far.
+
+    Returns:
+        The smoothed poses, (T, n_values).
     """
     known, out = np.flatnonzero(track.trusted.any(axis=1) | track.fixed), np.array(track.poses)
     if len(known) > MAX_ORDER:
@@ -56,20 +65,22 @@ def smooth_poses(track: PoseTrack, freedom: float = FREEDOM) -> Array:
 
         def evidence(t: int) -> Sequence[ResidualBlock]:
             at = t + used.start
-            if track.evidence is not None and track.trusted[at].all():
-                return track.evidence(at)
-            return [_measurement(track, at)]
+            seen = track.evidence(at) if track.evidence is not None and track.trusted[at].all() else ()
+            return seen or [_measurement(track, at)]
 
         path = PosedPath(
-            track.model, track.times_s[used], track.poses[used], evidence, track.fixed[used], freedom=freedom
-        )
-        out[used] = solve_path(path).poses
+            track.model, track.times_s[used], track.poses[used], evidence, track.fixed[used], track.active_dofs,
+            track.trusted[used], freedom,
+        )  # fmt: skip
+        out[used] = yield from solve_path(path)
     return out
 
 
 def _measurement(track: PoseTrack, t: int) -> GaussianPrior:
-    """Return what the estimate of a pose tells."""
+    """Return what the estimate of a pose says about what of it is trusted."""
     variances, directions = np.linalg.eigh(track.covariances[t])
-    information = directions / np.clip(variances, FLOOR_M2, _LINEAR**2) @ directions.T
-    information *= np.outer(track.trusted[t], track.trusted[t])
+    covariance = directions * np.clip(variances, FLOOR_M2, _LINEAR**2) @ directions.T
+    own = np.ix_(track.trusted[t], track.trusted[t])
+    information = np.zeros_like(covariance)
+    information[own] = np.linalg.inv(covariance[own])
     return GaussianPrior(track.poses[t], information)

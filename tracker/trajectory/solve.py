@@ -1,13 +1,13 @@
 """All poses of a run by one least-squares solve: the evidence of every frame, and Student's t of the accelerations.
 
 Levenberg-Marquardt over the whole path, with joint limits as an active set. The normal equations are banded by frames.
-The scales of the accelerations are learnt in turn with the poses, by expectation maximization: the covariance of the
-path counts, else the smoothest path would make itself ever smoother (R. H. Shumway, D. S. Stoffer 1982, J. Time Series
-Anal. 3:253).
+The scales of the accelerations are learnt by expectation maximization (R. H. Shumway, D. S. Stoffer 1982, J. Time
+Series Anal. 3:253). The covariance of the path counts: without it the smoothest path makes itself ever smoother.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -31,10 +31,10 @@ from tracker.trajectory.motion_model import FREEDOM, MotionModel, motion_points
 
 _ROUNDS = 10
 """Rounds of expectation maximization. With three and with thirty, the mean error of joints differs by 0.04 mm on `walk`
-and of a child."""
+and on a simulated child."""
 _BLOCK_FRAMES, _OVERLAP_FRAMES = 120, 20
-"""Frames are solved in blocks, because the evidence of one takes 5 to 10 MB. Frames beyond the overlap hardly matter
-to a pose."""
+"""Frames are solved in blocks, because the evidence of one takes 5 to 10 MB. Frames that are seen beyond the overlap
+hardly matter to a pose."""
 FRAMES_AT_ONCE = _BLOCK_FRAMES + 2 * _OVERLAP_FRAMES
 """Largest number of frames whose evidence is held at once."""
 
@@ -54,40 +54,49 @@ class PosedPath:
     """Whether a pose is exact, (T,): a keyframe."""
     active_dofs: Mask | None = None
     """Degrees of freedom that may change, (n_dofs,); None: all."""
+    seen: Mask | None = None
+    """Whether the evidence shows a degree of freedom, (T, n_dofs); None: all of them. Others follow their motion."""
     freedom: float = FREEDOM
     """Degrees of freedom of Student's t of the accelerations, once their scales are learnt; infinite for a Gaussian, to
     which a leap is an error."""
 
 
-class SolvedPath(NamedTuple):
-    """The most likely poses."""
+def solve_path(path: PosedPath) -> Generator[int, None, Array]:
+    """Find the most likely poses of a path; fixed poses and locked degrees of freedom stay.
 
-    poses: Array
-    """(T, n_values), within the joint limits."""
-    covariances: Array
-    """Of each pose by the whole path, (T, n_dofs, n_dofs), rad and metres; zero of what is fixed or locked."""
+    Yields:
+        The number of frames whose evidence was read so far, which takes most of the time.
 
-
-def solve_path(
-    path: PosedPath, step: Callable[[], None] = lambda: None, motion: MotionModel | None = None
-) -> SolvedPath:
-    """Return the most likely poses of a path; fixed poses and locked degrees of freedom stay.
-
-    Args:
-        path: the path.
-        step: called before each step; an exception that it raises ends the work.
-        motion: how the body moves; None learns it from the path, for each block of frames.
+    Returns:
+        The poses within the joint limits, (T, n_values).
     """
-    T, n = len(path.poses), path.model.n_dofs
-    poses, covariances = np.array(path.poses), np.zeros((T, n, n))
-    with one_blas_thread():
-        for first in range(0, T, _BLOCK_FRAMES):
-            end = min(T, first + _BLOCK_FRAMES)
-            used = slice(max(0, first - _OVERLAP_FRAMES), min(T, end + _OVERLAP_FRAMES))
-            own = slice(first - used.start, end - used.start)
-            found = _Solver(path, used, step, motion).solve()
-            poses[first:end], covariances[first:end] = found.poses[own], found.covariances[own]
-    return SolvedPath(poses, covariances)
+    poses, n_read = np.array(path.poses), 0
+    for own, used in _blocks(path):
+        solver = _Solver(path, used)
+        for t in range(used.start, used.stop):
+            solver.read(t)
+            n_read += own.start <= t < own.stop
+            yield n_read
+        poses[own] = solver.solve()[own.start - used.start : own.stop - used.start]
+    return poses
+
+
+def _blocks(path: PosedPath) -> Iterator[tuple[slice, slice]]:
+    """Yield the frames of each block, and those that it is solved with.
+
+    Whatever is not seen at a border is solved with the frames that show it again.
+    """
+    T = len(path.poses)
+    seen = np.ones((T, path.model.n_dofs), bool) if path.seen is None else path.seen | path.fixed[:, None]
+    bounds = np.linspace(0, T, -(-T // _BLOCK_FRAMES) + 1).round().astype(int).tolist()
+    for first, end in pairwise(bounds):
+        start, stop = first - _unseen_frames(seen[:first][::-1]), end + _unseen_frames(seen[end:])
+        yield slice(first, end), slice(max(0, start - _OVERLAP_FRAMES), min(T, stop + _OVERLAP_FRAMES))
+
+
+def _unseen_frames(seen: Mask) -> int:
+    """Return the frames, (n, n_dofs), before all that is ever seen has been seen."""
+    return int(np.where(seen.any(axis=0), seen.argmax(axis=0), 0).max(initial=0)) if len(seen) else 0
 
 
 class _State(NamedTuple):
@@ -107,47 +116,50 @@ class _State(NamedTuple):
     """Pose and equations of the evidence of each frame, where they were linearized last."""
 
 
-@dataclass(eq=False)
 class _Solver:
-    path: PosedPath
-    used: slice
-    """Frames of the path that are solved."""
-    step: Callable[[], None]
-    motion: MotionModel | None = None
-    reach: float = CLOSE_ENOUGH
-    """Distance, rad or metres, up to which the evidence of a frame is taken from where it was linearized."""
-    spread_m2: Array = field(default_factory=lambda: np.zeros(1))
-    """Variance of the accelerations by the uncertainty of the path, (T - 2, P), or zero."""
+    """Solves some frames of a path."""
 
-    def __post_init__(self) -> None:
-        path, model = self.path, self.path.model
-        self.fixed = path.fixed[self.used]
+    def __init__(self, path: PosedPath, used: slice) -> None:
+        """Prepare; `read` comes next."""
+        model = path.model
+        self.path, self.fixed = path, path.fixed[used]
         # The cost of each frame is rough on its own: their sum is rougher by the root of their number.
         self.min_decrease = MIN_DECREASE * np.sqrt(len(self.fixed))
         self.points = motion_points(model)
-        self.coefficients = _acceleration(path.times_s[self.used])
+        self.coefficients = _acceleration(path.times_s[used])
         active = np.ones(model.n_dofs, bool) if path.active_dofs is None else path.active_dofs
         self.locked = self.fixed[:, None] | ~active
         self.locked_values = value_mask(model, ~active)
-        at = range(len(path.poses))[self.used]
-        self.evidence = [() if f else path.evidence(t) for t, f in zip(at, self.fixed, strict=True)]
+        self.start = [self._within_limits(p, f) for p, f in zip(path.poses[used], self.fixed, strict=True)]
+        self.evidence: list[Sequence[ResidualBlock]] = []
+        self.motion: MotionModel | None = None
+        self.reach = CLOSE_ENOUGH
+        """Distance, rad or metres, up to which the evidence of a frame is taken from where it was linearized."""
+        self.spread_m2 = np.zeros(1)
+        """Variance of the accelerations by the uncertainty of the path, (T - 2, P), or zero."""
 
-    def solve(self) -> SolvedPath:
-        first = here = self._linearized([*self.path.poses[self.used]], None)
-        if self.motion is None and len(here.squares_m2):
-            # A smooth first guess shows too little motion: each frame is taken to be as unsure as it is alone.
-            self._learn(here, self._inverse(here._replace(hessian=here.hessian[:1])))
-            self.reach = np.inf  # the evidence stays as it is linearized: learning takes many steps
-            for _ in range(_ROUNDS):
-                here = self._descended(self._linearized(here.poses, here))
-                self._learn(here, self._inverse(here))
-            self.reach = CLOSE_ENOUGH
-        if self.motion is not None:
-            self.motion = replace(self.motion, freedom=self.path.freedom)
-        here = self._descended(self._linearized(first.poses, first))
-        covariances = self._inverse(here)[0]
-        covariances[self.locked[:, :, None] | self.locked[:, None, :]] = 0.0
-        return SolvedPath(np.array(here.poses), covariances)
+    def _within_limits(self, pose: Array, is_fixed: bool) -> Array:
+        return pose if is_fixed else np.where(self.locked_values, pose, self.path.model.clip(pose))
+
+    def read(self, t: int) -> None:
+        """Read the evidence of the next frame, given by its place in the path."""
+        self.evidence.append(() if self.path.fixed[t] else self.path.evidence(t))
+
+    def solve(self) -> Array:
+        """Return the most likely poses, (T, n_values)."""
+        with one_blas_thread():
+            first = here = self._linearized(self.start, None)
+            if len(here.squares_m2):
+                # A smooth first guess shows too little motion: each frame is taken to be as unsure as it is alone.
+                self._learn(here, self._inverse(here._replace(hessian=here.hessian[:1])))
+                self.reach = np.inf  # the evidence stays as it is linearized: learning takes many steps
+                for _ in range(_ROUNDS):
+                    here = self._descended(self._linearized(here.poses, here))
+                    self._learn(here, self._inverse(here))
+                self.reach = CLOSE_ENOUGH
+            if self.motion is not None:
+                self.motion = replace(self.motion, freedom=self.path.freedom)
+            return np.array(self._descended(self._linearized(first.poses, first)).poses)
 
     def _learn(self, here: _State, inverse: Array) -> None:
         """Learn the motion from the path and its covariance; see `_inverse`."""
@@ -175,7 +187,6 @@ class _Solver:
         """Return the path after a step that lowers its cost, the same if none is worth it, and the next damping."""
         held = self._held(here)
         while damping <= DAMPING.most:
-            self.step()
             found = self._step(here, held, damping)
             if found is not None:
                 there, promised = found
@@ -193,12 +204,13 @@ class _Solver:
             return None
         gradient = np.where(held, 0.0, here.gradient)
         change = -known.solve(gradient)
-        promised = -0.5 * float(np.vdot(gradient, change))
+        damped = damping * np.einsum("tii->ti", here.hessian[0]) * change
+        promised = 0.5 * float(np.vdot(damped - gradient, change))
         if promised < self.min_decrease:
             return here, promised
         model = self.path.model
         moved = [
-            pose if fixed else np.where(self.locked_values, pose, model.clip(model.retract(pose, own)))
+            pose if fixed else self._within_limits(np.where(self.locked_values, pose, model.retract(pose, own)), False)
             for pose, own, fixed in zip(here.poses, change, self.fixed, strict=True)
         ]
         return self._linearized(moved, here), promised

@@ -31,7 +31,7 @@ from tracker.observations.stored import list_observations, load_observations
 from tracker.pipeline.chain import unplaced
 from tracker.pipeline.keypoint_evidence import find_by_keypoints, read_points
 from tracker.pipeline.keypoint_poses import imported_changes, poses_of
-from tracker.pipeline.track_session import AuditStep, Step, TrackSession
+from tracker.pipeline.track_session import AuditStep, SolveStep, Step, TrackSession
 from tracker.plausibility.examine import plan_examined_import
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -325,6 +325,8 @@ class _ShownProgress:
             self.report("improving backward", step.done / step.total)
         elif isinstance(step, AuditStep):
             self.report("tracking without each view", step.done / step.total)
+        elif isinstance(step, SolveStep):
+            self.report("solving the whole path", step.done / step.total)
 
 
 def _described(session: Session, name: str) -> ObservedSet:

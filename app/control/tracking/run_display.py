@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
-from app.state.progress import TrackState
+from app.state.progress import TrackStage, TrackState
 from app.state.state import StateChanges, finite_or_none
 from tracker.pipeline.run_repair import RepairStep
-from tracker.pipeline.track_session import AuditStep, SmoothedRows, Step, TrackSession
+from tracker.pipeline.track_session import AuditStep, SmoothedRows, SolveStep, Step, TrackSession
 from tracker.tracking import confidence
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
@@ -36,8 +36,9 @@ class RunDisplay:
         """
         if isinstance(step, SmoothedRows):
             self._show_finished()
-        elif isinstance(step, AuditStep | RepairStep):
-            track = replace(self._session_state.state.track, stage="audit", done=step.done, total=step.total)
+        elif isinstance(step, AuditStep | RepairStep | SolveStep):
+            stage: TrackStage = "solve" if isinstance(step, SolveStep) else "audit"
+            track = replace(self._session_state.state.track, stage=stage, done=step.done, total=step.total)
             self._session_state.set(track=replace(track, running=self._is_running()))
         elif isinstance(step, BackwardStep):
             self._show_improved(step, seconds)

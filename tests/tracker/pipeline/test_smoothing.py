@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from tracker.body.limbs import limbs
+from tracker.compute.progress import result_of
 from tracker.errors import DamagedStoreError
+from tracker.fitting.gauss_newton import GaussianPrior, PointTargets
 from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
@@ -226,7 +228,7 @@ def test_reasons_follow_the_final_status():
     for frame, remark in enumerate(remarks):
         pose = PoseRecord(model.neutral(), (), 1, status="doubtful", remark=remark, limbs_lost=(0.1,) * 5)
         rows.add(PoseChange("person", frame, pose), 1e-4 * np.eye(model.n_dofs), doubtful)
-    found = [c.pose for c in rows.finished(Subjects.of([model]), 0, 25.0)]
+    found = [c.pose for c in result_of(rows.finished(Subjects.of([model]), 0, 25.0))]
     assert [p.status for p in found] == ["good"] * 4
     assert [p.remark for p in found] == ["", "left arm relocated", "", "body searched"]
 
@@ -238,8 +240,8 @@ def test_an_interrupted_run_of_an_older_version_keeps_its_statuses():
         pose = PoseRecord(model.neutral(), (), 1, status="doubtful", remark="x", limbs_lost=(0.1,) * 5)
         rows.add(PoseChange("person", frame, pose), 1e-4 * np.eye(model.n_dofs), CLEAR)
         old.restore(PoseChange("person", frame, pose), rows.record()[str(frame)][0])
-    assert [c.pose.status for c in old.finished(Subjects.of([model]), 0, 25.0)] == ["doubtful"] * 4
-    assert [c.pose.status for c in rows.finished(Subjects.of([model]), 0, 25.0)] == ["good"] * 4
+    assert [c.pose.status for c in result_of(old.finished(Subjects.of([model]), 0, 25.0))] == ["doubtful"] * 4
+    assert [c.pose.status for c in result_of(rows.finished(Subjects.of([model]), 0, 25.0))] == ["good"] * 4
 
 
 @pytest.mark.parametrize("texts", [["AA=="], [""], ["AADAfwAAwH8AAMB/"], ["x"], []], ids=str)
@@ -263,7 +265,7 @@ def test_passes_that_agree_count_alike_however_doubtful():
     one_row(rows, model, 3, pose, (0.2,) * len(limbs(model)))
     rows.add_other_pass(OtherPass((0, 5), {3: other}))
     subjects = Subjects.of([model], keyframes={0: {0: pose}, 5: {0: pose}})
-    (found,) = rows.finished(subjects, 0, 30.0, smooth=False)
+    (found,) = result_of(rows.finished(subjects, 0, 30.0, smooth=False))
     assert found.pose.values[0] - pose[0] == pytest.approx(0.02, abs=0.002)
 
 
@@ -275,7 +277,32 @@ def test_a_limb_in_doubt_stays_where_it_was_found_and_its_motion_tells_about_it(
         pose = model.neutral()
         pose[raised] += 1.0 * (frame == 6)
         one_row(rows, model, frame, pose, tuple(0.4 * (i == arm and frame == 6) for i in range(len(limbs(model)))))
-    smoothed, by_motion = rows.smoothed(Subjects.of([model]), 0, 5.0)
+    smoothed, by_motion = result_of(rows.smoothed(Subjects.of([model]), 0, 5.0))
     angles = np.array([change.pose.values[raised] for change in smoothed]) - model.neutral()[raised]
     assert angles[6] > 0.8
     assert by_motion[6][raised] - model.neutral()[raised] < 0.3
+
+
+def test_locked_degrees_of_freedom_are_locked_in_the_solve():
+    """The others fit to where the locked ones are, not to where they would like to be."""
+    model, rows = load_model("gavrila34", 1.7), TrackedRows()
+    locked = model.dof_names.index("left_shoulder.abduction")
+    active = np.arange(model.n_dofs) != locked
+    held, seen = model.neutral(), model.neutral()
+    seen[model.dof_value[locked]] += 0.3
+    wrist = model.point_names.index("left_wrist")
+    target = model.points_world(seen)[wrist]
+    for frame in range(N):
+        one_row(rows, model, frame, held)
+
+    def evidence(frame, person):
+        return [
+            GaussianPrior(held, 1e2 * np.eye(model.n_dofs)),
+            PointTargets(np.array([wrist]), target[None], np.array([1e3])),
+        ]
+
+    subjects = Subjects.of([model], None, [active])
+    changes, _ = result_of(rows.smoothed(subjects, 0, 25.0, evidence))
+    for change in changes:
+        assert change.pose.values[model.dof_value[locked]] == held[model.dof_value[locked]]
+        assert np.linalg.norm(model.points_world(change.pose.values)[wrist] - target) < 0.01

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from bodies import MODELS
 
+from tracker.compute.progress import result_of
 from tracker.fitting.gauss_newton import GaussianPrior
 from tracker.formats.model_toml import load_model
 from tracker.motion.shortest_step import unwrapped_path
@@ -40,6 +41,10 @@ def noisy(model, truth, seed=1, sigma_rad=0.03, fixed=()):
     return PoseTrack(model, np.arange(len(truth)) / FPS, poses, covariances, exact, trusted)
 
 
+def smoothed(track):
+    return result_of(smooth_poses(track))
+
+
 def points(model, poses):
     return np.array([model.points_world(v) for v in poses])
 
@@ -57,7 +62,7 @@ def test_noise_falls_and_its_acceleration_more(name):
     model = MODELS[name]
     truth = motion(model, 40)
     track = noisy(model, truth)
-    (before_m, before_a), (after_m, after_a) = (errors(model, p, truth) for p in (track.poses, smooth_poses(track)))
+    (before_m, before_a), (after_m, after_a) = (errors(model, p, truth) for p in (track.poses, smoothed(track)))
     assert after_m < 0.75 * before_m
     assert after_a < 0.25 * before_a
 
@@ -66,7 +71,7 @@ def test_noise_falls_and_its_acceleration_more(name):
 def test_keyframes_are_bit_identical_and_their_neighbours_follow_them():
     truth = motion(MODEL, 40)
     track = noisy(MODEL, truth, fixed=(0, 17, 39))
-    found = smooth_poses(track)
+    found = smoothed(track)
     for k in (0, 17, 39):
         np.testing.assert_array_equal(found[k], track.poses[k])
     assert not np.array_equal(found[1], track.poses[1])
@@ -84,8 +89,8 @@ def test_a_turn_goes_on_through_half_a_turn():
     wrapped = track.poses.copy()
     wrapped[:, twist] = np.remainder(wrapped[:, twist] + np.pi, 2 * np.pi) - np.pi
     assert np.abs(np.diff(wrapped[:, twist])).max() > 6
-    found = smooth_poses(PoseTrack(MODEL, track.times_s, wrapped, track.covariances, track.fixed, track.trusted))
-    np.testing.assert_allclose(points(MODEL, found), points(MODEL, smooth_poses(track)), atol=1e-9)
+    found = smoothed(PoseTrack(MODEL, track.times_s, wrapped, track.covariances, track.fixed, track.trusted))
+    np.testing.assert_allclose(points(MODEL, found), points(MODEL, smoothed(track)), atol=1e-9)
     assert errors(MODEL, found, truth)[1] < 0.25 * errors(MODEL, track.poses, truth)[1]
 
 
@@ -94,7 +99,7 @@ def test_limits_are_kept():
     elbow = MODEL.dof_names.index("left_elbow.extension")
     truth = motion(MODEL, 40)
     truth[:, elbow] = np.abs(np.linspace(-0.3, 0.3, 40))  # touches its limit of 0
-    found = smooth_poses(noisy(MODEL, truth, sigma_rad=0.05))
+    found = smoothed(noisy(MODEL, truth, sigma_rad=0.05))
     low, high = MODEL.limits.T
     assert (found >= low).all()
     assert (found <= high).all()
@@ -109,7 +114,7 @@ def test_a_lost_limb_follows_its_motion_before_and_after():
     wrist = MODEL.point_names.index("left_wrist")
 
     def off_m(trusted):
-        found = smooth_poses(PoseTrack(MODEL, track.times_s, track.poses, track.covariances, track.fixed, trusted))
+        found = smoothed(PoseTrack(MODEL, track.times_s, track.poses, track.covariances, track.fixed, trusted))
         return np.linalg.norm(points(MODEL, found)[:, wrist] - points(MODEL, truth)[:, wrist], axis=-1)[18:21].max()
 
     lost = track.trusted.copy()
@@ -126,7 +131,7 @@ def test_lost_frames_are_interpolated_but_not_extrapolated():
     for t in (0, 1, 12, 13, 28, 29):
         track.poses[t, :3] += 1.0
         lost[t] = False
-    found = smooth_poses(PoseTrack(MODEL, track.times_s, track.poses, track.covariances, track.fixed, lost))
+    found = smoothed(PoseTrack(MODEL, track.times_s, track.poses, track.covariances, track.fixed, lost))
     for t in (0, 1, 28, 29):
         np.testing.assert_array_equal(found[t], track.poses[t])
     assert np.abs(found[12:14, :3] - truth[12:14, :3]).max() < 0.05
@@ -141,13 +146,13 @@ def test_a_gap_in_time_counts():
     some = PoseTrack(
         MODEL, track.times_s[kept], track.poses[kept], track.covariances[kept], track.fixed[kept], track.trusted[kept]
     )
-    (before_m, _), (after_m, _) = (errors(MODEL, p, truth[kept]) for p in (some.poses, smooth_poses(some)))
+    (before_m, _), (after_m, _) = (errors(MODEL, p, truth[kept]) for p in (some.poses, smoothed(some)))
     assert after_m < 0.75 * before_m
 
 
 def test_two_frames_show_no_motion():
     track = noisy(MODEL, motion(MODEL, 2))
-    np.testing.assert_array_equal(smooth_poses(track), track.poses)
+    np.testing.assert_array_equal(smoothed(track), track.poses)
 
 
 def test_a_path_reaches_each_pose():
@@ -172,8 +177,8 @@ def test_the_other_set_of_angles_changes_nothing():
         poses[t, shoulder] = a - np.pi, np.pi - b, c + np.pi
         covariances[t] *= np.outer(sign, sign)
     wide = replace(MODEL, joints=tuple(map(without_limits, MODEL.joints)))
-    flipped = smooth_poses(replace(track, model=wide, poses=poses, covariances=covariances))
-    plain = smooth_poses(replace(track, model=wide))
+    flipped = smoothed(replace(track, model=wide, poses=poses, covariances=covariances))
+    plain = smoothed(replace(track, model=wide))
     assert np.abs(points(MODEL, flipped) - points(MODEL, plain)).max() < 1e-6
 
 
@@ -191,7 +196,7 @@ def test_a_fast_arm_keeps_its_motion():
     track = replace(noisy(MODEL, truth, sigma_rad=0.03), poses=truth, times_s=np.arange(24) / 8)
     swings = points(MODEL, truth)
     reach_m = np.linalg.norm(np.ptp(swings, axis=0), axis=-1).max() / np.ptp(truth[:, shoulder])
-    assert np.abs(points(MODEL, smooth_poses(track)) - swings).max() < 0.03 * reach_m
+    assert np.abs(points(MODEL, smoothed(track)) - swings).max() < 0.03 * reach_m
 
 
 def test_evidence_takes_the_place_of_estimates_that_are_trusted():
@@ -205,8 +210,15 @@ def test_evidence_takes_the_place_of_estimates_that_are_trusted():
         return [GaussianPrior(elsewhere, 1e6 * np.eye(n))]
 
     track = PoseTrack(
-        MODEL, np.arange(9) / FPS, still, np.tile(1e-4 * np.eye(n), (9, 1, 1)), np.zeros(9, bool), trusted, evidence
+        MODEL,
+        np.arange(9) / FPS,
+        still,
+        np.tile(1e-4 * np.eye(n), (9, 1, 1)),
+        np.zeros(9, bool),
+        trusted,
+        None,
+        evidence,
     )
-    found = smooth_poses(track)
+    found = smoothed(track)
     assert sorted(asked) == [0, 1, 2, 3, 5, 6, 7, 8]
     np.testing.assert_allclose(found, np.tile(elsewhere, (9, 1)), atol=1e-3)

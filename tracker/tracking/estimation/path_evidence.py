@@ -11,7 +11,7 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence, with_colors_only
 from tracker.fitting.gauss_newton import ResidualBlock
 from tracker.tracking.estimation.frame_problem import Bodies
-from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
+from tracker.tracking.estimation.pose_score import common_evidence, without_prediction
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.tracker import BodiesByFrame, PathEvidence
 from tracker.trajectory.solve import FRAMES_AT_ONCE
@@ -41,8 +41,10 @@ def evidence_of_frames(
         return learn_regions(learnt, observer.working_cameras, observer.empty_scenes())
 
     def blocks(frame: int, person: int) -> Sequence[ResidualBlock]:
+        if frame not in known():
+            return ()
         here, shown = known()[frame], views(frame)
-        by_colors = region_residuals(colors(), colors().frame(shown, here), here, person)
-        return [*scorer_without_prediction(shown, here, person, settings).blocks, by_colors]
+        residuals, priors = without_prediction(shown, here, person, settings)
+        return [residuals, *priors, region_residuals(colors(), colors().frame(shown, here), here, person)]
 
     return blocks

@@ -147,13 +147,20 @@ def scorer_without_prediction(
         part_colors: colours of the parts; None where they are unknown.
         active_dofs: degrees of freedom that may move, (n_dofs,); None: all.
     """
+    residuals, priors = without_prediction(views, bodies, person, settings)
+    known = None if settings.recover is None else part_colors
+    recover = settings.recover or RecoverSettings()
+    return PoseScorer.of(residuals, priors, Colors(views, bodies, person), known, recover, active_dofs)
+
+
+def without_prediction(
+    views: Sequence[ViewEvidence], bodies: Bodies, person: int, settings: EstimationSettings
+) -> tuple[PersonResiduals, list[ResidualBlock]]:
+    """Return the residuals of one person on common evidence, and the priors of every frame; see above."""
     residuals = person_residuals(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
-    priors: list[ResidualBlock] = [
+    return residuals, [
         PosePrior.of_spreads(bodies[person].model),
         SelfPenetration(),
         *penetration(bodies, person, settings),
         *keypoint_blocks(views, person, bodies[person].velocity),
     ]
-    known = None if settings.recover is None else part_colors
-    recover = settings.recover or RecoverSettings()
-    return PoseScorer.of(residuals, priors, Colors(views, bodies, person), known, recover, active_dofs)

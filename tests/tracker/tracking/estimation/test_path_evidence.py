@@ -59,3 +59,8 @@ def test_few_frames_are_held_at_once(walk, monkeypatch):
     for k in (0, 1, 2, 1, 2):
         evidence(k, 0)
     assert observer.read == [*range(N_FRAMES), 1, 2]
+
+
+def test_frames_of_which_nobody_knows_a_pose_have_no_evidence():
+    evidence = evidence_of_frames(None, lambda: {}, TrackSettings())
+    assert evidence(3, 0) == ()
