@@ -427,6 +427,7 @@ def test_a_frame_that_is_looked_at_shows_what_the_backward_pass_found(placed, tr
 @pytest.mark.parametrize("smooth", [True, False])
 def test_the_poses_are_smoothed_at_the_end_of_a_run(placed, tracker, smooth):
     """The frame that is looked at shows its smoothed pose, and one undo takes back all of the run."""
+    tracker.leaps_at = 9
     placed.search.set_settings(replace(placed.state.settings, smooth=smooth))
     placed.tracking.start(backward=False, until=9)
     tracker.let_go(7)
