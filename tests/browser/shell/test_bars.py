@@ -273,13 +273,18 @@ async def test_work_that_waits_for_kernels_says_so(page, endpoint):
 @pytest.mark.slow
 async def test_the_stages_of_a_run_are_told_apart(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "lost": 2}
-    texts = {"tracking": "Tracked 4 of 9", "back": "Checking alternatives", "audit": "Checking each camera"}
+    texts = {
+        "tracking": "Tracked 4 of 9",
+        "back": "Checking alternatives",
+        "audit": "Checking each camera",
+        "solve": "Solving the whole path",
+    }
     for stage, text in texts.items():
         endpoint.state["track"] = track | {"stage": stage, "done": 4, "total": 9}
         await endpoint.broadcast(endpoint.state)
         await expect(page.locator("#search-stage")).to_have_text(text, use_inner_text=True)
     assert await page.locator("#search-stage").get_attribute("title") == (
-        "Tracking once more without each camera in turn; you can go on"
+        "Fitting the poses of all frames together; you can go on"
     )
 
 
