@@ -1,22 +1,13 @@
 """BlazePose: squares of pictures, and its networks on rendered footage where a user has fetched them."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.detection.blazepose import _anchors, _groups, _refined
-from tracker.detection.detect import DetectionPlan, detect_people
 from tracker.detection.detector import PictureSquare
-from tracker.detection.detectors import load_detector
-from tracker.detection.model_files import MODEL_FILES, default_folder
-from tracker.footage.recording import Recording
 from tracker.formats.trc import read_trc
-from tracker.observations.joints import triangulate_observations
-from tracker.observations.stored import load_observations
 from tracker.session.assemble import NewSession, assemble
 
 
@@ -50,20 +41,12 @@ def test_landmarks_move_to_their_heat_maps_unless_these_are_cold():
 
 
 @pytest.mark.slow
-def test_a_man_who_walks_is_detected_in_all_views(tmp_path, data_folder):
+def test_a_man_who_walks_is_detected_in_all_views(tmp_path, data_folder, detected):
     """The points of the heavy network, without any fit, are within 60 mm of the joints: hips and shoulders are off."""
-    pytest.importorskip("ai_edge_litert")
-    folder = Path(os.environ.get("QUADRILLE_MODELS") or default_folder())
-    if not all((folder / name).is_file() for name in MODEL_FILES):
-        pytest.skip(f"expected the networks in {folder}: quadrille detect --get-models fetches them")
     walk = data_folder("walk")
     videos = tuple(sorted(walk.glob("*.mp4")))
     session = assemble(NewSession(tmp_path / "s", walk / "Calib.toml", videos=videos))
-    detector, name = load_detector("blazepose", "heavy", folder)
-    with Recording(session.cameras) as recording:
-        detect_people(session, recording, detector, DetectionPlan("net", name, range(0, 8)))
-    observations = load_observations(session, "net")
-    found = triangulate_observations(observations, [c.camera for c in session.cameras]).joints
+    observations, found = detected(session, range(8))
     truth = read_trc(walk / "ground_truth.trc")
     for side in ("left", "right"):
         for joint, marker in (("wrist", "Hand"), ("ankle", "Foot"), ("knee", "Leg"), ("elbow", "ForeArm")):

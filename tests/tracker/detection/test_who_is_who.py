@@ -1,19 +1,11 @@
-"""Two people of one size, who were out of all views, come back in each other's place: their clothes tell who is who."""
+"""Two people of one size, who were out of all views, come back in each other's place: their clothes decide."""
 
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tracker.detection.detect import DetectionPlan, detect_people
-from tracker.detection.detectors import load_detector
-from tracker.detection.model_files import MODEL_FILES, default_folder
 from tracker.evaluation.references import read_joints
-from tracker.footage.recording import Recording
-from tracker.observations.joints import triangulate_observations
-from tracker.observations.stored import load_observations
 from tracker.simulate import Simulation, simulate
 from tracker.simulate.motion import scenes
 from tracker.simulate.motion.postures import Role
@@ -35,20 +27,12 @@ def walks_at(side):
 
 
 @pytest.mark.slow
-def test_people_who_come_back_in_each_others_place(tmp_path, monkeypatch):
-    pytest.importorskip("ai_edge_litert")
-    folder = Path(os.environ.get("QUADRILLE_MODELS") or default_folder())
-    if not all((folder / name).is_file() for name in MODEL_FILES):
-        pytest.skip(f"expected the networks in {folder}: quadrille detect --get-models fetches them")
+def test_people_who_come_back_in_each_others_place(tmp_path, monkeypatch, detected):
     looks = {"ann": (1, RED), "ben": (-1, GREEN)}
     cast = tuple(Role(n, 1.75, walks_at(side), outfit=outfit) for n, (side, outfit) in looks.items())
     monkeypatch.setattr(scenes, "SCENES", {"exchange": lambda seed: cast})
     session = simulate(tmp_path / "s", Simulation("exchange", 4, 15, 7, fps=FPS))
-    detector, name = load_detector("blazepose", "heavy", folder)
-    with Recording(session.cameras) as recording:
-        detect_people(session, recording, detector, DetectionPlan("net", name, range(15)))
-    observations = load_observations(session, "net")
-    found = triangulate_observations(observations, [c.camera for c in session.cameras]).joints
+    observations, found = detected(session, range(15))
     true = [read_joints(session.folder / f"truth_{who}.trc", FPS) for who in looks]
     column = found.names.index(observations.joint_map.markers["left_hip"])
     hips = found.joints_world[:, :, column]
