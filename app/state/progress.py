@@ -11,7 +11,7 @@ Line = tuple[float, float, float, float]
 
 
 TrackStage = Literal["tracking", "back", "audit", "solve"]
-"""Stages of a run: all frames, lost people backward, and all frames without each camera in turn."""
+"""Stages of a run: all frames, lost people backward, all frames without each camera in turn, the solve of the path."""
 
 
 @dataclass(frozen=True)

@@ -142,10 +142,6 @@ class TrackedRows:
         model, active = subjects.models[person], subjects.active_dofs[person]
         seams = self._seams(model, {k: of_one[person] for k, of_one in subjects.keyframes.items() if person in of_one})
         agreed = {f: self.consensus(model, f, active) for f in self._changes.keys() & self.tracks.keys()}
-        for frame in agreed.keys() & self._repaired.keys():
-            tracks, repaired = self.tracks[frame], self._repaired[frame]
-            trust = tracks.trust * repaired.trust
-            agreed[frame] = agreement(model, repaired.pose, tracks.poses, trust)
         changes = self._with_poses(model, agreed, active)
         smoothed, by_motion = [*changes.values()], None
         if smooth:
@@ -190,10 +186,11 @@ class TrackedRows:
     def consensus(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Consensus:
         """Return the consensus of the tracked pose of a frame and of those by tracks without a view each.
 
-        Between two keyframes, the pose by the other pass takes part.
+        Between two keyframes, the pose by the other pass takes part. A repaired pose takes the place of the consensus.
         """
-        tracks = self.tracks[frame]
-        return agreement(model, self._agreed_pose(model, frame, active), tracks.poses, tracks.trust)
+        tracks, repaired = self.tracks[frame], self._repaired.get(frame)
+        trust = tracks.trust if repaired is None else tracks.trust * repaired.trust
+        return agreement(model, self.best_pose(model, frame, active), tracks.poses, trust)
 
     def best_pose(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Array:
         """Return the pose of a frame by all that is known before smoothing, (n_values,)."""

@@ -60,8 +60,8 @@ class CameraStep(NamedTuple):
 
 
 Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SolveStep | SmoothedRows | CameraStep
-"""A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit or of the
-repair, all smoothed poses, or a camera that is off."""
+"""A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit, of
+the repair or of the solve, all smoothed poses, or a camera that is off."""
 
 
 class Leg(NamedTuple):

@@ -101,7 +101,7 @@ class Tracker(Protocol):
         """
 
     def evidence(self, observer: Observer, bodies: Callable[[], BodiesByFrame]) -> PathEvidence | None:
-        """Return the evidence by which the whole path of a person is solved; None if the estimates tell all.
+        """Return the evidence by which the whole path of a person is solved; None for the estimates alone.
 
         Args:
             observer: of the cameras that were tracked with.

@@ -39,8 +39,8 @@ class PoseTrack:
     active_dofs: Mask | None = None
     """Degrees of freedom that may change, (n_dofs,); None: all."""
     evidence: Callable[[int], Sequence[ResidualBlock]] | None = None
-    """Returns the evidence of a frame, by its place, that tells more than the estimate where all is trusted; none where
-    there is no more."""
+    """Returns the evidence of a frame by its place; none where there is none but the estimate. It takes the place of an
+    estimate of which all is trusted."""
 
 
 def smooth_poses(track: PoseTrack, freedom: float = FREEDOM) -> Generator[int, None, Array]:

@@ -5,7 +5,7 @@ The scales of the accelerations are learnt by expectation maximization (R. H. Sh
 Series Anal. 3:253). The covariance of the path counts: without it the smoothest path makes itself ever smoother.
 """
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -130,7 +130,7 @@ class _Solver:
         active = np.ones(model.n_dofs, bool) if path.active_dofs is None else path.active_dofs
         self.locked = self.fixed[:, None] | ~active
         self.locked_values = value_mask(model, ~active)
-        self.start = [self._within_limits(p, f) for p, f in zip(path.poses[used], self.fixed, strict=True)]
+        self.start = self._within_limits(path.poses[used], [*path.poses[used]])
         self.evidence: list[Sequence[ResidualBlock]] = []
         self.motion: MotionModel | None = None
         self.reach = CLOSE_ENOUGH
@@ -138,8 +138,10 @@ class _Solver:
         self.spread_m2 = np.zeros(1)
         """Variance of the accelerations by the uncertainty of the path, (T - 2, P), or zero."""
 
-    def _within_limits(self, pose: Array, is_fixed: bool) -> Array:
-        return pose if is_fixed else np.where(self.locked_values, pose, self.path.model.clip(pose))
+    def _within_limits(self, poses: Iterable[Array], before: Sequence[Array]) -> list[Array]:
+        """Return poses within the limits, with fixed and locked ones as before."""
+        clip, at = self.path.model.clip, zip(poses, before, self.fixed, strict=True)
+        return [old if fixed else np.where(self.locked_values, old, clip(pose)) for pose, old, fixed in at]
 
     def read(self, t: int) -> None:
         """Read the evidence of the next frame, given by its place in the path."""
@@ -208,12 +210,8 @@ class _Solver:
         promised = 0.5 * float(np.vdot(damped - gradient, change))
         if promised < self.min_decrease:
             return here, promised
-        model = self.path.model
-        moved = [
-            pose if fixed else self._within_limits(np.where(self.locked_values, pose, model.retract(pose, own)), False)
-            for pose, own, fixed in zip(here.poses, change, self.fixed, strict=True)
-        ]
-        return self._linearized(moved, here), promised
+        moved = map(self.path.model.retract, here.poses, change)
+        return self._linearized(self._within_limits(moved, here.poses), here), promised
 
     def _held(self, here: _State) -> Mask:
         """Return the degrees of freedom that stay: locked ones, and those that press against a limit, (T, n_dofs)."""
@@ -226,7 +224,7 @@ class _Solver:
             n = blocks.shape[1] - d
             blocks[d, :n] *= ~held[d:, :, None] & ~held[:n, None, :]
         diagonal = np.einsum("tii->ti", blocks[0])
-        diagonal += np.where(held, 1.0, damping * diagonal + 1 / UNKNOWN**2 * 1e-9)
+        diagonal += np.where(held, 1.0, damping * diagonal + DAMPING.least / UNKNOWN**2)
         return blocks
 
     def _inverse(self, here: _State) -> Array:
