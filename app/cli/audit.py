@@ -1,4 +1,4 @@
-"""`quadrille audit`: assess stored poses by tracks without each camera in turn."""
+"""`quadrille audit`: assess stored poses by all frames and cameras together."""
 
 from collections import Counter
 from contextlib import closing
@@ -26,14 +26,14 @@ class AuditArguments:
     """name; all people who have poses by default."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
-    consensus: bool = False
-    """let the consensus of these tracks take the place of the poses; by default they stay as they are."""
+    replace: bool = False
+    """let the likeliest poses take the place of the stored ones; by default these stay as they are."""
     json: bool = False
     """print one JSON object; docs/trackers.md lists its keys."""
 
 
 def command(arguments: Annotated[AuditArguments, tyro.conf.arg(name="")]) -> None:
-    """Assess stored poses: track once more without each camera in turn, and compare.
+    """Assess stored poses: compare them with all others that they may be.
 
     Writes expected errors, statuses and reasons as one entry of the history. Poses may come from anywhere: tracked,
     interpolated, imported or set by hand; keyframes stay as they are. Ctrl+C stops it and changes nothing; the page
@@ -41,11 +41,11 @@ def command(arguments: Annotated[AuditArguments, tyro.conf.arg(name="")]) -> Non
     """
     at = load_target(arguments.session, arguments.person, several=True)
     frames = parse_frames(arguments.frames, at.session)
-    found = audit(at, frames, arguments.consensus, Reporter(silent=arguments.json))
+    found = audit(at, frames, arguments.replace, Reporter(silent=arguments.json))
     print(format_json(found) if arguments.json else _format(found))
 
 
-def audit(at: Target, frames: range, takes_consensus: bool, progress: Reporter) -> dict[str, Any]:
+def audit(at: Target, frames: range, replaces: bool, progress: Reporter) -> dict[str, Any]:
     """Audit the stored poses of people, and store their assessment.
 
     Returns:
@@ -53,7 +53,7 @@ def audit(at: Target, frames: range, takes_consensus: bool, progress: Reporter) 
         `status`, `probability_off` and `reason`, the most doubtful first.
 
     Raises:
-        TrackerError: there are fewer than three cameras, or no two frames in a row with poses.
+        TrackerError: there is one camera, or no two frames in a row with poses.
     """
     import numpy as np
 
@@ -75,8 +75,8 @@ def audit(at: Target, frames: range, takes_consensus: bool, progress: Reporter) 
         closing(AnnotationStore(session.annotations_path)) as store,
     ):
         people = tuple(i for i in people if store.frames(session.people[i].name)) or people
-        plan = AuditPlan(frames, people, TrackSettings(), takes_consensus)
-        with progress.share("checking each camera") as advance:
+        plan = AuditPlan(frames, people, TrackSettings(), replaces)
+        with progress.share("comparing poses") as advance:
 
             def report(stage: str, share: float, text: str = "", /) -> None:
                 advance(share)

@@ -50,4 +50,4 @@ def _methods() -> "Mapping[str, TrackerSettings]":
     from tracker.tracking.chamfer.settings import TrackSettings
     from tracker.tracking.contour.settings import ContourSettings
 
-    return {"chamfer": TrackSettings(backward_pass=False), "contour": ContourSettings(backward_pass=False)}
+    return {"chamfer": TrackSettings(whole_run=False), "contour": ContourSettings(whole_run=False)}

@@ -9,8 +9,7 @@ from app.remedies import command_line_text
 from app.runtime.progress import Reporter
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import Remedy
-from tracker.pipeline.run_repair import RepairStep
-from tracker.pipeline.track_session import AuditStep, SolveStep
+from tracker.pipeline.track_session import EstimateStep
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 if TYPE_CHECKING:
@@ -19,10 +18,7 @@ if TYPE_CHECKING:
     from tracker.pipeline.track_session import Step, TrackSession
     from tracker.session.session import Session
 
-_PASSES = {
-    BackwardStep: "tracking back", AuditStep: "checking each camera", RepairStep: "comparing with the run's colours",
-    SolveStep: "solving the whole path",
-}  # fmt: skip
+_PASSES = {BackwardStep: "tracking backward", EstimateStep: "estimating all frames together"}
 """Passes after the first, by their steps."""
 
 
@@ -71,8 +67,8 @@ class ChainProgress:
             if len(run.costs_px) == 1:
                 self._count(len(run.frames), "tracking")
             self._tick()
-        elif isinstance(step, BackwardStep | AuditStep | RepairStep | SolveStep):
-            if self._pass != (type(step), step.total):  # the repair begins again where it has found something
+        elif isinstance(step, BackwardStep | EstimateStep):
+            if self._pass != (type(step), step.total):
                 self._pass = type(step), step.total
                 self._count(step.total - step.done + 1, _PASSES[type(step)])
             self._tick()
@@ -94,10 +90,10 @@ def summarize(session: "Session", plan: "TrackPlan", run: "TrackSession", is_sto
         is_stopped: whether it was interrupted.
 
     Returns:
-        `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of poses that
-        the backward pass improved. `contradiction` is a sentence on a camera that seems off, else None. `first_frame`
-        is there where the run went out from a frame. `normal_matrices` has rank and conditioning by person, for methods
-        that compute them.
+        `stopped_at` is the frame where it was interrupted, else None; `moved_by_estimate` is the number of poses with a
+        limb elsewhere than where the first pass had it. `contradiction` is a sentence on a camera that seems off, else
+        None. `first_frame` is there where the run went out from a frame. `normal_matrices` has rank and conditioning by
+        person, for methods that compute them.
     """
     import numpy as np
 
@@ -109,7 +105,7 @@ def summarize(session: "Session", plan: "TrackPlan", run: "TrackSession", is_sto
         "frames": len(run.costs_px),
         "resumed_at": None if len(left) == len(planned) else left[0] if left else planned[-1],
         "stopped_at": stopped_at if is_stopped else None,
-        "improved_backward": run.n_improved,
+        "moved_by_estimate": run.n_moved,
         "people": [session.people[i].name for i in plan.people],
         "mean_cost_px": float(np.mean(costs)) if costs else None,
         "statuses": {session.people[i].name: dict(statuses[i]) for i in plan.people},
@@ -152,8 +148,8 @@ def format_summary(found: dict[str, Any]) -> str:
             f"{name}: normal matrix of rank {matrix['lowest_rank']} of {matrix['n_dofs']} or more, "
             f"condition number {condition} in the median"
         )
-    if found["improved_backward"]:
-        lines.append(f"the backward pass replaced {found['improved_backward']} poses of frames with lost people")
+    if found["moved_by_estimate"]:
+        lines.append(f"all frames together moved a limb in {found['moved_by_estimate']} poses")
     if found["contradiction"] is not None:
         lines.append(command_line_text(found["contradiction"], Remedy("check_cameras")))
     if found["stopped_at"] is not None:

@@ -10,8 +10,8 @@ Line = tuple[float, float, float, float]
 """x0, y0, x1, y1, undistorted px."""
 
 
-TrackStage = Literal["tracking", "back", "audit", "solve"]
-"""Stages of a run: all frames, lost people backward, all frames without each camera in turn, the solve of the path."""
+TrackStage = Literal["tracking", "back", "solve"]
+"""Stages of a run: forward, backward, all frames together."""
 
 
 @dataclass(frozen=True)

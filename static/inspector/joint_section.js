@@ -24,7 +24,7 @@ export function jointSection(context, { posing }) {
   const body = document.createElement("div");
   const expectedError = Object.assign(document.createElement("p"), {
     className: "section-note",
-    title: "Root mean square error of the joint that the audit after tracking expects. The layer Error ellipses draws it in the views",
+    title: "Root mean square error of the joint that tracking expects. The layer Error ellipses draws it in the views",
   });
   const map = costMap(context, posing);
   /** @type {Row[]} */

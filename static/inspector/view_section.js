@@ -49,11 +49,11 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
   const ellipses = checkRow({
     label: "Error ellipses",
     title:
-      "Draw around each joint of the selected person the ellipse that holds 90% of its error in the camera view. Errors come from tracking with the audit; a pose changed by hand has none",
+      "Draw around each joint of the selected person the ellipse that holds 90% of its error in the camera view. Errors come from tracking; a pose changed by hand has none",
     change: (on) => paneLayers.toggle(["errors"], on),
   });
   const noErrors = note();
-  noErrors.textContent = "The errors of this pose are not known: they come from tracking with the audit.";
+  noErrors.textContent = "The errors of this pose are not known: they come from tracking over the whole run.";
   const camera = choiceRow({
     label: "Look through",
     title: "Look through a camera, its image behind the bodies (Y: the camera under the pointer). Turning the view leaves the camera",

@@ -90,7 +90,7 @@ export const LAYERS = [
     id: "errors",
     group: "Model",
     label: "Error ellipses",
-    title: "Ellipses that hold 90% of the error of each joint of the selected person in the view, known from tracking with the audit",
+    title: "Ellipses that hold 90% of the error of each joint of the selected person in the view, known from tracking",
     shown: false,
     opacity: 0.9,
   },

@@ -94,9 +94,8 @@ export class TopBar {
     const [how, ...rest] = message.split(", ");
     const [work, way] = {
       tracking: [`tracked ${done} of ${total}`, `Frame ${at ?? first}, tracking to frame ${last}`],
-      back: ["checking alternatives", "Tracking lost people backward; you can go on"],
-      audit: ["checking each camera", "Tracking once more without each camera in turn; you can go on"],
-      solve: ["solving the whole path", "Fitting the poses of all frames together; you can go on"],
+      back: ["tracking backward", "Tracking once more from the last frame to the first; you can go on"],
+      solve: ["estimating all frames together", "Comparing poses over all frames and cameras; you can go on"],
     }[stage];
     this.#stage.textContent = isActive ? (running ? work : `paused ${done} of ${total}`) : how;
     this.#stage.title = isActive ? way : message;

@@ -229,7 +229,7 @@ export class WorkList {
  */
 function trackWork({ running, stage, done, total }, stop) {
   // No frame waits for what comes after the first pass.
-  const text = { tracking: "Tracking", back: "Checking alternatives", audit: "Checking each camera", solve: "Solving the whole path" }[stage];
+  const text = { tracking: "Tracking", back: "Tracking backward", solve: "Estimating all frames together" }[stage];
   const figures = ofTotal(done, total);
   const isFirst = stage === "tracking";
   return { id: "track", text: running ? text : "Tracking is paused", ...figures, done: isFirst ? figures.done : "you can go on", stop };

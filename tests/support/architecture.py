@@ -34,6 +34,7 @@ ROOMS = [
     "tracker.search",
     "tracker.tracking",
     "tracker.tracking.estimation",
+    "tracker.tracking.runs",
     "tracker.tracking.chamfer",
     "tracker.tracking.contour",
     "tracker.tracking.voxel",

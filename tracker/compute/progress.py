@@ -3,7 +3,9 @@
 from collections.abc import Callable, Generator
 from typing import Protocol, TypeVar
 
+S = TypeVar("S")
 T = TypeVar("T")
+U = TypeVar("U")
 
 
 class Report(Protocol):
@@ -53,6 +55,16 @@ def result_of(steps: Generator[object, None, T]) -> T:
     while True:
         try:
             next(steps)
+        except StopIteration as end:
+            result: T = end.value
+            return result
+
+
+def mapped(steps: Generator[S, None, T], shown: Callable[[S], U]) -> Generator[U, None, T]:
+    """Return the same work with what each step shows in its place."""
+    while True:
+        try:
+            yield shown(next(steps))
         except StopIteration as end:
             result: T = end.value
             return result

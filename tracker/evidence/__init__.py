@@ -5,4 +5,4 @@ The room imports `geometry`, `footage` and `images`, and knows no body. Callers 
 `view_evidence`.
 """
 
-__all__ = ["camera_exchange", "keypoints", "observer", "shared_observers", "silhouettes", "view_evidence"]
+__all__ = ["camera_exchange", "keypoints", "observer", "silhouettes", "view_evidence"]

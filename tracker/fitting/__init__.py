@@ -10,7 +10,6 @@ __all__ = [
     "added_camera",
     "bundle",
     "clocked_residuals",
-    "consensus",
     "contour_arrays",
     "contour_residuals",
     "gauss_newton",

@@ -101,7 +101,13 @@ class ClockedResiduals:
 
     def costs(self, candidates: Array) -> Array:
         """See `ContourResiduals.costs`."""
-        return np.sum([g.residuals.costs(g.moved(self.model, candidates, self.velocity)) for g in self.groups], axis=0)
+        return np.asarray(self.view_costs(candidates).sum(axis=1))
+
+    def view_costs(self, candidates: Array) -> Array:
+        """See `ContourResiduals.view_costs`; the views are in their order."""
+        order = np.argsort(np.concatenate([g.views for g in self.groups]))
+        found = [g.residuals.view_costs(g.moved(self.model, candidates, self.velocity)) for g in self.groups]
+        return np.concatenate(found, axis=1)[:, order]
 
     def part_costs(self, pose: Array) -> PartCosts:
         """See `ContourResiduals.part_costs`; the views are in their order."""

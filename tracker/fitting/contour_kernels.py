@@ -141,6 +141,7 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
     sums.b[:] = 0.0
     sums.parts[:] = 0.0
     sums.silhouette[:] = 0.0
+    sums.costs[:] = 0.0
     pixel, cost, caches = np.int64(0), 0.0, static.best.shape[0] > 0  # a literal 0 has a type of its own
     stale = caches and not is_static_unchanged(Ts, static.moves, static.Ts)
     place_parts(Ts, surfaces, scratch.traced)
@@ -157,11 +158,14 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
             scratch.pulls[:, : scratch.firsts[-1]] = 0.0
             # The costs of the parts need both directions.
             if views.weights[view, 0] > 0.0 or not with_jacobian:
-                cost += _model_to_image(
+                sums.costs[view] += _model_to_image(
                     view, first, last, pixel, views, scale, motion, with_jacobian, static, scratch, sums
                 )
             if views.weights[view, 1] > 0.0:
-                cost += _image_to_model(view, n_segments, views, scale, turn, with_jacobian, static, scratch, sums)
+                sums.costs[view] += _image_to_model(
+                    view, n_segments, views, scale, turn, with_jacobian, static, scratch, sums
+                )
+            cost += sums.costs[view]
             if with_jacobian:
                 for part in range(first, last):
                     if not static.moves[part]:

@@ -273,8 +273,13 @@ class ContourResiduals:
 
     def costs(self, candidates: Array) -> Array:
         """Return the costs alone of many poses, (C, n_values) to (C,)."""
-        out, model = np.empty(len(candidates)), self._model
-        _score(np.array(candidates, np.float64, order="C"), model.tree, model.n_dofs, self._term, out)
+        return np.asarray(self.view_costs(candidates).sum(axis=1))
+
+    def view_costs(self, candidates: Array) -> Array:
+        """Return the costs alone of many poses in each view, (C, n_values) to (C, V)."""
+        model, term = self._model, self._term
+        out = np.empty((len(candidates), len(term.views.sizes)))
+        _score(np.array(candidates, np.float64, order="C"), model.tree, model.n_dofs, term, out)
         return out
 
     def part_costs(self, pose: Array) -> PartCosts:
@@ -312,11 +317,12 @@ def equations_of_twists(model: BodyModel, kinematics: Kinematics, cost: float, M
 
 @njit(nogil=True, cache=True)
 def _score(candidates: Array, tree: Tree, n_dofs: int, term: ContourTerm, out: Array) -> None:
-    """Fill the costs, (C,), of poses of the fitted person, (C, n_values)."""
+    """Fill the costs in each view, (C, V), of poses of the fitted person, (C, n_values)."""
     axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
     for c in range(candidates.shape[0]):
         forward_kinematics(candidates[c], tree, term.Ts[term.first : term.last], axes, origins)
-        out[c] = accumulate_normal_equations(term, COST_ONLY)
+        accumulate_normal_equations(term, COST_ONLY)
+        out[c] = term.sums.costs
 
 
 @njit(nogil=True, cache=True)

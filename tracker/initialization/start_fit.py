@@ -26,7 +26,7 @@ from tracker.tracking.tracker import TrackingRun
 
 _TRACK_STEPS = (2, 4, 6)
 """Frames after and before a start over which starts are compared."""
-_SETTINGS = TrackSettings(backward_pass=False)
+_SETTINGS = TrackSettings(whole_run=False)
 
 
 class StartTrack(NamedTuple):

@@ -27,7 +27,6 @@ from tracker.session.session import Session
 from tracker.store.stored_poses import StoredPose
 from tracker.tracking.pose_errors import point_covariances
 from tracker.tracking.tracker import TrackerSettings
-from tracker.tracking.view_tracks import left_out
 
 _NOTABLE_M = 0.03
 """Constant offset of a joint from which it is worth a sentence, metres: conventions differ by less at most joints."""
@@ -130,7 +129,7 @@ def judge(
         TrackerError: there are fewer than three cameras, the observations are of nobody in the session, or tracking
             cannot begin.
     """
-    if not left_out(len(session.cameras)):
+    if len(session.cameras) < 3:
         raise TrackerError(
             f"expected three cameras or more to judge, found {len(session.cameras)}: without one of two, nothing shows "
             "depth"

@@ -19,7 +19,6 @@ __all__ = [
     "methods",
     "pose_check",
     "posed_recording",
-    "run_repair",
     "seen_points",
     "stored_run",
     "track_session",

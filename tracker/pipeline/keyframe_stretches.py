@@ -23,6 +23,7 @@ from tracker.store.records import BETWEEN, SEAM, PoseRecord
 from tracker.tracking.confidence import classify_limbs, probabilities, status_named, worst
 from tracker.tracking.pose_errors import limb_odds, point_covariances
 from tracker.tracking.remarks import uncertain, without_uncertainty
+from tracker.tracking.subjects import Keyframes
 
 _POSES = "keyframe_poses"
 """Key of a pose's settings: checksums of the poses of the two keyframes."""
@@ -100,6 +101,12 @@ def with_seam(model: BodyModel, pose: PoseRecord, seam: Seam) -> PoseRecord:
             _POSES: list(seam.checksums),
         },
     )
+
+
+def between_keyframes(keyframes: Keyframes, person: int, frames: Sequence[int]) -> dict[int, tuple[int, int]]:
+    """Return the keyframes of a person before and after each of some frames that lies between two, by frame."""
+    own = sorted(k for k, of_people in keyframes.items() if person in of_people)
+    return {k: (a, b) for a, b in pairwise(own) for k in frames if a < k < b}
 
 
 def pose_checksum(pose: Array) -> str:

@@ -127,6 +127,7 @@ def stored_run(
                 TrackingRun(observer, subjects, start, rest, session.fps, floor),
                 _tracked_before(session, store, known, start, subjects, plan.start),
                 plan.start,
+                _stored_starts(session, store, plan),
             )
         )
         done += [k for k in before if k != plan.start]
@@ -213,8 +214,24 @@ def _tracked_before(
         if any(r is None and i not in keyframes for i, r in records.items()):
             out.clear()
         else:
-            out.append(TrackedFrame(frame, tuple(poses), statuses))
+            others = tuple(_others(store, session, i, frame) if i in records else () for i in range(len(poses)))
+            out.append(TrackedFrame(frame, tuple(poses), statuses, others))
     return out
+
+
+def _others(store: AnnotationStore, session: Session, person: int, frame: int) -> tuple[Array, ...]:
+    """Return the stored alternatives of a pose, (n_values,) each."""
+    n_values = len(session.people[person].model.value_names)
+    found = store.alternatives(session.people[person].name, frame)
+    return tuple(other.values for other in found if len(other.values) == n_values)
+
+
+def _stored_starts(session: Session, store: AnnotationStore, plan: TrackPlan) -> dict[int, PoseRecord]:
+    """Return the stored poses of the frame that a run goes out from, by index of the person."""
+    if plan.start is None:
+        return {}
+    found = {i: store.pose(session.people[i].name, plan.start) for i in plan.people}
+    return {i: record for i, record in found.items() if record is not None}
 
 
 def _rows_before(

@@ -1,55 +1,44 @@
-"""Drive one run of a tracker over a session: both passes, smoothing, and saving as one entry of the history."""
+"""Drive one run of a tracker over a session: passes, estimate, and saving as one entry of the history."""
 
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from tracker.body.model import PosedBody
+from tracker.compute.progress import mapped
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
 from tracker.pipeline.calibration_check import contradiction
+from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row
+from tracker.pipeline.keyframe_stretches import between_keyframes, seam_of, with_seam
 from tracker.pipeline.posed_recording import PosedRecording
-from tracker.pipeline.run_repair import RepairStep, RunRepair
 from tracker.pipeline.smoothing import TrackedRows
-from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson, tracked_changes
-from tracker.store.records import AssessmentChange, PoseChange
+from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson, settings_record, tracked_changes
+from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
-from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.settings import EstimationSettings
-from tracker.tracking.person_memory import HISTORY_FRAMES
+from tracker.tracking.runs.frame_hypotheses import Proposal
+from tracker.tracking.runs.path_assessment import RunPose
+from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import Tracker, TrackingRun
-from tracker.tracking.view_tracks import FrameTracks, tracks_without_views, velocities_of
 
 
-class SmoothedRows(NamedTuple):
-    """The result of smoothing a run and of classifying its poses again."""
+class EstimateStep(NamedTuple):
+    """Progress of the estimate of all poses."""
+
+    done: int
+    total: int
+
+
+class EstimatedRows(NamedTuple):
+    """The poses of a run, estimated from all its frames."""
 
     changes: tuple[PoseChange, ...]
     """The rows of all people, which take the place of those with tracked poses."""
     keyframes: tuple[AssessmentChange, ...] = ()
     """The assessment of their keyframes, which stay."""
-
-
-class AuditStep(NamedTuple):
-    """A frame that was tracked without each view in turn."""
-
-    frame: int
-    tracks: Mapping[int, FrameTracks]
-    """By index of the person."""
-    done: int
-    """Frames so far."""
-    total: int
-
-
-class SolveStep(NamedTuple):
-    """Progress of the solve of the paths."""
-
-    done: int
-    """Frames so far."""
-    total: int
 
 
 class CameraStep(NamedTuple):
@@ -59,9 +48,9 @@ class CameraStep(NamedTuple):
     """A sentence for the user."""
 
 
-Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SolveStep | SmoothedRows | CameraStep
-"""A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit, of
-the repair or of the solve, all smoothed poses, or a camera that is off."""
+Step = PoseEstimate | BackwardStep | EstimateStep | EstimatedRows | CameraStep
+"""A step of a run: a frame of the first pass or of the second, progress of the estimate, all estimated poses, or a
+camera that is off."""
 
 
 class Leg(NamedTuple):
@@ -72,7 +61,10 @@ class Leg(NamedTuple):
     before: Sequence[TrackedFrame] = ()
     """Frames of the same leg that are known: those of an interrupted run, or the start. In the order of tracking."""
     start: int | None = None
-    """Frame whose stored pose the run goes out from. It is tracked to learn from it, and keeps its stored pose."""
+    """Frame whose stored pose the run goes out from. It is tracked to learn from it; a pose that was found is estimated
+    with the others."""
+    stored: Mapping[int, PoseRecord] = {}
+    """Stored poses of the start by person."""
 
     @property
     def frames(self) -> list[int]:
@@ -97,35 +89,12 @@ def outward(frames: Sequence[int], start: int) -> list[Sequence[int]]:
     return [leg for leg in legs if len(leg) > 1] or [[start]]
 
 
-def _with_starts(legs: Sequence[Leg]) -> Subjects:
-    """Return the subjects with the poses that a run goes out from among the keyframes: both are stored already."""
-    subjects = legs[0].run.subjects
-    keyframes = dict(subjects.keyframes)
-    for leg in legs:
-        for frame, poses, *_ in leg.before:
-            if frame == leg.start:
-                keyframes[frame] = {**dict(enumerate(poses)), **keyframes.get(frame, {})}
-    return replace(subjects, keyframes=keyframes)
-
-
-def _solve_steps(
-    steps: Generator[int, None, list[PoseChange]], before: int, total: int
-) -> Generator[SolveStep, None, list[PoseChange]]:
-    """Report how many frames of all people steps have read; return their result."""
-    while True:
-        try:
-            yield SolveStep(before + next(steps), total)
-        except StopIteration as end:
-            found: list[PoseChange] = end.value
-            return found
-
-
 class TrackSession:
     """One run of a tracker and its results so far. It has one leg, or two that go out from a start.
 
-    `first_pass`, `backward_pass`, `audit`, `repair`, `smoothing` and `cameras` do the work in this order. Any
-    thread may drain them. Each step is handed to `take` before the next one is asked for, under the lock of results and
-    writer. A run stops where its steps are no longer asked for, and goes on where they are again.
+    `first_pass`, `backward_pass`, `estimate` and `cameras` do the work in this order. Any thread may drain them. Each
+    step is handed to `take` before the next one is asked for, under the lock of results and writer. A run stops where
+    its steps are no longer asked for, and goes on where they are again.
     """
 
     def __init__(
@@ -157,15 +126,16 @@ class TrackSession:
         """Cost of each frame that this run has tracked, px."""
         self.normal_matrices: dict[int, tuple[NormalMatrix | None, ...]] = {}
         """How well contours determine the pose of each person, by frame; empty where the method does not compute it."""
-        self.n_improved = 0
-        """Number of poses that the backward pass has replaced."""
+        self.n_moved = 0
+        """Number of poses with a limb elsewhere than where the first pass had it."""
         self.visited: int | None = None
         """The frame that the backward pass visited last; None before it."""
         self.finished = False
-        """Whether both passes and smoothing are done."""
+        """Whether both passes and the estimate are done."""
         self.contradiction = ""
         """A sentence if the contours contradict the calibration; empty before the end, or if they do not."""
-        self._held = _with_starts(legs)
+        self._proposals: dict[tuple[int, int], list[Proposal]] = {}
+        self._backward: dict[int, tuple[Array, ...]] = {}
         self._rows = {i: (rows_before or {}).get(i, TrackedRows()) for i in self.subjects.tracked}
         self._waiting: list[PoseChange] = []
         self._n_waiting = 0
@@ -192,12 +162,10 @@ class TrackSession:
         return next((a, b) for a, b in known if min(a, b) <= frame <= max(a, b))
 
     def steps(self) -> Iterator[Step]:
-        """Run both passes, audit, repair and smooth the poses, and look at the cameras."""
+        """Run both passes, estimate the poses, and look at the cameras."""
         yield from self.first_pass()
         yield from self.backward_pass()
-        yield from self.audit()
-        yield from self.repair()
-        yield from self.smoothing()
+        yield from self.estimate()
         yield from self.cameras()
 
     def first_pass(self) -> Iterator[PoseEstimate]:
@@ -207,68 +175,75 @@ class TrackSession:
                 yield from (found for found in self.tracker.estimates(leg.run) if found.frame != leg.start)
 
     def backward_pass(self) -> Iterator[BackwardStep]:
-        """Track backward between keyframes, and where people were lost, in this run or before it was interrupted."""
-        for leg in self.legs:
-            known = [f.frame for f in leg.before]
-            tracked = [self.tracked[k] for k in (*known, *leg.frames)]
-            yield from self.tracker.backward_pass(leg.run, tracked)
-
-    def audit(self) -> Iterator[AuditStep]:
-        """Track all frames once more without each view in turn, each leg from its first pose; see `view_tracks`.
-
-        A leg that is shorter than what a tracker remembers is left out: its tracks would have no history of their own.
-        """
-        legs = [leg for leg in self.legs if self.tracker.settings.audit and len(leg.whole) > HISTORY_FRAMES]
+        """Track each leg once more from its last frame back to its first. Its poses are proposals."""
+        if not self._compares:
+            return
+        legs = [leg for leg in self.legs if len(leg.whole) > 1]
         done, total = 0, sum(len(leg.whole) for leg in legs)
         for leg in legs:
-            first = self.tracked[leg.whole[0]].poses
-            # A pose and the same one before it are a prediction: the tracker does not search around it again.
-            run = replace(leg.run, start=[[pose, pose] for pose in first], frames=leg.whole)
-            known = {k: self.tracked[k].poses for k in leg.whole}
-            for frame, tracks in tracks_without_views(self.tracker, run, known):
+            frames = leg.whole[::-1]
+            last = [[pose] for pose in self.tracked[frames[0]].poses]
+            for found in self.tracker.estimates(replace(leg.run, start=last, frames=frames)):
                 done += 1
-                yield AuditStep(frame, tracks, done, total)
+                yield BackwardStep(TrackedFrame.of(found), done, total)
 
-    def repair(self) -> Iterator[RepairStep]:
-        """Compare the consensus of the tracks with the colours of the whole run, and search limbs; see `run_repair`."""
-        settings, subjects = self.tracker.settings, self._held
-        frames = [k for leg in self.legs for k in leg.whole if all(k in r.tracks for r in self._rows.values())]
-        if not frames or not isinstance(settings, EstimationSettings):
-            return
-        bodies = self._bodies(frames)
-        tracks = {i: rows.tracks for i, rows in self._rows.items()}
+    @property
+    def _compares(self) -> bool:
+        """Whether poses are compared over the whole run; the estimates of other methods are smoothed."""
+        settings = self.tracker.settings
+        return settings.whole_run and isinstance(settings, EstimationSettings)
 
-        others = {(k, i): poses for k in frames for i, poses in enumerate(self.tracked[k].alternatives)}
-        yield from RunRepair(self.observer, subjects, settings, bodies, tracks, others).steps()
-
-    def _bodies(self, frames: Sequence[int]) -> dict[int, Bodies]:
-        """Return all people on some frames, by all that is known so far."""
-        subjects, known = self._held, dict[int, list[Array]]()
-        for k in frames:
-            known[k] = [*self.tracked[k].poses]
-            for i, rows in self._rows.items():
-                if i not in subjects.keyframes_at(k) and k in rows:
-                    known[k][i] = rows.best_pose(subjects.models[i], k, subjects.active_dofs[i])
-        velocities = velocities_of(subjects.models, known)
-        out = dict[int, Bodies]()
-        for k in frames:
-            moving = velocities(k) if any(self.observer.ahead_frames(k)) else [None] * len(subjects.models)
-            out[k] = tuple(map(PosedBody, subjects.models, known[k], moving))
-        return out
-
-    def smoothing(self) -> Iterator[SolveStep | SmoothedRows]:
-        """Solve the paths of all people and assess them. Their rows come last: as a whole or not at all."""
-        smooth = self.tracker.settings.smooth
-        if smooth or any(rows.is_compared for rows in self._rows.values()):
-            held, fps, changes = self._held, self.legs[0].run.fps, list[PoseChange]()
-            evidence = self.tracker.evidence(self.observer, lambda: self._bodies(sorted(self.tracked)))
-            n = len(self.tracked)
+    def estimate(self) -> Iterator[EstimateStep | EstimatedRows]:
+        """Estimate the poses of all people and assess them. Their rows come last: as a whole or not at all."""
+        if self._compares:
+            yield (yield from self._estimated())
+        elif self.tracker.settings.whole_run:
+            changes, n = list[PoseChange](), len(self.tracked)
             for i, (person, rows) in enumerate(self._rows.items()):
-                steps = rows.finished(held, person, fps, smooth, evidence)
-                changes += yield from _solve_steps(steps, i * n, len(self._rows) * n)
-            assessed = (self._assessed_keyframes(person) for person in self._rows)
-            yield SmoothedRows(tuple(changes), tuple(change for found in assessed for change in found))
+                steps = rows.finished(self.subjects, person, self.legs[0].run.fps)
+                changes += yield from mapped(steps, lambda done, i=i: EstimateStep(i * n + done, len(self._rows) * n))
+            yield EstimatedRows(tuple(changes))
         self.finished = True
+
+    def _estimated(self) -> Generator[EstimateStep, None, EstimatedRows]:
+        settings, subjects = self.tracker.settings, self.subjects
+        assert isinstance(settings, EstimationSettings)
+        proposals = {at: [*found] for at, found in self._proposals.items()}
+        for k, tracked in self.tracked.items():
+            former = subjects.former.get(k, {})
+            for i in subjects.tracked:
+                known = [(pose, "alternative") for pose in (tracked.alternatives[i] if tracked.alternatives else ())]
+                known += [(former[i], "former")] if i in former else []
+                proposals.setdefault((k, i), []).extend(Proposal(*own) for own in known)
+        poses = {k: tracked.poses for k, tracked in self.tracked.items()}
+        run = RunFrames(self.observer, subjects, settings, self.legs[0].run.fps, poses, proposals)
+        found = yield from mapped(estimate_run(run), lambda step: EstimateStep(*step))
+        return self._rows_estimated(found)
+
+    def _rows_estimated(self, found: Mapping[int, Mapping[int, RunPose]]) -> EstimatedRows:
+        """Return the rows of estimated poses, by person and frame."""
+        subjects, changes, keyframes = self.subjects, list[PoseChange](), list[AssessmentChange]()
+        settings = settings_record(self.tracker.settings)
+        starts = {leg.start: leg.stored for leg in self.legs if leg.start is not None}
+        for i, of_person in found.items():
+            model, stored, rows = subjects.models[i], self._stored[i], self._rows[i]
+            between = between_keyframes(subjects.keyframes, i, sorted(of_person))
+            for k, pose in of_person.items():
+                keyframe = subjects.keyframes_at(k).get(i)
+                if keyframe is not None:
+                    keyframes.append(assessed_keyframe(model, stored.name, k, keyframe, pose))
+                    continue
+                before = rows.pose(k) or starts.get(k, {}).get(i)
+                row = estimated_row(model, before, pose, stored.revision, settings)
+                if k in between and k in self._backward:
+                    ends = between[k]
+                    held = [subjects.keyframes[end][i] for end in ends]
+                    row = with_seam(
+                        model, row, seam_of(model, self.tracked[k].poses[i], self._backward[k][i], ends, held)
+                    )
+                others = tuple(Alternative(h.pose, stored.revision) for h in pose.others)
+                changes.append(PoseChange(stored.name, k, row, others))
+        return EstimatedRows(tuple(changes), tuple(keyframes))
 
     def cameras(self) -> Iterator[CameraStep]:
         """Look whether the contours contradict the calibration; see `contradiction`."""
@@ -277,36 +252,20 @@ class TrackSession:
             if found := contradiction(PosedRecording.of_run(self.observer, fps, models, self.tracked)):
                 yield CameraStep(found)
 
-    def _assessed_keyframes(self, person: int) -> list[AssessmentChange]:
-        keyframes = {k: own[person] for k, own in self.subjects.keyframes.items() if person in own}
-        name = self._stored[person].name
-        return self._rows[person].assessed_keyframes(self.subjects.models[person], name, keyframes)
-
     def take(self, step: Step) -> None:
-        """Keep the results of a step.
-
-        An interval that the backward pass improves is saved at once, as a whole or not at all.
-        """
+        """Keep the results of a step."""
         if isinstance(step, BackwardStep):
-            self._take_improved(step)
+            self._take_backward(step.found)
             return
-        if isinstance(step, SmoothedRows):
-            self._take_finished(step)
+        if isinstance(step, EstimatedRows):
+            self._take_estimated(step)
             return
         if isinstance(step, CameraStep):
             self.contradiction = step.contradiction
             return
-        if isinstance(step, SolveStep):
+        if isinstance(step, EstimateStep):
             return
-        if isinstance(step, AuditStep):
-            for person, tracks in step.tracks.items():
-                self._rows[person].add_tracks(step.frame, tracks)
-            return
-        if isinstance(step, RepairStep):
-            for person, poses in (step.found or {}).items():
-                self._rows[person].add_repaired(poses)
-            return
-        self._waiting += self._rows_of([step], self.subjects.tracked)
+        self._waiting += self._rows_of(step)
         self._n_waiting += 1
         self.tracked[step.frame] = TrackedFrame.of(step)
         self.costs_px[step.frame] = step.cost_px
@@ -341,40 +300,36 @@ class TrackSession:
         of_frames = [self.tracked[k].statuses for k in self.costs_px or self.tracked]
         return [Counter(s[i] for s in of_frames) for i in range(len(self._stored))]
 
-    def _take_improved(self, step: BackwardStep) -> None:
+    def _take_backward(self, found: TrackedFrame) -> None:
         self.save()
-        self.visited = step.frame
-        for found in step.better:
-            self.tracked[found.frame] = TrackedFrame.of(found)
-            if found.frame in self.costs_px:
-                self.costs_px[found.frame] = found.cost_px
-        self.n_improved += len(step.better)
-        if step.other_pass is not None:
-            self._rows[step.person].add_other_pass(step.other_pass)
-        self._write(self._rows_of(step.better, [step.person]))
+        self.visited = found.frame
+        self._backward[found.frame] = found.poses
+        for i in self.subjects.tracked:
+            known = self._proposals.setdefault((found.frame, i), [])
+            known.append(Proposal(found.poses[i], "backward"))
+            known += [Proposal(pose, "alternative") for pose in (found.alternatives[i] if found.alternatives else ())]
 
-    def _take_finished(self, step: SmoothedRows) -> None:
+    def _take_estimated(self, step: EstimatedRows) -> None:
         self.save()
         for i, person in enumerate(self._stored):
             poses = {c.frame: c.pose for c in step.changes if c.person == person.name and c.pose is not None}
             statuses = {k: pose.status for k, pose in poses.items()}
             statuses |= {c.frame: c.status for c in step.keyframes if c.person == person.name}
+            self.n_moved += sum(any(x.kind == "path" for x in pose.trace or ()) for pose in poses.values())
             for frame in statuses.keys() & self.tracked.keys():
                 values = poses[frame].values if frame in poses else None
                 self.tracked[frame] = self.tracked[frame].assessed(i, status_named(statuses[frame]), values)
         self._write([*step.changes, *step.keyframes])
         self.finished = True
 
-    def _rows_of(self, found: Sequence[PoseEstimate], people: Sequence[int]) -> list[PoseChange]:
-        """Return the rows of estimates, and keep them for smoothing."""
-        keyframes, settings = self._held.keyframes, self.tracker.settings
-        changes: list[PoseChange] = []
-        for estimate in found:
-            for person in people:
-                rows = tracked_changes([estimate], self._stored, [person], keyframes, settings)
-                for change in rows:
-                    self._rows[person].add(change, estimate.covariances[person], estimate.qualities[person])
-                changes += rows
+    def _rows_of(self, found: PoseEstimate) -> list[PoseChange]:
+        """Return the rows of an estimate, and keep them."""
+        changes = list[PoseChange]()
+        for i in self.subjects.tracked:
+            rows = tracked_changes([found], self._stored, [i], self.subjects.keyframes, self.tracker.settings)
+            for change in rows:
+                self._rows[i].add(change, found.covariances[i], found.qualities[i])
+            changes += rows
         return changes
 
     def _write(self, changes: Sequence[RunChange]) -> None:

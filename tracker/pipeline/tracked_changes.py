@@ -113,15 +113,15 @@ def tracked_changes(
                 ("tracked",) * len(found.poses[i]),
                 stored[i].revision,
                 status=found.statuses[i],
-                cost_px=_number(found.cost_px),
+                cost_px=number(found.cost_px),
                 settings=record,
-                view_costs_px=tuple(_number(c) for c in found.view_costs_px),
-                part_costs_px=tuple(_number(c) for c in found.part_costs_px[i]),
+                view_costs_px=tuple(number(c) for c in found.view_costs_px),
+                part_costs_px=tuple(number(c) for c in found.part_costs_px[i]),
                 remark=found.notes[i],
                 limbs_lost=_limbs_lost(found.qualities[i]),
                 trace=found.traces[i] if found.traces else None,
             ),
-            tuple(Alternative(o.values, stored[i].revision, _number(o.cost_px)) for o in found.alternatives[i]),
+            tuple(Alternative(o.values, stored[i].revision, number(o.cost_px)) for o in found.alternatives[i]),
         )
         for found in estimates
         for i in tracked
@@ -199,6 +199,6 @@ def _limbs_lost(quality: PoseQuality | None) -> tuple[float, ...]:
     return () if quality is None else tuple(map(float, quality.lost_probabilities))
 
 
-def _number(value: float) -> float | None:
+def number(value: float) -> float | None:
     """Return None for NaN and infinity, which JSON cannot hold."""
     return float(value) if np.isfinite(value) else None

@@ -16,5 +16,4 @@ __all__ = [
     "subjects",
     "tracker",
     "view_regions",
-    "view_tracks",
 ]

@@ -1,6 +1,5 @@
-"""Results that every tracker returns: the poses of a frame, and the steps of a backward pass."""
+"""Results that every tracker returns: the poses of a frame, and the frames of a backward pass."""
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 from tracker.body.searches import Search
@@ -60,7 +59,7 @@ class PoseEstimate(NamedTuple):
 
 
 class TrackedFrame(NamedTuple):
-    """A tracked frame as a backward pass needs it. Tuples are indexed by person."""
+    """A tracked frame, without what only its display needs. Tuples are indexed by person."""
 
     frame: int
     poses: tuple[Array, ...]
@@ -72,7 +71,7 @@ class TrackedFrame(NamedTuple):
 
     @classmethod
     def of(cls, estimate: PoseEstimate) -> "TrackedFrame":
-        """Return the part of an estimate that a backward pass needs; the whole holds much more."""
+        """Return the part of an estimate that is kept; the whole holds much more."""
         alternatives = tuple(tuple(a.values for a in of_one) for of_one in estimate.alternatives)
         return cls(estimate.frame, estimate.poses, estimate.statuses, alternatives)
 
@@ -83,26 +82,10 @@ class TrackedFrame(NamedTuple):
         return self._replace(poses=poses, statuses=statuses)
 
 
-class OtherPass(NamedTuple):
-    """Poses of one person between two keyframes by the pass, forward or backward, that was not selected there."""
-
-    between: tuple[int, int]
-    """The keyframes, the earlier one first."""
-    poses: Mapping[int, Array]
-    """By frame, (n_values,) each."""
-
-
 class BackwardStep(NamedTuple):
-    """A step of a backward pass: one visit to one frame of an interval."""
+    """A frame that was tracked backward. Its poses are proposals: those of the forward pass stay."""
 
-    frame: int
-    person: int
+    found: TrackedFrame
     done: int
-    """Steps so far."""
+    """Frames so far."""
     total: int
-    """Steps in all, over all people and intervals."""
-    better: tuple[PoseEstimate, ...] = ()
-    """At the end of an interval the estimates that replace former ones, in the order of tracking. They differ in this
-    person alone; poses and statuses of the others are unchanged."""
-    other_pass: OtherPass | None = None
-    """At the end of an interval between two keyframes, the poses that the selected ones are compared with."""

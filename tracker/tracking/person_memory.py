@@ -42,7 +42,6 @@ class PersonMemory:
         start: Array | Sequence[Array],
         active_dofs: NDArray[np.bool_] | None = None,
         alone: bool = True,
-        searches_around: bool = True,
     ) -> None:
         """Begin with the poses before the first frame.
 
@@ -51,7 +50,6 @@ class PersonMemory:
             start: the pose from which the first frame is predicted, (n_values,), or several, the last one last.
             active_dofs: the degrees of freedom that may move, (n_dofs,); None: all.
             alone: whether there is nobody else.
-            searches_around: whether the surroundings of a pose may be searched.
         """
         self.model, self.active_dofs, self.alone = model, active_dofs, alone
         self.limbs = movable(limbs(model), active_dofs)
@@ -65,7 +63,6 @@ class PersonMemory:
         self.step_frames: int | None = None
         """Frames from the last pose to the one that is estimated, negative backward; None where the velocity there is
         unknown, or known otherwise than from the last pose."""
-        self._searches_around = searches_around and alone
         self._n_frames = 0
         self._backoffs: dict[str, tuple[int, int]] = {}  # by limb: frame of the last search, back-off
         self._odds_searched: dict[str, float] = {}  # by limb: search odds before the last search
@@ -139,7 +136,7 @@ class PersonMemory:
         """
         status, (last, backoff) = classify(quality), self._backoffs.get(_AROUND, (-1, 0))
         is_due = status == "lost" or self._n_frames > last + min(backoff, _MAX_BACKOFF_FRAMES)
-        return self._searches_around and status != "good" and is_due
+        return self.alone and status != "good" and is_due
 
     def record_sampling(self, found: bool) -> None:
         """Record the outcome of a search around a pose.

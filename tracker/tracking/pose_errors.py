@@ -1,8 +1,7 @@
-"""Errors of joints from how far tracks without a view each lie apart, and the status of a pose from them.
+"""Errors of joints by all frames of a run, and the status of a pose from them and from what else it may be.
 
-The error of a point is normal. Its covariance is the mean square of the steps to the tracks without a view, and what
-all views share: sizes of the body, and where its joints lie in the flesh. Both were measured on simulated people by
-`tests/benchmarks/joint_errors.py`: a joint whose tracks lie 20, 40 and 80 mm apart is off by as much.
+The error of a point is normal. Its covariance is that of the solved path, and what all views share: sizes of the body,
+and where its joints lie in the flesh, which `tests/benchmarks/joint_errors.py` measures on simulated people.
 """
 
 from collections.abc import Sequence
@@ -12,7 +11,7 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import OTHER_BODY_M
-from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M, Hypothesis
+from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M
 from tracker.geometry.arrays import Array
 from tracker.tracking.run_confidence import RUN_MODEL
 
@@ -36,15 +35,15 @@ def acquired_sigma_m(joints_are_given: bool) -> float:
     return SHARED_M if joints_are_given else float(np.hypot(SHARED_M, OTHER_BODY_M))
 
 
-def point_covariances(model: BodyModel, steps: Array | float = 0.0) -> Array:
+def point_covariances(model: BodyModel, errors_m2: Array | float = 0.0) -> Array:
     """Return the covariances of the points of a body, (n_points, 3, 3), m^2.
 
     Args:
         model: the body.
-        steps: mean squares of the steps to other tracks, likewise.
+        errors_m2: those of the pose alone, likewise.
     """
     shared_m = OTHER_BODY_M if model.joint_sigma_m is None else model.joint_sigma_m
-    return np.asarray(steps + np.tile(shared_m**2 * np.eye(3), (len(model.point_names), 1, 1)))
+    return np.asarray(errors_m2 + np.tile(shared_m**2 * np.eye(3), (len(model.point_names), 1, 1)))
 
 
 def limb_odds(model: BodyModel, covariances: Array) -> Array:
@@ -75,23 +74,13 @@ def elsewhere_odds(nats: Array, is_searched: Sequence[bool]) -> Array:
     return np.asarray(odds[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
 
 
-def alternative_odds(model: BodyModel, pose: Array, alternatives: Sequence[Hypothesis]) -> Array:
-    """Return the log odds that each limb is off and lost, (n_limbs, 2), by other poses on the same evidence.
+def mass_odds(masses: Array) -> Array:
+    """Return the log odds that each limb is off and lost, (n_limbs, 2), by the mass of the paths on which it is
+    elsewhere, (n_limbs,)."""
+    from scipy.special import logit  # imported lazily, as above
 
-    A limb is as likely elsewhere as all poses together that have it there. It is at most as likely elsewhere as not:
-    poses that are clearly better have been taken, unless the pose stays.
-
-    Args:
-        model: the body.
-        pose: the pose, (n_values,).
-        alternatives: the other poses. Their costs are relative to that of the pose, nats.
-    """
-    points, odds = model.points_world(pose), np.full(len(limbs(model)), -np.inf)
-    for other in alternatives:
-        gaps = np.linalg.norm(other.body.points_world - points, axis=1)
-        is_off = [gaps[np.isin(model.point_parts, limb.parts)].max() > OFF_M for limb in limbs(model)]
-        odds = np.where(is_off, np.logaddexp(odds, -other.cost), odds)
-    return np.asarray(np.minimum(odds, 0.0)[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
+    odds = np.asarray(logit(np.clip(masses, 1e-12, 1 - 1e-12)))
+    return odds[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off)
 
 
 def beyond(radius_m: float, sigma_m: Array) -> Array:

@@ -1,7 +1,7 @@
 """The people of a tracking run: their bodies, whom to track, what may move, and keyframes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class Subjects:
     keyframes: Keyframes
     """Poses that stay as they are; tracking goes on from them."""
     former: Keyframes = field(default_factory=dict)
-    """Poses of the people to track that the run replaces. They stay candidates, see `backward_pass`."""
+    """Poses of the people to track that the run replaces. They are proposed, too."""
 
     @classmethod
     def of(
@@ -50,8 +50,3 @@ class Subjects:
     def keyframes_at(self, frame: int) -> Mapping[int, Array]:
         """Return the keyframes of a frame by person."""
         return self.keyframes.get(frame, {})
-
-    def without_keyframes(self) -> "Subjects":
-        """Return the same without keyframes of the people who are tracked."""
-        others = {k: {p: v for p, v in own.items() if p not in self.tracked} for k, own in self.keyframes.items()}
-        return replace(self, keyframes=others)

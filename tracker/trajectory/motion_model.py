@@ -129,7 +129,21 @@ class MotionModel:
 
     def nats(self, squares_m2: Array) -> float:
         """Return the cost of squared accelerations, (T, P), nats, but for a constant of the scales."""
-        sums = self._sums(squares_m2)
+        return float(np.sum(self.nats_of_sums(self._sums(squares_m2))))
+
+    def nats_of_sums(self, sums: Array) -> Array:
+        """Return the cost of sums of squares of each group in units of its scale, (..., G), nats, (...)."""
         if np.isinf(self.freedom):
-            return float(np.sum(sums) / 2)
-        return float(np.sum((self.freedom + self._n_dofs) / 2 * np.log1p(sums / self.freedom)))
+            return np.asarray(np.sum(sums, axis=-1) / 2)
+        return np.asarray(np.sum((self.freedom + self._n_dofs) / 2 * np.log1p(sums / self.freedom), axis=-1))
+
+
+def acceleration(times_s: Array) -> Array:
+    """Return the coefficients of three places in a row that give their acceleration per usual step², (T - 2, 3)."""
+    steps = np.diff(times_s)
+    if len(steps) < 2:
+        return np.zeros((0, 3))
+    before, after = steps[:-1], steps[1:]
+    usual = float(np.median(steps))
+    out = np.stack([1 / before, -1 / before - 1 / after, 1 / after], axis=1)
+    return np.asarray(out * (2 * usual**2 / (before + after))[:, None])

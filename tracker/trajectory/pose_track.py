@@ -4,13 +4,13 @@ A pose is a measurement with the covariance of its estimate. A limb that is not 
 after. See `tracker.trajectory.solve`.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import GaussianPrior, ResidualBlock
+from tracker.fitting.gauss_newton import GaussianPrior
 from tracker.geometry.arrays import Array, Mask
 from tracker.motion.prediction import MAX_ORDER
 from tracker.trajectory.motion_model import FLOOR_M2, FREEDOM
@@ -38,9 +38,6 @@ class PoseTrack:
     """Whether a degree of freedom is measured, (T, n_dofs): not in a lost limb. All of a fixed pose are."""
     active_dofs: Mask | None = None
     """Degrees of freedom that may change, (n_dofs,); None: all."""
-    evidence: Callable[[int], Sequence[ResidualBlock]] | None = None
-    """Returns the evidence of a frame by its place; none where there is none but the estimate. It takes the place of an
-    estimate of which all is trusted."""
 
 
 def smooth_poses(track: PoseTrack, freedom: float = FREEDOM) -> Generator[int, None, Array]:
@@ -63,16 +60,11 @@ def smooth_poses(track: PoseTrack, freedom: float = FREEDOM) -> Generator[int, N
     if len(known) > MAX_ORDER:
         used = slice(known[0], known[-1] + 1)
 
-        def evidence(t: int) -> Sequence[ResidualBlock]:
-            at = t + used.start
-            seen = track.evidence(at) if track.evidence is not None and track.trusted[at].all() else ()
-            return seen or [_measurement(track, at)]
-
         path = PosedPath(
-            track.model, track.times_s[used], track.poses[used], evidence, track.fixed[used], track.active_dofs,
-            track.trusted[used], freedom,
+            track.model, track.times_s[used], track.poses[used], lambda t: [_measurement(track, t + used.start)],
+            track.fixed[used], track.active_dofs, track.trusted[used], freedom,
         )  # fmt: skip
-        out[used] = yield from solve_path(path)
+        out[used] = (yield from solve_path(path)).poses
     return out
 
 

@@ -27,7 +27,7 @@ from tracker.fitting.gauss_newton import (
 )
 from tracker.geometry.arrays import Array, Mask
 from tracker.trajectory.block_band import factor
-from tracker.trajectory.motion_model import FREEDOM, MotionModel, motion_points
+from tracker.trajectory.motion_model import FREEDOM, MotionModel, acceleration, motion_points
 
 _ROUNDS = 10
 """Rounds of expectation maximization. With three and with thirty, the mean error of joints differs by 0.04 mm on `walk`
@@ -61,24 +61,32 @@ class PosedPath:
     which a leap is an error."""
 
 
-def solve_path(path: PosedPath) -> Generator[int, None, Array]:
+class SolvedPath(NamedTuple):
+    """The most likely poses of a path."""
+
+    poses: Array
+    """Within the joint limits, (T, n_values)."""
+    covariances: Array
+    """Of each pose, (T, n_dofs, n_dofs), rad and metres; 0 of fixed poses and locked degrees of freedom."""
+
+
+def solve_path(path: PosedPath) -> Generator[int, None, SolvedPath]:
     """Find the most likely poses of a path; fixed poses and locked degrees of freedom stay.
 
     Yields:
         The number of frames whose evidence was read so far, which takes most of the time.
-
-    Returns:
-        The poses within the joint limits, (T, n_values).
     """
-    poses, n_read = np.array(path.poses), 0
+    n, n_read = path.model.n_dofs, 0
+    poses, covariances = np.array(path.poses), np.zeros((len(path.poses), n, n))
     for own, used in _blocks(path):
         solver = _Solver(path, used)
         for t in range(used.start, used.stop):
             solver.read(t)
             n_read += own.start <= t < own.stop
             yield n_read
-        poses[own] = solver.solve()[own.start - used.start : own.stop - used.start]
-    return poses
+        found, within = solver.solve(), slice(own.start - used.start, own.stop - used.start)
+        poses[own], covariances[own] = found.poses[within], found.covariances[within]
+    return SolvedPath(poses, covariances)
 
 
 def _blocks(path: PosedPath) -> Iterator[tuple[slice, slice]]:
@@ -88,10 +96,20 @@ def _blocks(path: PosedPath) -> Iterator[tuple[slice, slice]]:
     """
     T = len(path.poses)
     seen = np.ones((T, path.model.n_dofs), bool) if path.seen is None else path.seen | path.fixed[:, None]
-    bounds = np.linspace(0, T, -(-T // _BLOCK_FRAMES) + 1).round().astype(int).tolist()
-    for first, end in pairwise(bounds):
-        start, stop = first - _unseen_frames(seen[:first][::-1]), end + _unseen_frames(seen[end:])
-        yield slice(first, end), slice(max(0, start - _OVERLAP_FRAMES), min(T, stop + _OVERLAP_FRAMES))
+    for own, used in even_blocks(T):
+        before, after = _unseen_frames(seen[: own.start][::-1]), _unseen_frames(seen[own.stop :])
+        yield own, slice(max(0, used.start - before), min(T, used.stop + after))
+
+
+def even_blocks(n_frames: int) -> list[tuple[slice, slice]]:
+    """Return the frames of each block of a run, and those that it is solved with: some more on both sides."""
+    if n_frames <= FRAMES_AT_ONCE:
+        return [(slice(0, n_frames), slice(0, n_frames))]
+    bounds = np.linspace(0, n_frames, -(-n_frames // _BLOCK_FRAMES) + 1).round().astype(int).tolist()
+    return [
+        (slice(first, end), slice(max(0, first - _OVERLAP_FRAMES), min(n_frames, end + _OVERLAP_FRAMES)))
+        for first, end in pairwise(bounds)
+    ]
 
 
 def _unseen_frames(seen: Mask) -> int:
@@ -126,7 +144,7 @@ class _Solver:
         # The cost of each frame is rough on its own: their sum is rougher by the root of their number.
         self.min_decrease = MIN_DECREASE * np.sqrt(len(self.fixed))
         self.points = motion_points(model)
-        self.coefficients = _acceleration(path.times_s[used])
+        self.coefficients = acceleration(path.times_s[used])
         active = np.ones(model.n_dofs, bool) if path.active_dofs is None else path.active_dofs
         self.locked = self.fixed[:, None] | ~active
         self.locked_values = value_mask(model, ~active)
@@ -147,8 +165,8 @@ class _Solver:
         """Read the evidence of the next frame, given by its place in the path."""
         self.evidence.append(() if self.path.fixed[t] else self.path.evidence(t))
 
-    def solve(self) -> Array:
-        """Return the most likely poses, (T, n_values)."""
+    def solve(self) -> SolvedPath:
+        """Return the most likely poses of the frames."""
         with one_blas_thread():
             first = here = self._linearized(self.start, None)
             if len(here.squares_m2):
@@ -161,7 +179,9 @@ class _Solver:
                 self.reach = CLOSE_ENOUGH
             if self.motion is not None:
                 self.motion = replace(self.motion, freedom=self.path.freedom)
-            return np.array(self._descended(self._linearized(first.poses, first)).poses)
+            found = self._descended(self._linearized(first.poses, first))
+            covariances = np.where(self.locked[:, None] | self.locked[:, :, None], 0.0, self._inverse(found)[0])
+            return SolvedPath(np.array(found.poses), covariances)
 
     def _learn(self, here: _State, inverse: Array) -> None:
         """Learn the motion from the path and its covariance; see `_inverse`."""
@@ -285,14 +305,3 @@ class _Solver:
         cost, gradient, hessian = (sum(parts[1:], start=parts[0]) for parts in zip(*found, strict=True))
         here = NormalEquations(float(cost), gradient, hessian)
         return (pose, here), here
-
-
-def _acceleration(times_s: Array) -> Array:
-    """Return the coefficients of three places in a row that give their acceleration per usual step², (T - 2, 3)."""
-    steps = np.diff(times_s)
-    if len(steps) < 2:
-        return np.zeros((0, 3))
-    before, after = steps[:-1], steps[1:]
-    usual = float(np.median(steps))
-    out = np.stack([1 / before, -1 / before - 1 / after, 1 / after], axis=1)
-    return np.asarray(out * (2 * usual**2 / (before + after))[:, None])

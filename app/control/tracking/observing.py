@@ -31,7 +31,7 @@ from tracker.observations.stored import list_observations, load_observations
 from tracker.pipeline.chain import unplaced
 from tracker.pipeline.keypoint_evidence import find_by_keypoints, read_points
 from tracker.pipeline.keypoint_poses import imported_changes, poses_of
-from tracker.pipeline.track_session import AuditStep, SolveStep, Step, TrackSession
+from tracker.pipeline.track_session import EstimateStep, Step, TrackSession
 from tracker.plausibility.examine import plan_examined_import
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -322,11 +322,9 @@ class _ShownProgress:
             self._n_tracked += 1
             self.report("tracking", min(1.0, self._n_tracked / max(1, len(run.frames))))
         elif isinstance(step, BackwardStep):
-            self.report("improving backward", step.done / step.total)
-        elif isinstance(step, AuditStep):
-            self.report("tracking without each view", step.done / step.total)
-        elif isinstance(step, SolveStep):
-            self.report("solving the whole path", step.done / step.total)
+            self.report("tracking backward", step.done / step.total)
+        elif isinstance(step, EstimateStep):
+            self.report("estimating all frames together", step.done / step.total)
 
 
 def _described(session: Session, name: str) -> ObservedSet:

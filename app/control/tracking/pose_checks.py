@@ -13,6 +13,8 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.pipeline.pose_check import PoseInRun, checked_pose, frames_around
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.settings import EstimationSettings
 
 _LOG = logging.getLogger(__name__)
 _GIVE_WAY_S = 0.05
@@ -68,7 +70,8 @@ class PoseChecks:
         person = self._person(change)
         try:
             state = session_state.state
-            settings = track_settings.of_run(state.settings, state.run_choices)
+            chosen = track_settings.of_run(state.settings, state.run_choices)
+            settings = chosen if isinstance(chosen, EstimationSettings) else TrackSettings()
             pose = self._in_run(person, change)
             if pose is not None:
                 observer = session_state.frames.observer.in_time()
@@ -97,7 +100,7 @@ class PoseChecks:
             if record is None or record.model_revision != saver.revisions.current(person):
                 return None
             posed = sorted(set.intersection(*(set(saver.index.frames(i)) for i in people)) | {change.frame})
-            frames = sorted({k for way in frames_around(change.frame, posed) for k in way})
+            frames = frames_around(change.frame, posed)
             known = {k: self._poses(k) for k in frames}
             active = session_state.active_dofs(person)
         return PoseInRun(change.frame, person, record, {k: p for k, p in known.items() if p is not None}, active)

@@ -1,4 +1,4 @@
-"""Show the steps of a tracking run: its progress, the frames that it tracks, and what later stages improve."""
+"""Show the steps of a tracking run: its progress, the frames that it tracks, and their poses by all frames."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -8,8 +8,7 @@ from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
 from app.state.progress import TrackStage, TrackState
 from app.state.state import StateChanges, finite_or_none
-from tracker.pipeline.run_repair import RepairStep
-from tracker.pipeline.track_session import AuditStep, SmoothedRows, SolveStep, Step, TrackSession
+from tracker.pipeline.track_session import EstimatedRows, EstimateStep, Step, TrackSession
 from tracker.tracking import confidence
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
@@ -34,15 +33,12 @@ class RunDisplay:
             step: of any stage.
             seconds: time that the run has worked so far.
         """
-        if isinstance(step, SmoothedRows):
+        if isinstance(step, EstimatedRows):
             self._show_finished()
-        elif isinstance(step, AuditStep | RepairStep | SolveStep):
-            stage: TrackStage = "solve" if isinstance(step, SolveStep) else "audit"
+        elif isinstance(step, BackwardStep | EstimateStep):
+            stage: TrackStage = "back" if isinstance(step, BackwardStep) else "solve"
             track = replace(self._session_state.state.track, stage=stage, done=step.done, total=step.total)
             self._session_state.set(track=replace(track, running=self._is_running()))
-        elif isinstance(step, BackwardStep):
-            self._show_improved(step, seconds)
-            self._session_state.refresh_saving()
         elif isinstance(step, PoseEstimate):
             self._show_tracked(step, seconds)
 
@@ -53,27 +49,12 @@ class RunDisplay:
         return ", ".join([f"{n_frames} frame{'' if n_frames == 1 else 's'}", *odd])
 
     def _show_finished(self) -> None:
-        """Show the smoothed pose of the shown frame, and how many frames are doubtful or lost in the end."""
+        """Show the estimated pose of the shown frame, and how many frames are doubtful or lost in the end."""
         session_state = self._session_state
         session_state.note_stored()
         session_state.refresh_saving()
         state = session_state.state
         session_state.show_frame(state.frame, follow=state.follow, track=self._with_doubts(state.track))
-
-    def _show_improved(self, step: BackwardStep, seconds: float) -> None:
-        """Show the progress of the backward pass, and what it improved at the end of an interval."""
-        session_state, track = self._session_state, self._session_state.state.track
-        if step.better:  # not at every step: there may be many frames
-            track = self._with_doubts(track)
-        steps = len(self._session.tracked) + step.done
-        track = replace(
-            track, running=self._is_running(), stage="back", done=step.done, total=step.total,
-            per_second=steps / max(1e-6, seconds),
-        )  # fmt: skip
-        if session_state.state.frame in {found.frame for found in step.better}:
-            session_state.show_frame(session_state.state.frame, follow=session_state.state.follow, track=track)
-        else:
-            session_state.set(track=track)
 
     def _show_tracked(self, found: PoseEstimate, seconds: float) -> None:
         """Show the progress of the first pass, and the frame if it is shown or followed."""

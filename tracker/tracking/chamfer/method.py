@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tracker.tracking.chamfer.constants import PAPER_BODY
-from tracker.tracking.estimation.options import AUDIT, BACKWARD_PASS, ORDER, RECOVER, SMOOTH, THETA, WINDOW
+from tracker.tracking.estimation.options import ORDER, RECOVER, THETA, WHOLE_RUN, WINDOW
 from tracker.tracking.method import Method, Option, PaperMode
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def _settings() -> "TrackSettings":
 def _paper_settings() -> "TrackSettings":
     from tracker.tracking.chamfer.paper import paper_settings
 
-    return replace(paper_settings(), smooth=False)
+    return paper_settings()
 
 
 def _require_paper_body(bodies: "Mapping[str, BodyModel]") -> None:
@@ -54,6 +54,6 @@ ESTIMATE = Option(
 CHAMFER = Method(
     "chamfer", "Chamfer matching",
     "edges; predicted, refined by Gauss-Newton, and searched if that does not suffice",
-    _settings, _tracker, (ESTIMATE, ORDER, WINDOW, RECOVER, BACKWARD_PASS, AUDIT, SMOOTH, THETA),
+    _settings, _tracker, (ESTIMATE, ORDER, WINDOW, RECOVER, WHOLE_RUN, THETA),
     PaperMode("Gavrila and Davis 1996", _paper_settings, PAPER_BODY, _require_paper_body), _at_stride,
 )  # fmt: skip

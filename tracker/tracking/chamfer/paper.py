@@ -36,7 +36,7 @@ def paper_settings() -> TrackSettings:
         recover=None,
         outliers="paper",
         edges=EdgeSettings(whole_images=True, static=False, max_segment_px=None, max_angle_rad=float(np.pi / 2)),
-        backward_pass=False,
+        whole_run=False,
     )
 
 

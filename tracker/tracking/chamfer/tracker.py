@@ -1,34 +1,21 @@
 """The chamfer tracker of GD96 behind the interface that all trackers share."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from tracker.evidence.observer import Observer
 from tracker.tracking.chamfer.frame_estimator import ChamferEstimator
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
-from tracker.tracking.estimation.backward_pass import track_backward
+from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.estimation.forward_pass import track_forward
-from tracker.tracking.estimation.path_evidence import evidence_of_frames
-from tracker.tracking.tracker import BodiesByFrame, PathEvidence, TrackingRun
+from tracker.tracking.tracker import TrackingRun
 
 
 @dataclass(frozen=True)
 class ChamferTracker:
-    """Predict, observe, estimate and assess, one frame at a time; then track back through lost intervals."""
+    """Predict, observe, estimate and assess, one frame at a time."""
 
     settings: TrackSettings = field(default_factory=TrackSettings)
 
     def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
         """See `Tracker.estimates`."""
         return track_forward(run, self.settings, ChamferEstimator)
-
-    def backward_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
-        """See `Tracker.backward_pass`; nothing where the settings switch it off."""
-        if not self.settings.backward_pass:
-            return iter(())
-        return track_backward(run, tracked, self.settings, ChamferEstimator)
-
-    def evidence(self, observer: Observer, bodies: Callable[[], BodiesByFrame]) -> PathEvidence:
-        """See `Tracker.evidence`."""
-        return evidence_of_frames(observer, bodies, self.settings)

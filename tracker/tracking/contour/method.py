@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tracker.tracking.estimation.options import AUDIT, BACKWARD_PASS, ORDER, RECOVER, SMOOTH, THETA, WINDOW
+from tracker.tracking.estimation.options import ORDER, RECOVER, THETA, WHOLE_RUN, WINDOW
 from tracker.tracking.method import Method, Option, PaperMode
 
 if TYPE_CHECKING:
@@ -53,6 +53,6 @@ SLIDING = Option(
 CONTOUR = Method(
     "contour", "Extremal contours",
     "extremal contours, refined by Gauss-Newton until it converges, without a search of whole bodies",
-    _settings, _tracker, (IMAGE_CONTOURS, SLIDING, ORDER, WINDOW, RECOVER, BACKWARD_PASS, AUDIT, SMOOTH, THETA),
+    _settings, _tracker, (IMAGE_CONTOURS, SLIDING, ORDER, WINDOW, RECOVER, WHOLE_RUN, THETA),
     PaperMode("Knossow, Ronfard and Horaud 2008", _paper_settings), _at_stride,
 )  # fmt: skip

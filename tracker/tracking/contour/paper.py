@@ -22,9 +22,7 @@ def paper_settings(image_contours: ImageContours = "silhouettes", sliding: bool 
         recover=None,
         segments=False,
         edges=EdgeSettings(whole_images=True, static=False, max_segment_px=None, max_angle_rad=float(np.pi / 2)),
-        backward_pass=False,
-        smooth=False,
-        audit=False,
+        whole_run=False,
         image_contours=image_contours,
         paper=True,
     )

@@ -7,6 +7,7 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.body.searches import Search
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import covariance
 from tracker.fitting.hypothesis import Hypothesis
@@ -57,7 +58,7 @@ def estimate_fixed(problem: FrameProblem, person: int, bodies: Bodies) -> Person
     model = bodies[person].model
     costs = problem.residuals(person, bodies).part_costs(bodies[person].values)
     zero = np.zeros((model.n_dofs, model.n_dofs))
-    return PersonEstimate("good", "", _part_costs_px(problem, costs), zero, 0, None)
+    return PersonEstimate("good", "", part_costs_px(problem.views, costs), zero, 0, None)
 
 
 def estimate_at(
@@ -96,7 +97,7 @@ def finalize(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFi
     model = found.body.model
     out = PersonEstimate(
         confidence.classify(quality), ", ".join(found.notes) or confidence.reason(quality),
-        _part_costs_px(problem, costs), covariance(model, found.fit), found.evaluations, quality,
+        part_costs_px(problem.views, costs), covariance(model, found.fit), found.evaluations, quality,
         trace=found.trace,
     )  # fmt: skip
     if not found.alternatives:
@@ -108,9 +109,9 @@ def finalize(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFi
     )
 
 
-def _part_costs_px(problem: FrameProblem, costs: PartCosts) -> Array:
+def part_costs_px(views: Sequence[ViewEvidence], costs: PartCosts) -> Array:
     """Return the mean distance of each part's contour to the edges over all views, (n_parts,), px of the footage."""
-    scales = np.array([v.scale for v in problem.views])
+    scales = np.array([v.scale for v in views])
     length = (costs.length_px / scales[:, None]).sum(axis=0)
     far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
     return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)

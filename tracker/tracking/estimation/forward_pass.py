@@ -30,25 +30,21 @@ _Predict = Callable[[PersonMemory, PredictSettings], Array]
 
 
 def track_forward(
-    run: TrackingRun, settings: EstimationSettings, make_estimator: type[FrameEstimator] = FrameEstimator,
-    lead_in: int = 0,
-) -> Iterator[PoseEstimate]:  # fmt: skip
+    run: TrackingRun, settings: EstimationSettings, make_estimator: type[FrameEstimator] = FrameEstimator
+) -> Iterator[PoseEstimate]:
     """Track all people frame by frame, in the order of `run.frames`.
 
     Args:
         run: what to track.
         settings: of the tracker.
         make_estimator: estimates a frame by the tracker's method.
-        lead_in: number of frames at the beginning that are learnt from, but not yielded.
 
     Yields:
         The poses of each frame.
     """
     way = _ForwardPass(run, settings, make_estimator)
     for i in range(len(run.frames)):
-        found = way.advance(i, is_start=i == 0 and not lead_in)
-        if i >= lead_in:
-            yield way.collected(found)
+        yield way.collected(way.advance(i))
 
 
 class _Found(NamedTuple):
@@ -79,18 +75,16 @@ class _ForwardPass:
     def __init__(self, run: TrackingRun, settings: EstimationSettings, make_estimator: type[FrameEstimator]) -> None:
         """Begin before the first frame; see `track_forward`."""
         self._run, self._settings, self._make_estimator = run, settings, make_estimator
-        self._held = run.subjects.without_keyframes() if run.estimates_keyframes else run.subjects
         self._memories = [self._memory(p, start) for p, start in enumerate(run.start)]
         cameras, self._learns_static = run.observer.working_cameras, settings.segments and settings.edges.static
         self._static_edges = [StaticEdgeModel(c.size) for c in cameras] if self._learns_static else None
         self._regions = _Regions(run, settings.edges.whole_images)
 
-    def advance(self, i: int, is_start: bool) -> _Found:
+    def advance(self, i: int) -> _Found:
         """Estimate the ith frame of the run, and learn from it.
 
         Args:
             i: the frames before it have been estimated.
-            is_start: whether the poses before the run were not tracked, and are compared with their surroundings.
         """
         run, settings, subjects, frame = self._run, self._settings, self._run.subjects, self._run.frames[i]
         if i == 0:
@@ -101,16 +95,13 @@ class _ForwardPass:
             self._regions.look_ahead(k, self._placed(k, PersonMemory.predict_two_ahead))
             self._read_ahead(k)
         seen = self._observe(frame, predicted, where)
-        seen, starts = self._settled(seen) if is_start else (seen, {})
+        seen, starts = self._settled(seen) if i == 0 else (seen, {})
         for k in () if self._regions.is_ahead else following:  # for one person now: this frame has kept all cores busy
             run.observer.prefetch(k)
         estimator = self._make_estimator(seen.views, self._memories, seen.bodies, settings, seen.contours)
-        keyframes, fixed = subjects.keyframes_at(frame), self._held.keyframes_at(frame)
+        fixed, people = subjects.keyframes_at(frame), range(len(subjects.models))
         estimates = estimator.estimate([p for p in subjects.tracked if p not in fixed])
-        people = range(len(subjects.models))
-        statuses: list[Status] = [
-            estimates[p].status if p in estimates and p not in keyframes else "good" for p in people
-        ]
+        statuses: list[Status] = [estimates[p].status if p in estimates else "good" for p in people]
         cost_of = self._learn(frame, estimator, seen.views, statuses, starts)
         return _Found(frame, estimator, estimates, starts, cost_of)
 
@@ -125,11 +116,12 @@ class _ForwardPass:
         """Return the state of a person who begins in some poses."""
         subjects, is_alone = self._run.subjects, len(self._run.subjects.models) == 1
         model, active = subjects.models[person], subjects.active_dofs[person]
-        return PersonMemory(model, start, active, is_alone, self._run.searches_around)
+        return PersonMemory(model, start, active, is_alone)
 
     def _placed(self, frame: int, predict: _Predict) -> Bodies:
         """Return all people on a frame: in their keyframes, as predicted, or where they stay if not tracked."""
-        subjects, keyframes, settings = self._held, self._held.keyframes_at(frame), self._settings.predict
+        subjects, settings = self._run.subjects, self._settings.predict
+        keyframes = subjects.keyframes_at(frame)
         poses = [
             keyframes.get(p, predict(m, settings) if p in subjects.tracked else m.history[-1])
             for p, m in enumerate(self._memories)
@@ -139,9 +131,7 @@ class _ForwardPass:
     def _read_first(self, frame: int) -> None:
         """Read the first frame. A run that goes on from known poses uses the regions of one without a break."""
         goes_on = len(self._memories) > 1 and all(len(m.history) > 1 for m in self._memories)
-        if self._run.regions is not None:
-            self._regions.look_ahead(frame, ())
-        elif goes_on:
+        if goes_on:
             self._regions.look_ahead(frame, self._placed(frame, PersonMemory.predict_before_last))
         self._read_ahead(frame)
 
@@ -159,7 +149,7 @@ class _ForwardPass:
     def _settled(self, seen: _Seen) -> tuple[_Seen, dict[int, SearchedStart]]:
         """Search the poses that the run begins with, where the first frame contradicts them; return what is seen from
         there, and the searches by person."""
-        frame, fixed = self._run.frames[0], self._held.keyframes_at(self._run.frames[0])
+        frame, fixed = self._run.frames[0], self._run.subjects.keyframes_at(self._run.frames[0])
         begun = StartFrame(*seen, lambda bodies: self._observe(frame, bodies, self._regions.new(bodies)).views)
         starts = settle_starts(begun, self._memories, self._run.subjects.tracked, self._settings)
         settled = {p: s.body for p, s in starts.items() if s.taken}
@@ -178,10 +168,9 @@ class _ForwardPass:
 
         If a frame contradicts its keyframe, colours are learnt from the settled pose.
         """
-        keyframes, fixed = self._run.subjects.keyframes_at(frame), self._held.keyframes_at(frame)
-        learnt = _learnt(estimator.bodies, {p: v for p, v in keyframes.items() if p not in fixed})
+        keyframes = self._run.subjects.keyframes_at(frame)
         settled = {p: starts[p].body for p in starts if starts[p].taken and p in keyframes}
-        learnt = tuple(settled.get(p, b) for p, b in enumerate(learnt))
+        learnt = tuple(settled.get(p, b) for p, b in enumerate(estimator.bodies))
         _remember(self._memories, estimator, learnt, statuses, keyframes)
         cost_of = chamfer_cost(views, estimator.bodies, self._settings)
         if self._static_edges is not None:
@@ -191,21 +180,18 @@ class _ForwardPass:
 
 
 class _Regions:
-    """Chooses the regions of each frame, a frame ahead for several people and where other runs use the same."""
+    """Chooses the regions of each frame, a frame ahead for several people."""
 
     def __init__(self, run: TrackingRun, whole_images: bool) -> None:
-        self._cameras, self._shared = run.observer.working_cameras, run.regions
+        self._cameras = run.observer.working_cameras
         self._whole: list[Region | None] | None = [None] * len(self._cameras) if whole_images else None
-        self.is_ahead = len(run.subjects.models) > 1 or run.regions is not None
+        self.is_ahead = len(run.subjects.models) > 1
         self.ahead: list[Region | None] = []
         """Regions of the frame that is read ahead."""
 
     def look_ahead(self, frame: int, predicted: Bodies) -> None:
         """Choose the regions of a frame that is read ahead."""
-        if self._shared is not None:
-            self.ahead = list(self._shared(frame))
-        else:
-            self.ahead = self._whole or regions_ahead(self._cameras, predicted)
+        self.ahead = self._whole or regions_ahead(self._cameras, predicted)
 
     def around(self, bodies: Bodies) -> list[Region | None]:
         """Return the regions that were chosen ahead, where they hold all bodies; else new ones."""
@@ -218,11 +204,6 @@ class _Regions:
         return self._whole or regions(self._cameras, bodies)
 
 
-def _learnt(bodies: Bodies, keyframes: Mapping[int, Array]) -> Bodies:
-    """Return all people, some of them in their keyframes."""
-    return tuple(PosedBody(b.model, keyframes[p]) if p in keyframes else b for p, b in enumerate(bodies))
-
-
 def _moving(run: TrackingRun, memories: Sequence[PersonMemory], bodies: Bodies, i: int) -> Bodies:
     """Return all people on the ith frame of a run with their velocities, if a view needs them.
 
@@ -232,11 +213,9 @@ def _moving(run: TrackingRun, memories: Sequence[PersonMemory], bodies: Bodies, 
         return bodies
     frames, out = run.frames, []
     first, second = (frames[i - 1], frames[i]) if i > 0 else (frames[0], frames[min(1, len(frames) - 1)])
-    known = [None] * len(bodies) if run.velocities is None else run.velocities(frames[i])
-    for memory, body, velocity in zip(memories, bodies, known, strict=True):
-        memory.step_frames = None if velocity is not None else (second - first) or 1
-        if memory.step_frames is not None:
-            velocity = shortest_step(body.model, body.values, memory.history[-1]) / memory.step_frames
+    for memory, body in zip(memories, bodies, strict=True):
+        memory.step_frames = (second - first) or 1
+        velocity = shortest_step(body.model, body.values, memory.history[-1]) / memory.step_frames
         out.append(PosedBody(body.model, body.values, velocity))
     return tuple(out)
 

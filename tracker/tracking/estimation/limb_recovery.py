@@ -25,7 +25,7 @@ from tracker.geometry.arrays import Array, IntArray
 from tracker.motion.shortest_step import nearest_equivalent
 from tracker.search.even_points import even_points
 from tracker.tracking.estimation.pose_score import PoseScorer
-from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, RecoverSettings
+from tracker.tracking.estimation.settings import RecoverSettings
 
 T = TypeVar("T")
 
@@ -100,10 +100,7 @@ def _search_limb(
         return scorer.scored(model, solver_of(model)(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE))
 
     def whole_body(scorer: PoseScorer, pose: Array) -> Hypothesis:
-        dofs = scorer.active_dofs
-        return scorer.scored(
-            model, solver_of(model)(model, pose, scorer.blocks, dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
-        )
+        return scorer.fitted(model, pose)
 
     of_limb = scorer.restricted_to(limb)
     if away is None:

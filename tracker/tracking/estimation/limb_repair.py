@@ -18,14 +18,12 @@ from tracker.body.limbs import Limb, limbs, movable
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.searches import Search
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import MIN_DECREASE
-from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
 from tracker.tracking.estimation.limb_recovery import search_entry, search_limbs
 from tracker.tracking.estimation.pose_score import PoseScorer, scorer_without_prediction
-from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings
+from tracker.tracking.estimation.settings import EstimationSettings
 
 MIN_GAIN_NATS = 2 * CLEAR_NATS
 """Smallest gain for which a tracked pose is replaced, nats: the other is then 400 times more likely."""
@@ -95,7 +93,7 @@ class RegionScorer(PoseScorer):
 
     def restricted_to(self, limb: Limb) -> "RegionScorer":
         """See `PoseScorer.restricted_to`."""
-        return _with_regions(super().restricted_to(limb), self.evidence, self.bodies, self.person, limb)
+        return with_regions(super().restricted_to(limb), self.evidence, self.bodies, self.person, limb)
 
     def _color_costs(self, poses: Array) -> Array:
         if self.limb is None:
@@ -148,9 +146,8 @@ def better_limbs(
     searched, tried = (movable(some, evidence.active_dofs) for some in (searched, tried))
     at = evidence.views, bodies, person, settings
     plain = scorer_without_prediction(*at, evidence.part_colors, evidence.active_dofs)
-    scorer = _with_regions(plain, evidence, bodies, person)
-    fit = solver_of(model)(model, tracked, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
-    start = scorer.scored(model, fit)
+    scorer = with_regions(plain, evidence, bodies, person)
+    start = scorer.fitted(model, tracked)
     unproposed = [x for x in tried if x.name not in [s.name for s in searched]]
     best, *rest = search_limbs(model, searched, start, others, scorer, unproposed)
     gain = start.cost - best.cost
@@ -161,8 +158,9 @@ def better_limbs(
     return Repair(tracked, start.cost, gain, (best, *rest), entry, start.pose)
 
 
-def _with_regions(
+def with_regions(
     plain: PoseScorer, evidence: FrameEvidence, bodies: Bodies, person: int, limb: Limb | None = None
 ) -> RegionScorer:
+    """Return a scorer that adds region evidence to a plain one; see `RegionScorer`."""
     own = {f.name: getattr(plain, f.name) for f in fields(PoseScorer)}
     return RegionScorer(**own, evidence=evidence, bodies=bodies, person=person, limb=limb)

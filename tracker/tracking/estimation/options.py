@@ -36,17 +36,8 @@ RECOVER = Option(
     "recover", "Search lost limbs", "search for a limb that is not where edges and colours are", "", "switch",
     lambda s: s.recover is not None, _with_recovery,
 )  # fmt: skip
-BACKWARD_PASS = Option(
-    "backward_pass", "Backward pass",
-    "at the end, track backward between two keyframes, and from the first trusted poses after a loss", "", "switch",
-    lambda s: s.backward_pass, lambda s, on: replace(s, backward_pass=on),
-)  # fmt: skip
-SMOOTH = Option(
-    "smooth", "Smooth", "at the end, smooth the poses over time; keyframes stay, lost limbs are not trusted", "",
-    "switch", lambda s: s.smooth, lambda s, on: replace(s, smooth=on),
-)  # fmt: skip
-AUDIT = Option(
-    "audit", "Audit",
-    "at the end, track once more without each camera in turn: the median is the pose, and how far these tracks lie "
-    "apart is its error", "", "switch", lambda s: s.audit, lambda s, on: replace(s, audit=on),
+WHOLE_RUN = Option(
+    "whole_run", "Whole run",
+    "at the end, track backward too, and estimate the poses of all frames together; keyframes stay", "", "switch",
+    lambda s: s.whole_run, lambda s, on: replace(s, whole_run=on),
 )  # fmt: skip

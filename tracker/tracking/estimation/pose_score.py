@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,11 @@ class PoseScorer:
         """Return a faster scorer for poses that differ in a limb alone. It works in the room of this one's clones."""
         return replace(self, clones=tuple(c.restricted_to(limb.parts) for c in self.clones))
 
+    def with_part_colors(self, colors: Colors, part_colors: PartColors | None) -> "PoseScorer":
+        """Return a scorer that ranks proposals by the colours of the parts, too. It works in the room of this one's
+        clones."""
+        return replace(self, colors=colors, part_colors=part_colors)
+
     def each(self, work: Callable[["PoseScorer", Array], T], poses: Sequence[Array] | Array) -> list[T]:
         """Apply work to each of several poses, (n_values,) each, in parallel; each thread has a scorer of its own."""
         return map_chunked(work, [replace(self, residuals=c) for c in self.clones], list(poses))
@@ -81,6 +86,11 @@ class PoseScorer:
     def scored(self, model: BodyModel, fit: Fit) -> Hypothesis:
         """Return the hypothesis of a refined pose, with its cost."""
         return Hypothesis.refined(model, fit, self.cost(fit))
+
+    def fitted(self, model: BodyModel, pose: Array) -> Hypothesis:
+        """Return the hypothesis of a pose, (n_values,), after its refinement."""
+        fit = solver_of(model)(model, pose, self.blocks, self.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+        return self.scored(model, fit)
 
     def costs(self, candidates: Array) -> Array:
         """Return the costs of poses, (n, n_values), without refinement and without priors, (n,)."""
@@ -147,20 +157,27 @@ def scorer_without_prediction(
         part_colors: colours of the parts; None where they are unknown.
         active_dofs: degrees of freedom that may move, (n_dofs,); None: all.
     """
-    residuals, priors = without_prediction(views, bodies, person, settings)
+    residuals, priors, keypoints = without_prediction(views, bodies, person, settings)
     known = None if settings.recover is None else part_colors
     recover = settings.recover or RecoverSettings()
-    return PoseScorer.of(residuals, priors, Colors(views, bodies, person), known, recover, active_dofs)
+    all_priors = [*priors, *keypoints]
+    return PoseScorer.of(residuals, all_priors, Colors(views, bodies, person), known, recover, active_dofs)
+
+
+class FrameBlocks(NamedTuple):
+    """What a frame tells of one person's pose, and what holds on every frame."""
+
+    residuals: PersonResiduals
+    """Of contours."""
+    priors: list[ResidualBlock]
+    keypoints: list[ResidualBlock]
 
 
 def without_prediction(
     views: Sequence[ViewEvidence], bodies: Bodies, person: int, settings: EstimationSettings
-) -> tuple[PersonResiduals, list[ResidualBlock]]:
+) -> FrameBlocks:
     """Return the residuals of one person on common evidence, and the priors of every frame; see above."""
     residuals = person_residuals(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
-    return residuals, [
-        PosePrior.of_spreads(bodies[person].model),
-        SelfPenetration(),
-        *penetration(bodies, person, settings),
-        *keypoint_blocks(views, person, bodies[person].velocity),
-    ]
+    model, velocity = bodies[person].model, bodies[person].velocity
+    priors = [PosePrior.of_spreads(model), SelfPenetration(), *penetration(bodies, person, settings)]
+    return FrameBlocks(residuals, priors, keypoint_blocks(views, person, velocity))

@@ -78,13 +78,8 @@ class EstimationSettings:
     """Whether people occlude each other and edges are assigned; else each is tracked as if alone."""
     rounds: int = 2
     """Largest number of rounds in which all people are refined again with the others where they were found."""
-    backward_pass: bool = True
-    """Whether people are tracked backward between two keyframes, and through intervals in which they were lost; see
-    `backward_pass`."""
-    smooth: bool = True
-    """Whether the poses are smoothed at the end of a run."""
-    audit: bool = True
-    """Whether the poses are compared with tracks without each view at the end of a run; see `view_tracks`."""
+    whole_run: bool = True
+    """Whether the poses of all frames are estimated together at the end of a run; see `tracker.tracking.runs`."""
     apart: float = 1.0
     """Weight of the term against people passing through each other; 0 leaves it out."""
     max_iterations: int = MAX_ITERATIONS

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tracker.tracking.estimation.options import SMOOTH
+from tracker.tracking.estimation.options import WHOLE_RUN
 from tracker.tracking.method import Method, Option, PaperMode
 from tracker.tracking.voxel.constants import MAX_VOXEL_M, MIN_VOXEL_M, PAPER_BODY
 
@@ -52,6 +52,6 @@ SIZES = Option(
 )  # fmt: skip
 VOXEL = Method(
     "voxel", "Voxels", "a Kalman filter on the parts of the body, measured by the voxels of the silhouettes",
-    _settings, _tracker, (VOXEL_SIZE, SIZES, SMOOTH),
+    _settings, _tracker, (VOXEL_SIZE, SIZES, WHOLE_RUN),
     PaperMode("Mikic and others 2001", _paper_settings, PAPER_BODY, _require_paper_body),
 )  # fmt: skip

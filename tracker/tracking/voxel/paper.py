@@ -37,7 +37,7 @@ def paper_settings(voxel_m: float = PAPER_VOXEL_M) -> VoxelSettings:
         by_size=True,
         levels=False,
         limit_rad=None,
-        smooth=False,
+        whole_run=False,
         paper=True,
     )
 

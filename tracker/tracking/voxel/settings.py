@@ -63,11 +63,8 @@ class VoxelSettings:
     limit_rad: float | None = 0.15
     """Standard deviation of the parts' rotations from the closest pose of the body, whose joints have limits, rad.
     None: the figure's joints are balls without limits, as in the paper."""
-    smooth: bool = True
+    whole_run: bool = True
     """Whether the poses are smoothed at the end of a run."""
-    audit: bool = False
-    """Whether the poses are compared with tracks without each view at the end of a run. A hull of fewer views is wider,
-    so that these tracks differ by more than their errors."""
     paper: bool = False
     """Whether the run is that of the paper."""
 

@@ -1,13 +1,12 @@
 """The voxel tracker of MTHC01 behind the interface that all trackers share."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
-from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
-from tracker.tracking.tracker import BodiesByFrame, TrackingRun
+from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.voxel.frame_estimator import VoxelEstimator
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.voxels.shadows import recover_from_shadows
@@ -39,10 +38,3 @@ class VoxelTracker:
                     yield estimator.estimate(frame, silhouettes)
         finally:
             finder.close()
-
-    def backward_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
-        """See `Tracker.backward_pass`; the filter has none."""
-        return iter(())
-
-    def evidence(self, observer: Observer, bodies: Callable[[], BodiesByFrame]) -> None:
-        """See `Tracker.evidence`: the Kalman filter's estimates are all that is kept of a frame."""

@@ -1,0 +1,136 @@
+"""How likely each limb is elsewhere: the mass of all paths on which it is, averaged over views that are left out.
+
+A view that holds a limb at a wrong edge no longer does where it is left out (deletion of groups of data: J. Tukey 1958,
+Ann. Math. Stat. 29:614). The hypotheses are those of all views, scored again without one.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.appearance.region_deficit import worst_views
+from tracker.body.limbs import display_name, limbs
+from tracker.body.model import BodyModel, PosedBody
+from tracker.body.searches import Search
+from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M, Hypothesis, distance_m, distinct, limbs_elsewhere
+from tracker.geometry.arrays import Array, Mask
+from tracker.tracking.runs.frame_hypotheses import FrameHypotheses
+from tracker.tracking.runs.path_search import PathSearch
+from tracker.trajectory.hypotheses import HypothesisSet, Paths, all_together, cheapest, through
+from tracker.trajectory.solve import SolvedPath
+
+
+class RunPose(NamedTuple):
+    """The pose of a person on a frame, by all frames of a run."""
+
+    pose: Array
+    """(n_values,)."""
+    entry: Search | None
+    """How it was found in place of the first guess; None where that stays."""
+    part_costs_px: Array
+    """Mean distance of the contour of each part to the edges, (n_parts,), px of the footage; NaN where hidden."""
+    errors_m2: Array
+    """Covariances of the points of the body, (n_points, 3, 3), square metres."""
+    elsewhere: Array
+    """Mass of the paths on which each limb is elsewhere, (n_limbs,)."""
+    by_colors: Array
+    """How much likelier each limb is elsewhere by the colours of the run, (n_limbs,), nats; see `elsewhere_nats`."""
+    against: tuple[str, ...]
+    """For each limb, the part and the view that speak most against it, for people to read."""
+    is_searched: bool
+    """Whether limbs were searched on the frame."""
+    others: tuple[Hypothesis, ...]
+    """Poses with a limb elsewhere that are about as good on the frame, or better, cheapest first. Their costs are
+    relative to that of the pose, nats."""
+    cost_px: float = np.nan
+    """Cost of the poses of all people on the frame, px of the footage."""
+    view_costs_px: tuple[float, ...] = ()
+    """The same in each view, (V,)."""
+
+
+def assessed_path(
+    search: PathSearch, solved: SolvedPath, first: Sequence[Array], poses: Array, cameras: Sequence[str]
+) -> list[RunPose]:
+    """Return poses with what is known of each by the path of a person.
+
+    Keyframes are compared as if other poses were free to take their place.
+
+    Args:
+        search: of the path.
+        solved: its solution.
+        first: first guesses, (n_values,) each.
+        poses: the poses that are assessed, (T, n_values): those of the path, or others.
+        cameras: names of the views.
+    """
+    model, paths = search.model, search.paths
+    free = [f.found for f in search.frames]
+    masses = masses_elsewhere(model, paths, search.sets, poses)
+    others = _about_as_good(paths, search.sets, poses, model)
+    is_key = np.array([f.anchor is not None for f in search.frames])
+    if is_key.any():
+        masses[is_key] = masses_elsewhere(model, paths, free, poses)[is_key]
+        of_keys = _about_as_good(paths, free, poses, model)
+        others = [k if key else own for k, own, key in zip(of_keys, others, is_key, strict=True)]
+    by_colors, parts, nats = search.elsewhere(poses)
+    views = np.take_along_axis(worst_views(nats, [model]), parts, axis=1)
+    names = [display_name(p.name) for p in model.parts]
+    out = []
+    for t, (frame, pose) in enumerate(zip(search.frames, poses, strict=True)):
+        kinematics = model.kinematics(pose)
+        J = model.point_jacobian(kinematics, model.point_parts, model.points_world(pose))
+        off = model.points_world(solved.poses[t]) - model.points_world(pose)
+        errors = np.einsum("pia,ab,pjb->pij", J, solved.covariances[t], J) + off[:, :, None] * off[:, None]
+        against = tuple(f"{names[p]} elsewhere in {cameras[v]}" for p, v in zip(parts[t], views[t], strict=True))
+        known = by_colors[t], against, t in search.searched, others[t]
+        entry = _entry(frame, first[t], pose)
+        out.append(RunPose(pose, entry, frame.part_costs_px(pose), errors, masses[t], *known))
+    return out
+
+
+def _entry(frame: FrameHypotheses, first: Array, pose: Array) -> Search | None:
+    """Return the entry of a pose that took the place of a first guess, (n_values,) each, if a limb is elsewhere."""
+    moved = limbs_elsewhere(PosedBody(frame.model, first), PosedBody(frame.model, pose))
+    return Search.of("path", moved, frame.nats(first), frame.nats(pose), True) if moved else None
+
+
+def _about_as_good(
+    paths: Paths, sets: Sequence[HypothesisSet], poses: Array, model: BodyModel
+) -> list[tuple[Hypothesis, ...]]:
+    """Return the hypotheses of each frame with paths about as good as the likeliest, and a limb elsewhere."""
+    out = []
+    of_frames = through([s.costs() for s in sets], paths.motion_nats(sets), cheapest)
+    for own, costs, pose in zip(sets, of_frames, poses, strict=True):
+        here, near = PosedBody(model, pose), np.flatnonzero(costs < costs.min() + CLEAR_NATS)
+        found = [Hypothesis(PosedBody(model, own.poses[i]), own.sources[i], costs[i] - costs.min()) for i in near]
+        out.append(tuple(h for h in distinct(found) if distance_m(h.body, here) > SAME_POSE_M))
+    return out
+
+
+def masses_elsewhere(model: BodyModel, paths: Paths, sets: Sequence[HypothesisSet], poses: Array) -> Array:
+    """Return the mass of the paths on which a point of each limb is more than `SAME_POSE_M` elsewhere, (T, n_limbs).
+
+    Args:
+        model: the body.
+        paths: how its points move.
+        sets: hypotheses of each frame.
+        poses: from which distances count, (T, n_values).
+    """
+    n_views = sets[0].view_nats.shape[1]
+    views = range(n_views) if n_views > 2 else (None,)  # one view shows no depth
+    motion = paths.motion_nats(sets)
+    apart = [_apart(model, s.poses, pose) for s, pose in zip(sets, poses, strict=True)]
+    out = np.zeros((len(views), len(sets), len(limbs(model))))
+    for i, view in enumerate(views):
+        nats = through([s.costs(view) for s in sets], motion, all_together)
+        for t, (of_frame, is_apart) in enumerate(zip(nats, apart, strict=True)):
+            weights = np.exp(of_frame.min() - of_frame)
+            out[i, t] = weights @ is_apart / weights.sum()
+    return np.asarray(out.mean(axis=0))
+
+
+def _apart(model: BodyModel, poses: Array, pose: Array) -> Mask:
+    """Return whether a point of each limb lies elsewhere in each of some poses, (K, n_limbs), than in one."""
+    gaps = np.linalg.norm([model.points_world(p) for p in poses] - model.points_world(pose), axis=-1)
+    of_limbs = [gaps[:, np.isin(model.point_parts, limb.parts)].max(axis=1) for limb in limbs(model)]
+    return np.stack(of_limbs, axis=1) > SAME_POSE_M
