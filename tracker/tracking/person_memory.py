@@ -11,7 +11,7 @@ from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings, predict
-from tracker.tracking.confidence import PoseQuality, Status, classify
+from tracker.tracking.confidence import PoseQuality, Status
 
 _MAX_BACKOFF_FRAMES = 8
 """Longest back-off of a limb that seems lost."""
@@ -21,8 +21,6 @@ silhouette may be anybody's."""
 _WORSE_NATS = 2.0
 """The back-off of a limb ends where its search odds are higher by this than before the search that failed, nats. That
 search has not seen what now contradicts the limb."""
-_AROUND = "around"
-"""Key of the back-off of the search around a pose."""
 _LEARN_FRAMES = 3
 """The colours of the parts are updated every so many frames."""
 _TRACKED_SHARE, _KEYFRAME_SHARE = 0.15, 0.5
@@ -128,23 +126,6 @@ class PersonMemory:
     def _is_worse(self, limb: Limb, quality: PoseQuality) -> bool:
         """Return whether a limb is much more likely lost than before its last search."""
         return quality.search_odds_of(limb.name) > self._odds_searched.get(limb.name, np.inf) + _WORSE_NATS
-
-    def samples_around(self, quality: PoseQuality) -> bool:
-        """Return whether to search around a refined pose now: that of a single person that is not good.
-
-        After each search that finds nothing the back-off doubles, as that of a limb. A lost pose does not back off.
-        """
-        status, (last, backoff) = classify(quality), self._backoffs.get(_AROUND, (-1, 0))
-        is_due = status == "lost" or self._n_frames > last + min(backoff, _MAX_BACKOFF_FRAMES)
-        return self.alone and status != "good" and is_due
-
-    def record_sampling(self, found: bool) -> None:
-        """Record the outcome of a search around a pose.
-
-        Args:
-            found: whether the pose changed.
-        """
-        self._backoffs[_AROUND] = (self._n_frames, 0 if found else 2 * self._backoffs.get(_AROUND, (0, 0))[1] + 1)
 
     def update(self, pose: Array, colors: Colors, status: Status, keyframe: bool) -> None:
         """Take in the result of a frame.

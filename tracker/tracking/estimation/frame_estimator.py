@@ -20,7 +20,6 @@ from tracker.fitting.gauss_newton import Fit, with_locked_dofs
 from tracker.fitting.hypothesis import SAME_POSE_M, SETTLED_M, distance_m, limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.assessment import PersonEstimate, assess, estimate_fixed, finalize
-from tracker.tracking.estimation.covariance_search import search_along_covariance
 from tracker.tracking.estimation.frame_problem import (
     Bodies,
     FrameProblem,
@@ -137,7 +136,7 @@ class FrameEstimator:
         for person, (quality, _) in zip(fits, assessments, strict=True):
             limbs = self._memories[person].limbs_to_search(quality)[:_MAX_LIMBS]
             candidates = quality.search_candidates(alone) if alone else quality.doubtful_limbs(alone)
-            if limbs or candidates or quality.is_body_lost or self._memories[person].samples_around(quality):
+            if limbs or candidates or quality.is_body_lost:
                 limbs_of[person] = limbs
         if not limbs_of:
             return
@@ -168,8 +167,7 @@ class FrameEstimator:
         fit = problem.solve(person, before.fit.pose, [residuals, *priors], MAX_ITERATIONS, MIN_DECREASE)
         # Limbs that wait for their search are no longer drawn to their prediction.
         found = PersonFit(residuals, bodies, fit, PosedBody(model, fit.pose), untrusted)
-        samples = memory.samples_around(quality)
-        if not limbs and not quality.is_body_lost and not samples:
+        if not limbs and not quality.is_body_lost:
             return found
         scorer = PoseScorer.of(
             residuals, priors, Colors(own, *problem.around(person, bodies)), memory.part_colors,
@@ -191,11 +189,6 @@ class FrameEstimator:
             memory.record_search(limb, quality, limb.name in moved)
             if limb.name in relocated:
                 notes.append(f"{limb_display_name(limb.name)} relocated")
-        if samples:
-            sampled, entry = search_along_covariance(model, best, scorer, problem.sigma(person))
-            memory.record_sampling(distance_m(sampled.body, best.body) > SETTLED_M)
-            best = sampled
-            trace.append(entry)
         assert best.fit is not None
         return found._replace(
             fit=best.fit, body=best.body, evaluations=evaluations, notes=tuple(notes), trace=tuple(trace),
