@@ -39,17 +39,17 @@ def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseR
         found: what all frames of the run say about it.
     """
     errors = point_covariances(model, found.errors_m2)
-    odds, reasons = limb_odds(model, errors), [""] * len(limbs(model))
-    by_mass = mass_odds(found.elsewhere)
     searched = [found.is_searched and len(limb.parts) > 1 for limb in limbs(model)]
-    by_colors = elsewhere_odds(found.by_colors, searched)
-    for i in np.flatnonzero(by_colors[:, 0] > np.maximum(odds, by_mass)[:, 0]):
-        reasons[i] = f": {found.against[i]}"
+    odds = np.stack([limb_odds(model, errors), mass_odds(found.elsewhere), elsewhere_odds(found.by_colors, searched)])
+    reasons = [
+        ("", f": elsewhere on {100 * mass:.0f}% of the likely paths", f": {against}")[source]
+        for source, mass, against in zip(odds[:, :, 0].argmax(axis=0), found.elsewhere, found.against, strict=True)
+    ]
     remarks = without_uncertainty(pose.remark, alternatives=True)
     if found.others:
         remarks.append(may_be_elsewhere(PosedBody(model, pose.values), found.others))
     pose = replace(pose, errors=errors, remark=", ".join(remarks))
-    return _classified(model, pose, np.maximum(np.maximum(odds, by_mass), by_colors), reasons)
+    return _classified(model, pose, odds.max(axis=0), reasons)
 
 
 def _classified(model: BodyModel, pose: PoseRecord, odds: Array, reasons: Sequence[str]) -> PoseRecord:
