@@ -38,12 +38,6 @@ class Walker:
                 (None,) * n, ((),) * n, self.settings.method,
             )  # fmt: skip
 
-    def evidence(self, observer, bodies):
-        return None
-
-    def backward_pass(self, run, tracked):
-        return iter(())
-
 
 class FakeTracker:
     """Frame 4 is doubtful, frames divisible by 7 are lost, and the second view sees no edge."""
@@ -61,8 +55,8 @@ class FakeTracker:
         """Frame to which the step is twice as long."""
         self.last = {}
         """What was found last on each frame."""
-        self.back = None
-        """Makes the steps of the backward pass from what was tracked; None: there is nothing to follow back."""
+        self.whole_runs = False
+        """Whether runs go on after their first pass; see `EstimationSettings.whole_run`."""
 
     def let_go(self, frames):
         """Let it track so many frames more."""
@@ -71,7 +65,7 @@ class FakeTracker:
 
     def with_settings(self, settings):
         """Stands for the tracker's constructor."""
-        self.settings = replace(settings, audit=False)
+        self.settings = settings if self.whole_runs else replace(settings, whole_run=False)
         return self
 
     def estimates(self, run):
@@ -97,10 +91,3 @@ class FakeTracker:
                 (part_costs_px,) * n, tuple(np.eye(m.n_dofs) for m in models), (LIMBS,) * n, ((),) * n, "chamfer",
             )  # fmt: skip
             yield self.last[frame]
-
-    def evidence(self, observer, bodies):
-        return None
-
-    def backward_pass(self, run, tracked):
-        if self.back is not None and self.settings.backward_pass:
-            yield from self.back(tracked)

@@ -10,9 +10,3 @@ def track(observer, models, start, frames, settings=None, **subjects):
     """The estimates of the first pass; keywords as of `Subjects.of`."""
     run = TrackingRun(observer, Subjects.of(models, **subjects), start, frames)
     return make_tracker(settings or TrackSettings()).estimates(run)
-
-
-def track_back(observer, models, found, settings=None, **subjects):
-    """The steps of the backward pass; keywords as of `Subjects.of`."""
-    run = TrackingRun(observer, Subjects.of(models, **subjects), (), ())
-    return make_tracker(settings or TrackSettings()).backward_pass(run, found)

@@ -34,7 +34,7 @@ class HypothesisSet(NamedTuple):
     prior_nats: Array
     """Cost by what holds on every frame, (K,)."""
     sources: tuple[str, ...]
-    """What proposed each, (K,)."""
+    """Name of what proposed each, (K,)."""
 
     def costs(self, without: int | None = None) -> Array:
         """Return the cost of each hypothesis, (K,), nats; without a view if one is given."""

@@ -20,7 +20,7 @@ from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.contour.settings import ContourSettings
 
 SMALL = ContourExperiment(n_frames=3, n_cameras=3, camera_counts=(2,))
-QUICK = TrackSettings(recover=None, backward_pass=False)
+QUICK = TrackSettings(recover=None, whole_run=False)
 
 
 @pytest.mark.parametrize("name", ["knossow54", "gavrila22_cones"])

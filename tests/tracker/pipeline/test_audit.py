@@ -6,17 +6,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tracker.fitting.consensus import agreement
+from tracker.pipeline.run_repair import RepairedPose, RepairStep, RunRepair
+from tracker.tracking.view_tracks import FrameTracks
 
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.body.searches import Search
-from tracker.fitting.consensus import agreement
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline import track_session
 from tracker.pipeline.assessed_poses import assessed_by_tracks, assessed_keyframe, with_alternatives, with_repair
 from tracker.pipeline.methods import METHODS
-from tracker.pipeline.run_repair import RepairedPose, RepairStep, RunRepair
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.pipeline.track_session import AuditStep
 from tracker.session.session import load_session
@@ -27,7 +28,6 @@ from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import LimbFeatures, PoseQuality
 from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.person_memory import HISTORY_FRAMES
-from tracker.tracking.view_tracks import FrameTracks
 
 N, WRONG, APART = 10, 3, 4
 OBSERVER = SimpleNamespace(ahead_frames=lambda frame: (0.0,))

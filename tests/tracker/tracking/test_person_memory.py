@@ -160,4 +160,3 @@ def test_doubtful_poses_are_searched_around_less_and_less_often_and_lost_ones_al
     status["is"] = "lost"
     assert memory.samples_around(off)
     assert not PersonMemory(gavrila, gavrila.neutral(), alone=False).samples_around(off)
-    assert not PersonMemory(gavrila, gavrila.neutral(), searches_around=False).samples_around(off)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from tracker.body.limbs import limbs
-from tracker.body.model import PosedBody
 from tracker.fitting.gauss_newton import OTHER_BODY_M
-from tracker.fitting.hypothesis import Hypothesis
+from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.tracking.confidence import classify_limbs, probabilities
-from tracker.tracking.pose_errors import alternative_odds, beyond, limb_odds, point_covariances
+from tracker.tracking.pose_errors import SELDOM_NATS, beyond, elsewhere_odds, limb_odds, mass_odds, point_covariances
 
 
 @pytest.mark.parametrize(("sigma", "radius"), [(0.02, 0.03), (0.05, 0.1), (0.1, 0.1)])
@@ -43,21 +42,14 @@ def test_tracks_that_agree_leave_the_error_that_they_share(gavrila):
         np.testing.assert_allclose(errors, np.broadcast_to(sigma_m**2 * np.eye(3), errors.shape))
 
 
-def test_limbs_are_elsewhere_as_likely_as_other_poses_are(gavrila):
-    here, names = gavrila.neutral(), [x.name for x in limbs(gavrila)]
-    arm = names.index("left_forearm")
+def test_a_limb_is_off_as_likely_as_paths_have_it_elsewhere():
+    masses = np.array([0.0, 0.02, 0.4, 1.0])
+    odds = mass_odds(masses)
+    np.testing.assert_allclose(probabilities(odds[:, 0]), masses, atol=1e-9)
+    assert np.all(odds[:, 1] < odds[:, 0])
+    assert [classify_limbs(odds[i : i + 1]) for i in range(4)] == ["good", "good", "doubtful", "lost"]
 
-    def raised(by_rad, nats):
-        pose = here.copy()
-        pose[gavrila.value_names.index("left_shoulder.elevation")] += by_rad
-        return Hypothesis(PosedBody(gavrila, pose), cost=nats)
 
-    off = probabilities(alternative_odds(gavrila, here, [raised(0.8, 2.0), raised(1.2, 2.0), raised(0.02, 0.0)])[:, 0])
-    weight = 2 * np.exp(-2.0)
-    assert off[arm] == pytest.approx(weight / (1 + weight))  # the third is in the same place
-    assert not np.delete(off, arm).any()
-    better = alternative_odds(gavrila, here, [raised(0.8, -4.0)])
-    assert probabilities(better[arm, 0]) == pytest.approx(0.5)
-    assert classify_limbs(better) == "doubtful"
-    assert classify_limbs(alternative_odds(gavrila, here, [raised(0.8, 3.5)])) == "good"
-    assert classify_limbs(alternative_odds(gavrila, here, [])) == "good"
+def test_colors_count_less_against_a_limb_that_was_searched():
+    odds = elsewhere_odds(np.array([SELDOM_NATS] * 2), [False, True])
+    assert probabilities(odds[:, 0]) == pytest.approx([0.5, 1 / (1 + np.exp(CLEAR_NATS))])

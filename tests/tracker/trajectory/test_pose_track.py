@@ -7,7 +7,6 @@ import pytest
 from bodies import MODELS
 
 from tracker.compute.progress import result_of
-from tracker.fitting.gauss_newton import GaussianPrior
 from tracker.formats.model_toml import load_model
 from tracker.motion.shortest_step import unwrapped_path
 from tracker.trajectory.pose_track import PoseTrack, smooth_poses
@@ -197,28 +196,3 @@ def test_a_fast_arm_keeps_its_motion():
     swings = points(MODEL, truth)
     reach_m = np.linalg.norm(np.ptp(swings, axis=0), axis=-1).max() / np.ptp(truth[:, shoulder])
     assert np.abs(points(MODEL, smoothed(track)) - swings).max() < 0.03 * reach_m
-
-
-def test_evidence_takes_the_place_of_estimates_that_are_trusted():
-    n, still = MODEL.n_dofs, np.tile(MODEL.neutral(), (9, 1))
-    elsewhere, trusted = MODEL.neutral() + 0.1 * (np.arange(MODEL.n_dofs) == 0), np.ones((9, n), bool)
-    trusted[4] = False
-    asked = []
-
-    def evidence(t):
-        asked.append(t)
-        return [GaussianPrior(elsewhere, 1e6 * np.eye(n))]
-
-    track = PoseTrack(
-        MODEL,
-        np.arange(9) / FPS,
-        still,
-        np.tile(1e-4 * np.eye(n), (9, 1, 1)),
-        np.zeros(9, bool),
-        trusted,
-        None,
-        evidence,
-    )
-    found = smoothed(track)
-    assert sorted(asked) == [0, 1, 2, 3, 5, 6, 7, 8]
-    np.testing.assert_allclose(found, np.tile(elsewhere, (9, 1)), atol=1e-3)

@@ -43,7 +43,7 @@ def cost_of(path, poses, motion):
 
 
 def solved(path):
-    return result_of(solve_path(path))
+    return result_of(solve_path(path)).poses
 
 
 @pytest.mark.slow
@@ -73,8 +73,12 @@ def test_fixed_poses_and_locked_degrees_of_freedom_stay():
     active = np.arange(MODEL.n_dofs) % 3 > 0
     start = np.tile(MODEL.neutral(), (T, 1))
     start[2] = poses[2]
-    found = solved(path_of(start, evidence, fixed=[2], active=active))
+    found, covariances = result_of(solve_path(path_of(start, evidence, fixed=[2], active=active)))
     np.testing.assert_array_equal(found[2], poses[2])
+    assert not covariances[2].any()
+    assert not covariances[:, ~active].any()
+    assert not covariances[..., ~active].any()
+    assert np.linalg.eigvalsh(np.delete(covariances, 2, axis=0)[:, active][..., active]).min() > 0
     others = np.delete(found, 2, axis=0)
     locked = MODEL.dof_value[~active]
     np.testing.assert_array_equal(others[:, locked], np.delete(start, 2, axis=0)[:, locked])
@@ -85,10 +89,16 @@ def far_apart(one, other):
     return max(np.abs(MODEL.points_world(a) - MODEL.points_world(b)).max() for a, b in zip(one, other, strict=True))
 
 
+def in_blocks(monkeypatch, n_frames, overlap):
+    monkeypatch.setattr(solve, "_BLOCK_FRAMES", n_frames)
+    monkeypatch.setattr(solve, "_OVERLAP_FRAMES", overlap)
+    monkeypatch.setattr(solve, "FRAMES_AT_ONCE", n_frames)
+
+
 def test_blocks_give_nearly_what_one_piece_gives(monkeypatch):
     path = path_of(*measured(n_frames=45))
     whole = solved(path)
-    monkeypatch.setattr(solve, "_BLOCK_FRAMES", 25)
+    in_blocks(monkeypatch, 25, 20)
     assert 0 < far_apart(solved(path), whole) < 0.005
 
 
@@ -100,15 +110,45 @@ def test_a_gap_across_the_border_of_two_blocks_is_interpolated(monkeypatch):
     poses[12:26] = poses[11]
     path = path_of(poses, evidence)
     whole = solved(path)
-    monkeypatch.setattr(solve, "_BLOCK_FRAMES", 18)
-    monkeypatch.setattr(solve, "_OVERLAP_FRAMES", 6)
+    in_blocks(monkeypatch, 18, 6)
     assert far_apart(solved(replace(path, seen=seen)), whole) < 0.5 * far_apart(solved(path), whole)
 
 
 def test_frames_are_counted_once_as_their_evidence_is_read(monkeypatch):
-    monkeypatch.setattr(solve, "_BLOCK_FRAMES", 5)
-    monkeypatch.setattr(solve, "_OVERLAP_FRAMES", 2)
+    in_blocks(monkeypatch, 5, 2)
     counts = list(solve_path(path_of(*measured(n_frames=10))))
     assert counts == sorted(counts)
     assert counts[-1] == 10
     assert len(counts) == 14
+
+
+def test_covariances_are_those_of_a_linear_problem(monkeypatch):
+    """With a Gaussian motion that is known, the inverse of the normal matrix of all frames at once."""
+    poses, evidence = measured()
+    groups = motion_points(MODEL).groups
+    motion = MotionModel(groups, np.full(len(groups), 1e-2), np.inf)
+    monkeypatch.setattr(MotionModel, "learned", lambda *_: motion)
+    found, covariances = result_of(solve_path(path_of(poses, evidence, freedom=np.inf)))
+    n, c = MODEL.n_dofs, np.array([1.0, -2.0, 1.0])
+    kinematics = [MODEL.kinematics(pose) for pose in found]
+    J = [motion_points(MODEL).jacobian(k, motion_points(MODEL).at(k)) for k in kinematics]
+    H = np.zeros((T, n, T, n))
+    for t, pose in enumerate(found):
+        H[t, :, t] += evidence[t][0].linearize(MODEL, pose, kinematics[t]).hessian
+    for t in range(T - 2):
+        for i in range(3):
+            for k in range(3):
+                H[t + i, :, t + k] += c[i] * c[k] * J[t + i].T @ J[t + k] / 1e-2
+    expected = np.linalg.inv(H.reshape(T * n, T * n)).reshape(T, n, T, n)
+    for t in range(T):
+        np.testing.assert_allclose(covariances[t], expected[t, :, t], rtol=0.02, atol=1e-6)
+
+
+@pytest.mark.parametrize("n_frames", [1, 160, 161, 330, 1000])
+def test_blocks_cover_a_run_once_and_are_solved_with_few_frames(n_frames):
+    blocks = solve.even_blocks(n_frames)
+    assert [k for own, _ in blocks for k in range(n_frames)[own]] == list(range(n_frames))
+    assert len(blocks) == (1 if n_frames <= solve.FRAMES_AT_ONCE else -(-n_frames // 120))
+    for own, used in blocks:
+        assert used.stop - used.start <= solve.FRAMES_AT_ONCE
+        assert (used.start, used.stop) == (max(0, own.start - 20), min(n_frames, own.stop + 20)) or len(blocks) == 1

@@ -12,6 +12,7 @@ __all__ = [
     "frame_estimator",
     "frame_problem",
     "incremental_fit",
+    "limb_recovery",
     "limb_repair",
     "options",
     "part_evidence",

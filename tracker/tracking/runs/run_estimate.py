@@ -69,7 +69,7 @@ def estimate_run(run: RunFrames) -> Generator[Progress, None, dict[int, dict[int
     Keyframes stay, and so do locked degrees of freedom. A caller that stops asking leaves the work undone.
 
     Returns:
-        The poses by person and frame. Those of keyframes are as they were, and assessed like others.
+        The poses by person and frame. Keyframes are as they were, and assessed like others.
     """
     return (yield from _RunEstimate(run).steps())
 

@@ -16,7 +16,7 @@ def test_the_settings_are_those_of_the_paper():
     assert search.patience == search.max_expansions  # nothing else ends a stage
     assert (predict.order, predict.full_window) == (2, True)
     assert (settings.segments, edges.max_segment_px, edges.whole_images) == (True, None, True)
-    assert (settings.recover, settings.backward_pass) == (None, False)
+    assert (settings.recover, settings.whole_run) == (None, False)
 
 
 def test_the_spaces_searched_have_5_9_and_8_dimensions():

@@ -14,14 +14,12 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
-from tracker.pipeline.methods import make_tracker
 from tracker.search import chamfer_cost
 from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost, search_frame
 from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
 
 COARSE = TrackSettings(
     estimate="search", search=SearchSettings(passes=(1.0,)), predict=PredictSettings(order=0), recover=None
@@ -76,19 +74,6 @@ def test_keyframes_are_taken_as_they_are_and_tracking_goes_on_from_them(balls):
         np.testing.assert_allclose(found[k].poses[0] - values[k, 0], keyframe - values[2, 0], atol=0.051)
     for k in range(5):  # the other one is searched throughout
         np.testing.assert_allclose(found[k].poses[1], values[k, 1], atol=1e-9)
-
-
-def test_keyframes_are_also_estimated_where_that_is_asked_and_tracking_goes_on_from_them(balls):
-    """The audit compares them with tracks that have not seen them. People who are not tracked keep theirs."""
-    model, values, views = balls
-    lost = values[0] + np.array([[0, -0.6, 0, 0, 0, 0], [0] * 6])
-    subjects = Subjects.of([model] * 2, [0], keyframes={2: dict(enumerate(values[2]))})
-    run = TrackingRun(Shown(views), subjects, lost, range(4), estimates_keyframes=True)
-    found = list(make_tracker(COARSE).estimates(run))
-    assert np.linalg.norm(found[2].poses[0] - values[2, 0]) > 2 * STEP  # on its way back, without the keyframe
-    assert found[2].qualities[0] is not None
-    np.testing.assert_array_equal(found[2].poses[1], values[2, 1])
-    np.testing.assert_allclose(found[3].poses[0], values[3, 0], atol=0.051)
 
 
 def test_a_frame_of_keyframes_alone_is_not_searched(balls):
