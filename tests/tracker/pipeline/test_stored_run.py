@@ -1,4 +1,4 @@
-"""Runs from stored poses: where they begin, what they save, and how they go on after an interruption."""
+"""Runs from stored poses: where they begin, what they propose and save, and how they go on after an interruption."""
 
 import json
 import shutil
@@ -6,26 +6,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from run_poses import MOVED, Estimate
 
 from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.formats.model_toml import format_model
-from tracker.pipeline import methods
+from tracker.pipeline import methods, track_session
 from tracker.pipeline.methods import METHODS, make_tracker
 from tracker.pipeline.stored_run import TrackPlan, stored_run
+from tracker.pipeline.track_session import EstimatedRows, EstimateStep
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.chamfer.method import CHAMFER
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimate import BackwardStep, PoseEstimate
+from tracker.tracking.estimate import AlternativePose, BackwardStep, PoseEstimate
 
-STEP_M = 0.01
-SETTINGS = TrackSettings(smooth=False, audit=False)
+STEP_M, MOVED_M = 0.01, 0.1
+N = 6
+FIRST_PASS = TrackSettings(whole_run=False)
+SETTINGS = TrackSettings()
 
 
 @dataclass
 class Walker:
-    """Stands for a tracker: walks along x; frame 3 is lost, and the backward pass finds it."""
+    """Stands for a tracker: walks along x; frame 3 is lost, and has an alternative."""
 
     settings: TrackSettings
 
@@ -34,23 +38,11 @@ class Walker:
         for frame in run.frames:
             for i in run.subjects.tracked:
                 poses[i] = run.subjects.keyframes_at(frame).get(i, poses[i] + STEP_M * (np.arange(len(poses[i])) == 0))
-            yield self.estimate(frame, poses, "lost" if frame == 3 else "good")
-
-    def evidence(self, observer, bodies):
-        return None
-
-    def backward_pass(self, run, tracked):
-        (lost,) = (f for f in tracked if "lost" in f.statuses)
-        yield BackwardStep(lost.frame, 0, 1, 2)
-        better = self.estimate(lost.frame, [p + STEP_M for p in lost.poses], "good")
-        yield BackwardStep(lost.frame, 0, 2, 2, (better,))
-
-    def estimate(self, frame, poses, status):
-        n = len(poses)
-        return PoseEstimate(
-            frame, tuple(poses), 1.0, np.ones(4), 0, (status,) * n, ("",) * n, (np.ones(10),) * n, (np.eye(22),) * n,
-            (None,) * n, ((),) * n, "chamfer",
-        )  # fmt: skip
+            n, others = len(poses), (AlternativePose(poses[0] + 0.5, 2.0),) if frame == 3 else ()
+            yield PoseEstimate(
+                frame, tuple(poses), 1.0, np.ones(4), 0, ("lost" if frame == 3 else "good",) * n, ("",) * n,
+                (np.ones(10),) * n, (np.eye(22),) * n, (None,) * n, (others,) * n, "chamfer",
+            )  # fmt: skip
 
 
 @pytest.fixture
@@ -62,22 +54,35 @@ def session(tmp_path, sample_folder, monkeypatch):
 @pytest.fixture
 def store(session):
     """With a keyframe on the first frame."""
-    store, (person,) = AnnotationStore(session.annotations_path), session.people
-    values = person.model.neutral()
-    record = PoseRecord(
-        values, ("manual",) * len(values), store.add_model_revision(person.name, format_model(person.model)), True
-    )
-    store.commit("init", [PoseChange(person.name, 0, record)])
+    store = AnnotationStore(session.annotations_path)
+    put(session, store, 0)
     yield store
     store.close()
 
 
-def run_of(session, store, frames=range(6), settings=SETTINGS):
-    return stored_run(session, store, None, TrackPlan(frames, (0,), settings))
+@pytest.fixture
+def estimate(monkeypatch):
+    """Stands for the estimate: all poses move along y, frame 2 by another path."""
+    found = Estimate(MOVED_M, {2: {"entry": MOVED}})
+    monkeypatch.setattr(track_session, "estimate_run", found)
+    return found
 
 
-def stored_x(store):
-    return [float(store.pose("person", row.frame).values[0]) for row in store.frames("person")]
+def put(session, store, frame, x_m=0.0, source="manual", keyframe=True):
+    (person,) = session.people
+    values = person.model.neutral() + x_m * (np.arange(len(person.model.neutral())) == 0)
+    revision = store.add_model_revision(person.name, format_model(person.model))
+    store.commit(
+        "put", [PoseChange(person.name, frame, PoseRecord(values, (source,) * len(values), revision, keyframe))]
+    )
+
+
+def run_of(session, store, frames=range(N), settings=FIRST_PASS, start=None):
+    return stored_run(session, store, None, TrackPlan(frames, (0,), settings, start=start))
+
+
+def stored(store, axis):
+    return [float(store.pose("person", row.frame).values[axis]) for row in store.frames("person")]
 
 
 def track(run, n=None):
@@ -92,42 +97,168 @@ def test_a_run_is_one_entry_of_the_history_and_keeps_keyframes(session, store):
     with run_of(session, store) as run:
         track(run)
     assert run.finished
-    assert (run.n_improved, run.next_frame, run.visited) == (1, None, 3)
-    assert run.status_counts() == [{"good": 6}]
+    assert (run.n_moved, run.next_frame, run.visited) == (0, None, None)
+    assert run.status_counts() == [{"good": 5, "lost": 1}]
     rows = store.frames("person")
-    assert [(r.frame, r.source) for r in rows] == [(0, "manual"), *((k, "tracked") for k in range(1, 6))]
-    np.testing.assert_allclose(np.diff(stored_x(store)), STEP_M * np.array([1, 1, 2, 0, 1]))
+    assert [(r.frame, r.source) for r in rows] == [(0, "manual"), *((k, "tracked") for k in range(1, N))]
+    np.testing.assert_allclose(np.diff(stored(store, 0)), STEP_M)
     assert store.pose("person", 1).settings["method"] == "chamfer"
     assert store.undo() == "track frames 0:6"
     assert [r.frame for r in store.frames("person")] == [0]
+
+
+def test_the_estimate_takes_the_place_of_the_poses_of_the_first_pass(session, store, estimate):
+    before = store.pose("person", 0)
+    with run_of(session, store, settings=SETTINGS) as run:
+        track(run)
+    assert (run.finished, run.n_moved, run.visited) == (True, 1, 0)
+    assert run.status_counts() == [{"good": N}]
+    assert stored(store, 1) == pytest.approx([0.0, *[MOVED_M] * (N - 1)])
+    assert [run.tracked[k].poses[0][1] for k in range(N)] == pytest.approx(stored(store, 1))
+    np.testing.assert_allclose(np.diff(stored(store, 0)), STEP_M)
+    records = store.poses("person", range(N))
+    assert [records[k].trace for k in (1, 2)] == [(), (MOVED,)]
+    assert (records[1].cost_px, records[1].view_costs_px, records[1].status) == (1.5, (0.5,) * 4, "good")
+    assert records[1].errors is not None
+    keyframe = records[0]
+    assert (keyframe.status, keyframe.values.tobytes(), keyframe.keyframe) == ("good", before.values.tobytes(), True)
+    assert (keyframe.sources, keyframe.author, keyframe.time) == (before.sources, before.author, before.time)
+    assert store.undo() == "track frames 0:6"
+    assert [r.frame for r in store.frames("person")] == [0]
+    assert store.pose("person", 0).status == ""
+
+
+def test_the_estimate_is_asked_with_all_that_was_proposed(session, store, estimate):
+    with run_of(session, store, settings=SETTINGS) as run:
+        track(run)
+    former = stored(store, 1)
+    with run_of(session, store, settings=SETTINGS) as run:
+        track(run)
+    first, second = estimate.asked
+    assert sorted(second.poses) == list(range(N))
+    assert [second.poses[k][0][0] for k in range(N)] == pytest.approx(STEP_M * np.arange(N))
+    assert (second.fps, second.settings, second.stays) == (session.fps, SETTINGS, False)
+    assert sorted(second.subjects.keyframes) == [0]
+    sources = {k: [p.source for p in second.proposals[k, 0]] for k in range(N)}
+    assert sources == {
+        k: ["backward", *["alternative"] * 2 * (k == 3), *["former"] * (k > 0)] for k in range(N)
+    }  # the alternative of either pass; no keyframe is a former pose
+    assert {p.source for own in first.proposals.values() for p in own} == {"backward", "alternative"}
+    back = {k: next(p.pose[0] for p in second.proposals[k, 0] if p.source == "backward") for k in range(N)}
+    assert [back[k] for k in range(1, N)] == pytest.approx([STEP_M * (N - 1 + N - k) for k in range(1, N)])
+    assert back[0] == 0.0
+    assert [p.pose[1] for k in range(1, N) for p in second.proposals[k, 0] if p.source == "former"] == pytest.approx(
+        former[1:]
+    )
+
+
+def test_a_start_that_was_found_is_estimated_and_stays_the_start(session, store, estimate):
+    store.undo()
+    put(session, store, 3, 0.2, "searched", keyframe=False)
+    with run_of(session, store, settings=SETTINGS, start=3) as run:
+        track(run)
+    (asked,) = estimate.asked
+    assert not asked.subjects.keyframes
+    assert asked.poses[3][0][0] == pytest.approx(0.2)
+    assert [p.source for p in asked.proposals[3, 0]].count("backward") == 2  # by either leg
+    assert stored(store, 1) == pytest.approx([MOVED_M] * N)
+    sources = [store.pose("person", k).sources[0] for k in range(N)]
+    assert sources == [*["tracked"] * 3, "searched", *["tracked"] * 2]
+
+
+def test_a_start_that_is_a_keyframe_stays(session, store, estimate):
+    put(session, store, 3)
+    before = store.pose("person", 3)
+    with run_of(session, store, settings=SETTINGS, start=3) as run:
+        track(run)
+    after = store.pose("person", 3)
+    assert after.values.tobytes() == before.values.tobytes()
+    assert (after.sources, after.keyframe, after.status) == (before.sources, True, "good")
+    assert stored(store, 1) == pytest.approx([0.0, MOVED_M, MOVED_M, 0.0, MOVED_M, MOVED_M])
+
+
+def test_the_status_of_the_estimate_counts(session, store, estimate):
+    lost = np.array([0.9, 0.0, 0.0, 0.0])
+    estimate.known = {0: {"elsewhere": lost}, 4: {"elsewhere": lost}}
+    with run_of(session, store, settings=SETTINGS) as run:
+        track(run)
+    assert run.status_counts() == [{"good": N - 2, "lost": 2}]
+    assert [r.status for r in store.poses("person", range(N)).values()] == ["lost", *["good"] * 3, "lost", "good"]
+    assert store.pose("person", 0).remark == "left arm uncertain"
 
 
 def test_frames_are_saved_as_they_come(session, store, monkeypatch):
     monkeypatch.setattr("tracker.pipeline.stored_run._SAVE_FRAMES", 2)
     saved = []
     with run_of(session, store) as run:
-        for estimate in run.first_pass():
-            run.take(estimate)
+        for step in run.first_pass():
+            run.take(step)
             saved.append(len(store.frames("person")))
     assert saved == [1, 2, 2, 4, 4, 6]
 
 
-@pytest.mark.parametrize("n", [2, 6, 7])
-def test_the_same_task_goes_on_where_it_was_interrupted(session, store, n):
-    """In the first pass, between the passes, and in the second."""
-    with run_of(session, store) as run:
-        track(run, n)
-    assert len(store.frames("person")) == min(n, 6)
-    with run_of(session, store) as run:
-        assert list(run.frames) == list(range(n, 6))
-        assert list(run.tracked) == list(range(min(n, 6)))
+def poses_of(run):
+    """First guesses and other proposals. The poses that an interrupted run has stored itself propose nothing else."""
+    return {
+        (k, i): {pose.tobytes(), *(p.pose.tobytes() for p in run.proposals[k, i])}
+        for k, of_people in run.poses.items()
+        for i, pose in enumerate(of_people)
+    }
+
+
+@pytest.mark.parametrize("n", [2, N, N + 1, 2 * N, 2 * N + 3, 3 * N])
+@pytest.mark.parametrize("start", [None, 3])
+def test_the_same_task_goes_on_where_it_was_interrupted(session, store, estimate, n, start):
+    """In the first pass, between the passes, in the second, and in the estimate of all poses."""
+    if start is not None:
+        put(session, store, start, 0.2, "searched", keyframe=False)
+        store.set_setting("locked", {"person": ["torso.z"]})
+
+    def records():
+        return [
+            (r.values.tobytes(), r.status, r.sources, r.trace, r.settings)
+            for r in store.poses("person", range(N)).values()
+        ]
+
+    with run_of(session, store, settings=SETTINGS, start=start) as run:
         track(run)
-    np.testing.assert_allclose(np.diff(stored_x(store)), STEP_M * np.array([1, 1, 2, 0, 1]))
-    with run_of(session, store) as run:  # once done, it begins again
-        assert list(run.frames) == list(range(6))
+    whole, asked = records(), estimate.asked.pop()
+    store.undo()
+    n_first, kinds = N - (start is not None), []
+    with run_of(session, store, settings=SETTINGS, start=start) as run:
+        for step in run.steps():
+            kinds.append(type(step))
+            if len(kinds) <= n and not isinstance(step, EstimatedRows):
+                run.take(step)
+            else:
+                break
+    assert not run.finished
+    assert stored(store, 1)[1:] == [0.0] * (len(stored(store, 1)) - 1)  # no part of the estimate
+    estimate.asked.clear()
+    with run_of(session, store, settings=SETTINGS, start=start) as run:
+        assert len(run.frames) == max(0, n_first - n)
+        track(run)
+    assert records() == whole
+    again = estimate.asked.pop()
+    assert poses_of(again) == poses_of(asked)
+    with run_of(session, store, settings=SETTINGS, start=start) as run:  # once done, it begins again
+        assert len(run.frames) == n_first
 
 
-@pytest.mark.parametrize(("frames", "settings"), [(range(5), SETTINGS), (range(6), replace(SETTINGS, trust_rad=0.2))])
+def test_the_steps_of_a_run_come_in_order(session, store, estimate):
+    with run_of(session, store, settings=SETTINGS) as run:
+        steps = []
+        for step in run.steps():
+            run.take(step)
+            steps.append(step)
+    assert [type(s) for s in steps] == [*[PoseEstimate] * N, *[BackwardStep] * N, *[EstimateStep] * N, EstimatedRows]
+    assert [s.frame for s in steps[:N]] == list(range(N))
+    assert [(s.found.frame, s.done, s.total) for s in steps[N : 2 * N]] == [(N - 1 - k, k + 1, N) for k in range(N)]
+
+
+@pytest.mark.parametrize(
+    ("frames", "settings"), [(range(5), FIRST_PASS), (range(N), replace(FIRST_PASS, trust_rad=0.2))]
+)
 def test_another_task_begins_at_its_first_frame(session, store, frames, settings):
     with run_of(session, store) as run:
         track(run, 2)
@@ -144,7 +275,6 @@ def test_what_a_former_version_interrupted_goes_on_or_begins_again(session, stor
     unfinished = json.loads(json.dumps(store.setting(key)))
     settings = unfinished["task"][-1]
     assert settings.pop("method") == "chamfer"
-    settings["second_pass"] = settings.pop("backward_pass")  # as it was called before
     store.set_setting(key, unfinished)
     with run_of(session, store) as run:
         assert list(run.frames) == [2, 3, 4, 5]
@@ -152,7 +282,7 @@ def test_what_a_former_version_interrupted_goes_on_or_begins_again(session, stor
         unfinished["task"][-1][names] = {"a_former_name": 1.0}
         store.set_setting(key, unfinished)
         with run_of(session, store) as run:
-            assert list(run.frames) == list(range(6))
+            assert list(run.frames) == list(range(N))
 
 
 def test_a_cleared_frame_ends_what_the_backward_pass_may_use(session, store):
@@ -165,7 +295,7 @@ def test_a_cleared_frame_ends_what_the_backward_pass_may_use(session, store):
 
 def test_without_a_pose_there_is_nothing_to_begin_from(session, store):
     store.undo()
-    with pytest.raises(SessionError, match="expected a pose") as caught, run_of(session, store, range(2, 6)):
+    with pytest.raises(SessionError, match="expected a pose") as caught, run_of(session, store, range(2, N)):
         pass
     assert caught.value.remedy == Remedy("place_body")
 
