@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from fake_tracker import Walker
+from run_poses import Estimate
 
 from tracker.acquisition.from_contours import Acquisition
 from tracker.body.dimensions import dimensions_of, with_dimensions
@@ -19,7 +20,7 @@ from tracker.fitting.hypothesis import Hypothesis
 from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model, load_model
 from tracker.initialization.first_pose import FirstPose, FirstPoses
-from tracker.pipeline import chain
+from tracker.pipeline import chain, track_session
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, start_frame
 from tracker.pipeline.find_people import FindSettings
@@ -95,8 +96,8 @@ def opened(tmp_path, sample_folder):
         yield StoredSession(session, store, observer)
 
 
-def run(opened, sink=None, frames=range(6), smooth=False, acquire=(), is_finding=True):
-    plan = TrackPlan(frames, (0,), TrackSettings(smooth=smooth, audit=False))
+def run(opened, sink=None, frames=range(6), whole_run=False, acquire=(), is_finding=True):
+    plan = TrackPlan(frames, (0,), TrackSettings(whole_run=whole_run))
     return run_chain(ChainPlan(plan, FindSettings() if is_finding else None, acquire), opened, sink or Notes())
 
 
@@ -152,13 +153,19 @@ def test_it_tracks_out_from_the_start_in_both_directions_and_keeps_the_start(ope
     np.testing.assert_allclose([poses[k].values[0] - start for k in range(6)], 0.01 * np.array([4, 3, 2, 0, 2, 3]))
 
 
-def test_smoothing_joins_both_directions_and_keeps_the_start(opened, found, walkers):
-    run(opened, smooth=True)
+def test_a_start_that_was_found_is_estimated_with_the_others_and_begins_the_next_run(
+    opened, found, walkers, monkeypatch
+):
+    monkeypatch.setattr(track_session, "estimate_run", Estimate(0.1))
+    run(opened, whole_run=True)
     assert opened.run.finished
-    poses = rows(opened)
-    np.testing.assert_array_equal(poses[FRAME].values, opened.session.people[0].model.neutral())
+    assert walkers[0].asked == [[3, 2, 1, 0], [3, 4, 5], [0, 1, 2, 3], [5, 4, 3]]
+    poses, start = rows(opened), opened.session.people[0].model.neutral()
+    assert [poses[k].values[1] for k in range(6)] == pytest.approx([start[1] + 0.1] * 6)
     assert poses[FRAME].sources[0] == "searched"
-    assert all(poses[k].settings["smooth"] for k in (0, 1, 2, 4, 5))
+    assert all(poses[k].settings["whole_run"] for k in (0, 1, 2, 4, 5))
+    assert run(opened, whole_run=True).start == FRAME
+    assert len(found) == 1
 
 
 @pytest.mark.slow

@@ -9,20 +9,19 @@ import pytest
 from tracker.body.limbs import limbs
 from tracker.compute.progress import result_of
 from tracker.errors import DamagedStoreError
-from tracker.fitting.gauss_newton import GaussianPrior, PointTargets
 from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.stored_run import TrackPlan, stored_run
-from tracker.pipeline.track_session import SmoothedRows
+from tracker.pipeline.track_session import EstimatedRows
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.chamfer.method import CHAMFER
-from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import LimbFeatures, PoseQuality
-from tracker.tracking.estimate import AlternativePose, OtherPass, PoseEstimate
+from tracker.tracking.estimate import AlternativePose, PoseEstimate
 from tracker.tracking.subjects import Subjects
+from tracker.tracking.voxel.method import VOXEL
+from tracker.tracking.voxel.settings import VoxelSettings
 
 N = 12
 CLEAR = PoseQuality(
@@ -30,14 +29,14 @@ CLEAR = PoseQuality(
     tuple(LimbFeatures(n, 1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 1.2, 0.06, 1.0, 1.0, 0.01) for n in "abcde"),
 )  # fmt: skip
 """Of a pose that its own frame does not contradict."""
-SETTINGS = TrackSettings(audit=False)
+SETTINGS = VoxelSettings()
 
 
 @dataclass
 class Jittery:
     """Stands for a tracker: walks along x, 2 cm to and fro beside the path; has alternatives on frame 4."""
 
-    settings: TrackSettings
+    settings: VoxelSettings
     quality: PoseQuality | None = None
 
     def estimates(self, run):
@@ -49,19 +48,13 @@ class Jittery:
             alternatives = ((AlternativePose(pose + 0.1, 3.0),),) if frame == 4 else ((),)
             yield PoseEstimate(
                 frame, (pose,), 1.0 + frame, np.ones(4), 0, ("good",), (f"note {frame}",), (np.ones(10),),
-                (1e-4 * np.eye(n),), (self.quality,), alternatives, "chamfer",
+                (1e-4 * np.eye(n),), (self.quality,), alternatives, "voxel",
             )  # fmt: skip
-
-    def evidence(self, observer, bodies):
-        return None
-
-    def backward_pass(self, run, tracked):
-        return iter(())
 
 
 @pytest.fixture
 def session(tmp_path, sample_folder, monkeypatch):
-    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=Jittery))
+    monkeypatch.setitem(METHODS, "voxel", replace(VOXEL, make_tracker=Jittery))
     return load_session(shutil.copytree(sample_folder, tmp_path / "session"))
 
 
@@ -108,13 +101,13 @@ def test_a_run_is_smoothed_as_part_of_its_entry(session, store):
     smoothed = x_of(store)
     assert store.undo() == f"track frames 0:{N}"
     assert [r.frame for r in store.frames("person")] == [0, 6]
-    track(session, store, replace(SETTINGS, smooth=False))
+    track(session, store, replace(SETTINGS, whole_run=False))
     assert jitter(smoothed) < 0.3 * jitter(x_of(store))
     assert np.abs(smoothed - 0.05 * np.arange(N)).max() < 0.02
 
 
 def test_everything_but_the_poses_stays(session, store):
-    track(session, store, replace(SETTINGS, smooth=False))
+    track(session, store, replace(SETTINGS, whole_run=False))
     before, alternatives = records(store), store.alternatives("person", 4)
     store.undo()
     track(session, store)
@@ -141,7 +134,7 @@ def test_keyframes_are_bit_identical(session, store):
 
 def test_locked_degrees_of_freedom_keep_their_values(session, store):
     store.set_setting("locked", {"person": ["torso.x"]})
-    track(session, store, replace(SETTINGS, smooth=False))
+    track(session, store, replace(SETTINGS, whole_run=False))
     before = x_of(store)
     store.undo()
     track(session, store)
@@ -173,7 +166,7 @@ def x_of_tracked(store, n):
 def test_a_run_interrupted_before_its_smoothed_poses_are_written_is_not_smoothed_in_part(session, store):
     with stored_run(session, store, None, TrackPlan(range(N), (0,), SETTINGS)) as run:
         for step in run.steps():
-            if isinstance(step, SmoothedRows):
+            if isinstance(step, EstimatedRows):
                 break
             run.take(step)
     assert not run.finished
@@ -189,12 +182,12 @@ def with_a_leap(monkeypatch):
     def fewer_limbs(settings):
         return Jittery(settings, CLEAR._replace(limbs=CLEAR.limbs[:4]))
 
-    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=fewer_limbs))
+    monkeypatch.setitem(METHODS, "voxel", replace(VOXEL, make_tracker=fewer_limbs))
     monkeypatch.setitem(globals(), "tracked_x", lambda frame: 0.05 * frame)
 
 
 def test_a_leap_is_doubted_at_the_end_of_the_run(session, store, with_a_leap):
-    track(session, store, replace(SETTINGS, smooth=False))
+    track(session, store, replace(SETTINGS, whole_run=False))
     assert {r.status for r in records(store) if not r.keyframe} == {"good"}
     store.undo()
     run = track(session, store)
@@ -258,17 +251,6 @@ def one_row(rows, model, frame, pose, lost=()):
     rows.add(PoseChange("person", frame, record), 1e-4 * np.eye(model.n_dofs), None)
 
 
-def test_passes_that_agree_count_alike_however_doubtful():
-    model = load_model("gavrila34", 1.7)
-    pose = model.neutral()
-    other, rows = pose + 0.04 * (np.arange(len(pose)) == 0), TrackedRows()
-    one_row(rows, model, 3, pose, (0.2,) * len(limbs(model)))
-    rows.add_other_pass(OtherPass((0, 5), {3: other}))
-    subjects = Subjects.of([model], keyframes={0: {0: pose}, 5: {0: pose}})
-    (found,) = result_of(rows.finished(subjects, 0, 30.0, smooth=False))
-    assert found.pose.values[0] - pose[0] == pytest.approx(0.02, abs=0.002)
-
-
 def test_a_limb_in_doubt_stays_where_it_was_found_and_its_motion_tells_about_it():
     model, rows = load_model("gavrila34", 1.7), TrackedRows()
     raised = model.dof_names.index("left_shoulder.abduction")
@@ -281,28 +263,3 @@ def test_a_limb_in_doubt_stays_where_it_was_found_and_its_motion_tells_about_it(
     angles = np.array([change.pose.values[raised] for change in smoothed]) - model.neutral()[raised]
     assert angles[6] > 0.8
     assert by_motion[6][raised] - model.neutral()[raised] < 0.3
-
-
-def test_locked_degrees_of_freedom_are_locked_in_the_solve():
-    """The others fit to where the locked ones are, not to where they would like to be."""
-    model, rows = load_model("gavrila34", 1.7), TrackedRows()
-    locked = model.dof_names.index("left_shoulder.abduction")
-    active = np.arange(model.n_dofs) != locked
-    held, seen = model.neutral(), model.neutral()
-    seen[model.dof_value[locked]] += 0.3
-    wrist = model.point_names.index("left_wrist")
-    target = model.points_world(seen)[wrist]
-    for frame in range(N):
-        one_row(rows, model, frame, held)
-
-    def evidence(frame, person):
-        return [
-            GaussianPrior(held, 1e2 * np.eye(model.n_dofs)),
-            PointTargets(np.array([wrist]), target[None], np.array([1e3])),
-        ]
-
-    subjects = Subjects.of([model], None, [active])
-    changes, _ = result_of(rows.smoothed(subjects, 0, 25.0, evidence))
-    for change in changes:
-        assert change.pose.values[model.dof_value[locked]] == held[model.dof_value[locked]]
-        assert np.linalg.norm(model.points_world(change.pose.values)[wrist] - target) < 0.01
