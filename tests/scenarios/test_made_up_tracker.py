@@ -24,7 +24,7 @@ from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.options import SMOOTH
+from tracker.tracking.estimation.options import WHOLE_RUN
 from tracker.tracking.method import Method, Option, PaperMode
 
 
@@ -34,8 +34,7 @@ class SonarSettings:
 
     method: ClassVar[str] = "sonar"
     pings: int = 3
-    smooth: bool = False
-    audit: bool = False
+    whole_run: bool = False
 
 
 PINGS = Option(
@@ -43,7 +42,7 @@ PINGS = Option(
     lambda s, value: replace(s, pings=value), limits=(1, 9),
 )  # fmt: skip
 SONAR = Method(
-    "sonar", "Sonar", "echoes from the people", SonarSettings, Walker, (PINGS, SMOOTH),
+    "sonar", "Sonar", "echoes from the people", SonarSettings, Walker, (PINGS, WHOLE_RUN),
     PaperMode("Dolphin 1952", lambda: SonarSettings(9)),
 )  # fmt: skip
 
@@ -95,9 +94,9 @@ def test_help_and_options_of_the_command_line_have_it(sonar, capsys):
 def test_the_page_gets_its_controls_and_runs_it(sonar):
     shown = methods()[-1]
     assert (shown.name, shown.label, shown.help) == ("sonar", "Sonar", "Echoes from the people")
-    pings, smooth = shown.options
+    pings, whole_run = shown.options
     assert (pings.label, pings.kind, pings.limits, pings.default) == ("Pings", "whole", (1, 9), 3)
-    assert smooth.name == "smooth"
+    assert whole_run.name == "whole_run"
     choices = track_settings.with_choices(RunChoices(), {"method": "sonar", "options": {"pings": 4}}, ["FRONT"])
     assert track_settings.of_run(TrackSettings(), choices) == SonarSettings(4)
     assert track_settings.restored(track_settings.stored(choices), ["FRONT"]) == choices
