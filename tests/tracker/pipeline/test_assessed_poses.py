@@ -84,8 +84,9 @@ def test_the_head_is_not_searched():
 
 
 def test_the_worst_of_all_counts_and_the_reason_is_of_the_limb_that_it_speaks_against(gavrila):
+    by_colors = np.maximum(*(at_limb(gavrila, 9.0, name, -20.0) for name in ("left_forearm", "right_calf")))
     found = assessed(
-        gavrila, elsewhere=at_limb(gavrila, 0.97), by_colors=at_limb(gavrila, 9.0, "right_calf", -20.0),
+        gavrila, elsewhere=at_limb(gavrila, 0.97), by_colors=by_colors,
         against=("colours",) * len(limbs(gavrila)),
     )  # fmt: skip
     assert (found.status, found.remark) == ("lost", "left arm uncertain")

@@ -68,8 +68,8 @@ def estimate(monkeypatch):
     return found
 
 
-def put(session, store, frame, x_m=0.0, source="manual", keyframe=True):
-    (person,) = session.people
+def put(session, store, frame, x_m=0.0, source="manual", keyframe=True, index=0):
+    person = session.people[index]
     values = person.model.neutral() + x_m * (np.arange(len(person.model.neutral())) == 0)
     revision = store.add_model_revision(person.name, format_model(person.model))
     store.commit(
@@ -185,6 +185,25 @@ def test_the_status_of_the_estimate_counts(session, store, estimate):
     assert run.status_counts() == [{"good": N - 2, "lost": 2}]
     assert [r.status for r in store.poses("person", range(N)).values()] == ["lost", *["good"] * 3, "lost", "good"]
     assert store.pose("person", 0).remark == "left arm uncertain"
+
+
+def test_each_person_gets_their_own_rows(session, store, estimate):
+    """Also where one of them alone is tracked; the other stays."""
+    (person,) = session.people
+    pair = replace(session, people=(person, replace(person, name="beside")))
+    put(pair, store, 0, 3.0, index=1)
+    put(pair, store, 5, 4.0, index=1)
+    for people, moved in (((1,), {"beside"}), ((0, 1), {"person", "beside"})):
+        with stored_run(pair, store, None, TrackPlan(range(4), people, SETTINGS)) as run:
+            track(run)
+        assert {name: [store.pose(name, k).values[1] for k in range(4) if store.pose(name, k)] for name in moved} == {
+            name: [0.0, *[pytest.approx(MOVED_M)] * 3] for name in moved
+        }
+        assert [store.pose("beside", k).values[0] for k in range(4)] == pytest.approx([3.0, 3.01, 3.02, 3.03])
+        assert len(store.frames("person")) == (4 if 0 in people else 1)
+    assert [i for asked in estimate.asked for i in asked.subjects.tracked] == [1, 0, 1]
+    assert store.pose("person", 3).values[0] == pytest.approx(0.03)
+    assert store.pose("beside", 5).values[0] == 4.0
 
 
 def test_frames_are_saved_as_they_come(session, store, monkeypatch):
