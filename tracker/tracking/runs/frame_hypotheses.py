@@ -11,7 +11,7 @@ from tracker.appearance.region_residuals import region_residuals
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.threads import kernel_pool
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import ResidualBlock
+from tracker.fitting.gauss_newton import ResidualBlock, with_locked_dofs
 from tracker.fitting.keypoints import keypoint_blocks
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.tracking.estimation.assessment import part_costs_px
@@ -94,14 +94,15 @@ class FrameHypotheses:
 
     def propose(self, proposals: Sequence[Proposal]) -> None:
         """Refine proposals that no former one is alike, and add them to the hypotheses."""
-        new = [p for p in proposals if self._is_new(p.pose)]
+        new = [p for p in self._with_locked_dofs(proposals) if self._is_new(p.pose)]
         if new:
             poses = self._scorer.refined(self.model, [p.pose for p in new], self._sigma)
             self._join(self._scored(poses, tuple(p.source for p in new)))
 
     def add(self, proposals: Sequence[Proposal]) -> None:
-        """Add proposals to the hypotheses as they are."""
-        self._join(self._scored(np.array([p.pose for p in proposals]), tuple(p.source for p in proposals)))
+        """Add proposals to the hypotheses unrefined."""
+        poses = [p.pose for p in self._with_locked_dofs(proposals)]
+        self._join(self._scored(np.array(poses), tuple(p.source for p in proposals)))
 
     def among(self, bodies: Bodies) -> "FrameHypotheses":
         """Return the same person and hypotheses with the other people in other poses."""
@@ -166,6 +167,11 @@ class FrameHypotheses:
 
         list(kernel_pool().map(score, range(n)))
         return HypothesisSet(poses, places, nats, priors, sources)
+
+    def _with_locked_dofs(self, proposals: Sequence[Proposal]) -> list[Proposal]:
+        """Return proposals with the locked degrees of freedom of the frame; a keyframe beside it may have others."""
+        here, active = self.bodies[self.person].values, self._scorer.active_dofs
+        return [p._replace(pose=with_locked_dofs(self.model, p.pose, here, active)) for p in proposals]
 
     def _join(self, new: HypothesisSet) -> None:
         self._found = new if self._found is None else self._found.joined(new)

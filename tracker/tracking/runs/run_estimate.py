@@ -19,8 +19,6 @@ from tracker.body.model import PosedBody
 from tracker.compute.progress import mapped
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence, with_colors_only
-from tracker.fitting.gauss_newton import with_locked_dofs
-from tracker.fitting.hypothesis import apart
 from tracker.geometry.arrays import Array
 from tracker.motion.velocity import velocity
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
@@ -31,7 +29,6 @@ from tracker.tracking.runs.path_assessment import RunPose, assessed_path
 from tracker.tracking.runs.path_search import ROUNDS, PathSearch
 from tracker.tracking.runs.proposals import other_sides
 from tracker.tracking.subjects import Subjects
-from tracker.trajectory.hypotheses import DISTINCT_M
 from tracker.trajectory.solve import PosedPath, even_blocks, solve_path
 
 _TURNS = 2
@@ -135,18 +132,14 @@ class _RunEstimate:
                     self._found[i][k] = assessed[i][t]._replace(**known)
 
     def _proposals(self, frame: int, person: int) -> list[Proposal]:
-        """Return distinct poses of a person on a frame by all that is known, with locked degrees of freedom as they
-        are."""
+        """Return poses of a person on a frame by all that is known."""
         run, here, place = self._run, self._poses[frame][person], self._places[frame]
-        model, active = run.subjects.models[person], run.subjects.active_dofs[person]
+        model = run.subjects.models[person]
         beside = [self._frames[i] for i in (place - 1, place + 1) if 0 <= i < len(self._frames)]
-        found = [
+        return [
             Proposal(here, "forward"), *run.proposals.get((frame, person), ()),
             *(Proposal(self._poses[k][person], "neighbour") for k in beside), *other_sides(PosedBody(model, here)),
         ]  # fmt: skip
-        found = [p._replace(pose=with_locked_dofs(model, p.pose, here, active)) for p in found]
-        points = np.array([model.points_world(p.pose) for p in found])
-        return [found[i] for i in apart(points, np.arange(len(found)), len(found), DISTINCT_M)]
 
     def _proposed(
         self, evidence: RunEvidence, frame: int, person: int, proposals: Sequence[Proposal]
