@@ -120,7 +120,8 @@ def test_locked_degrees_of_freedom_stay_in_every_proposal(film, gavrila, monkeyp
 def test_people_are_estimated_in_turn(gavrila):
     true = moving(gavrila, 5)
     beside = true[::-1].copy()
-    beside[:, 1] += 1.1
+    true[:, 1] -= 0.5
+    beside[:, 1] += 0.4
     film = FilmedRun(gavrila, true, beside)
     steps = estimate_run(film.asked(astray(gavrila, true, 2), astray(gavrila, beside, 1, name="right_forearm")))
     found = result_of(steps)
