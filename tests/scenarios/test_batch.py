@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 QUADRILLE = [sys.executable, "-m", "app"]
 PLAN = """
 sessions = ["r*"]
-settings = {acquire = false, frames = "0:4", export = ["csv"], options = {audit = false}}
+settings = {acquire = false, frames = "0:4", export = ["csv"], options = {whole_run = false}}
 """
 
 

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 N_TASKS = 200
 PLAN = """
 sessions = ["r*"]
-settings = {acquire = false, frames = "0:2", options = {audit = false, smooth = false}}
+settings = {acquire = false, frames = "0:2", options = {whole_run = false}}
 """
 
 

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 N_KILLS = 25
 PLAN = """
 sessions = ["r*", "long"]
-settings = {acquire = false, frames = "0:4", attempts = 1000, options = {audit = false}}
+settings = {acquire = false, frames = "0:4", attempts = 1000, options = {whole_run = false}}
 [recordings.long]
 frames = "0:16"
 stretch = 5

@@ -46,7 +46,7 @@ def random_run(draw: random.Random, session: Path) -> Words:
     words: Words = ["track", session, "--method", draw.choice(METHODS)]
     if draw.random() < 0.3:
         words += ["--cameras", *draw.sample(cameras, draw.randint(1, len(cameras)))]
-    for option, odds in (("--backward", 0.2), ("--no-audit", 0.2), ("--no-smooth", 0.1), ("--paper", 0.1)):
+    for option, odds in (("--backward", 0.2), ("--no-whole-run", 0.3), ("--paper", 0.1)):
         words += [option] if draw.random() < odds else []
     if draw.random() < 0.2:
         words += ["--stride", draw.randint(2, 3)]

@@ -39,8 +39,6 @@ from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
 _SAVE_FRAMES = 10
 """Frames after which a run is saved."""
-_RENAMED = {"second_pass": "backward_pass"}
-"""Settings whose names have changed since sessions store them."""
 UNFINISHED = "unfinished track"
 """Setting of the store: the plan that was interrupted and its next frame."""
 
@@ -189,8 +187,7 @@ def is_interrupted(store: AnnotationStore, plan: TrackPlan) -> bool:
 def _same_task(stored: list[Any], task: list[Any]) -> bool:
     """Return whether two records are of the same task, also one that an older version stored."""
     *what, settings = stored
-    renamed = {_RENAMED.get(name, name): value for name, value in settings.items()}
-    return [*what, {**renamed, "method": recorded_method(settings)}] == task
+    return [*what, {**settings, "method": recorded_method(settings)}] == task
 
 
 def _tracked_before(

@@ -75,7 +75,7 @@ def test_footage_is_tracked_and_the_progress_stops_it(tmp_path):
     folder = shutil.copytree(SAMPLE, tmp_path / "s")
     session = tracker.open_session(folder)
     set_pose_from_table(session, 0, 0, read_pose_table(SAMPLE / "truth.csv"))
-    tracker.track(folder, frames=range(3), options={"audit": False})
+    tracker.track(folder, frames=range(3), options={"whole_run": False})
     assert tracker.read_poses(folder).frames.tolist() == [0, 1, 2]
 
     def stop(stage, share):
@@ -83,6 +83,6 @@ def test_footage_is_tracked_and_the_progress_stops_it(tmp_path):
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        tracker.track(folder, frames=range(40), options={"audit": False}, progress=stop)
+        tracker.track(folder, frames=range(40), options={"whole_run": False}, progress=stop)
     with pytest.raises(tracker.TrackerError, match="expected options among"):
         tracker.track(folder, options={"nothing": 1})

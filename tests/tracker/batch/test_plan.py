@@ -29,11 +29,11 @@ def read(folder, text):
 
 
 def test_settings_are_inherited_from_folder_to_folder_and_overridden_for_a_recording(lab):
-    (lab / "lab" / FOLDER_FILE).write_text("[settings]\nstride = 2\noptions = {smooth = false}\n")
+    (lab / "lab" / FOLDER_FILE).write_text("[settings]\nstride = 2\noptions = {whole_run = false}\n")
     (lab / "lab" / "old" / FOLDER_FILE).write_text('[settings]\nframes = "0:1"\n')
     text = """
     sessions = ["lab/*", "lab/old/c"]
-    settings = {stride = 5, acquire = false, options = {audit = false, smooth = true}}
+    settings = {stride = 5, acquire = false, options = {recover = false, whole_run = true}}
     [recordings."lab/a"]
     stride = 3
     [recordings."lab/old"]
@@ -42,7 +42,7 @@ def test_settings_are_inherited_from_folder_to_folder_and_overridden_for_a_recor
     found = {r.name: r.settings for r in read(lab, text).recordings}
     assert sorted(found) == ["lab/a", "lab/b", "lab/old/c"]
     assert (found["lab/a"].stride, found["lab/b"].stride, found["lab/old/c"].stride) == (3, 2, 2)
-    assert found["lab/b"].options == {"audit": False, "smooth": False}
+    assert found["lab/b"].options == {"recover": False, "whole_run": False}
     assert found["lab/old/c"].frames == "0:1"
     assert found["lab/b"].frames is None
     assert found["lab/a"].acquire is False

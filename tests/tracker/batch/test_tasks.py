@@ -28,7 +28,7 @@ def manifest(tmp_path):
     set_pose_at_joints(session, 0, 0, read_joints(SAMPLE / "truth.trc", session.fps), fit_sizes=False)
     plan = tmp_path / "plan.toml"
     plan.write_text(
-        'sessions = ["a"]\nsettings = {acquire = false, frames = "0:3", export = ["csv"], options = {audit = false}}'
+        'sessions = ["a"]\n[settings]\nacquire = false\nframes = "0:3"\nexport = ["csv"]\noptions = {whole_run = false}'
     )
     return Manifest.create(read_plan(plan, tmp_path / "out"), tmp_path / "out")
 
