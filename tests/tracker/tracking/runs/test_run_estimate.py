@@ -147,4 +147,4 @@ def test_blocks_give_nearly_what_one_block_gives(gavrila, monkeypatch):
     assert 0 < np.linalg.norm(apart, axis=-1).max() < 0.01
     assert film.errors_m(found).max() < NEAR_M
     assert [k for k in found if found[k].entry] == [3, 14, 15]
-    assert max(asked.count(k) for k in range(30)) <= 2  # for the colours of the run, and for its block
+    assert {asked.count(k) for k in range(20)} == {1}  # those of the first block, which the second one shares
