@@ -148,8 +148,8 @@ def format_summary(found: dict[str, Any]) -> str:
             f"{name}: normal matrix of rank {matrix['lowest_rank']} of {matrix['n_dofs']} or more, "
             f"condition number {condition} in the median"
         )
-    if found["moved_by_estimate"]:
-        lines.append(f"all frames together moved a limb in {found['moved_by_estimate']} poses")
+    if n_moved := found["moved_by_estimate"]:
+        lines.append(f"all frames together moved a limb in {n_moved} pose{'' if n_moved == 1 else 's'}")
     if found["contradiction"] is not None:
         lines.append(command_line_text(found["contradiction"], Remedy("check_cameras")))
     if found["stopped_at"] is not None:

@@ -172,7 +172,7 @@ class Track(Part, frozen=True):
     lost: int
     """Frames with status `lost`."""
     stage: TrackStage
-    """Stage of the run: all frames, lost people backward, or all frames without each camera in turn."""
+    """Stage of the run: forward, backward, or all frames together."""
     message: str
     """Result of the last run, or empty."""
 

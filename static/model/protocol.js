@@ -135,8 +135,8 @@
  *   MovedLimb[], is_before_shown: boolean}} Compared
  * @typedef {{person: number, points: string[], camera: number}} UnseenDepth
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total:
- *   number, per_second: number, doubtful: number, lost: number, stage: "tracking" | "back" | "audit" | "solve",
- *   message: string}} Track
+ *   number, per_second: number, doubtful: number, lost: number, stage: "tracking" | "back" | "solve", message: string}}
+ *   Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
  * @typedef {{point: number, views: number, marked: boolean, known: boolean, error_px: number | null, ready: boolean,
  *   why: string}} FloorPicking

@@ -180,7 +180,7 @@ def test_a_sample_is_tracked_and_exported(environment, sample, tmp_path):
     quadrille = environment / "quadrille"
     assert run(quadrille, "info", sample, cwd=tmp_path).count("  camera ") == 4
     run(quadrille, "init", sample, "--method", "joints", "--joints", sample / "truth.trc", cwd=tmp_path)
-    run(quadrille, "track", sample, "--frames", "0:3", "--no-audit", cwd=tmp_path)
+    run(quadrille, "track", sample, "--frames", "0:3", "--no-whole-run", cwd=tmp_path)
     shown = run(quadrille, "evaluate", sample, "--reference", sample / "truth.trc", cwd=tmp_path)
     assert "person: 3 frames, 0 missing, 0 lost" in shown
     run(quadrille, "export", sample, "--out", "motion.csv", cwd=tmp_path)

@@ -51,8 +51,6 @@ class FakeTracker:
         self.seen = []
         """Frames that have been tracked."""
         self.fails_at = None
-        self.leaps_at = None
-        """Frame to which the step is twice as long."""
         self.last = {}
         """What was found last on each frame."""
         self.whole_runs = False
@@ -78,7 +76,7 @@ class FakeTracker:
             if frame == self.fails_at:
                 raise RuntimeError("no light")
             for i in run.subjects.tracked:
-                step = STEP_M * (2 if frame == self.leaps_at else 1) * (np.arange(len(poses[i])) == 0)
+                step = STEP_M * (np.arange(len(poses[i])) == 0)
                 poses[i] = keyframes.get(frame, {}).get(i, poses[i] + step)
             status = "doubtful" if frame == 4 else "lost" if frame % 7 == 0 else "good"
             remark = "left arm relocated" if frame == 4 else ""

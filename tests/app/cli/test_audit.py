@@ -7,32 +7,21 @@ from contextlib import closing
 import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
+from fake_estimate import FakeEstimate
 
 from tracker.pipeline import audit
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Alternative, MarkChange, PinChange, PoseChange
-from tracker.tracking.view_tracks import FrameTracks
 
-FRAMES, APART = range(20, 26), 23
+FRAMES, APART, STEP_M = range(20, 26), 23, 0.02
 
 
 @pytest.fixture
-def tracks(monkeypatch):
-    """The tracks agree with the poses, but on one frame the left wrist is elsewhere in all but one."""
-    asked = []
-
-    def without_views(tracker, run, known):
-        asked.append(list(run.frames))
-        model = run.subjects.models[0]
-        shoulder = next(i for i, name in enumerate(model.value_names) if name.startswith("left_shoulder"))
-        for frame in run.frames:
-            poses = np.array([known[frame][0]] * 4)
-            if frame == APART:
-                poses[1:, shoulder] += 0.4
-            yield frame, {0: FrameTracks(poses, np.ones((4, 4)), ("FRONT", "RIGHT", "BACK", "LEFT"))}
-
-    monkeypatch.setattr(audit, "tracks_without_views", without_views)
-    return asked
+def estimate(monkeypatch):
+    """The likeliest poses are a step aside, and on one frame the left arm is elsewhere on half of the paths."""
+    found = FakeEstimate(STEP_M, doubted=(APART,))
+    monkeypatch.setattr(audit, "estimate_run", found)
+    return found
 
 
 @pytest.fixture
@@ -46,14 +35,14 @@ def posed(run, session):
 
 
 @pytest.mark.slow
-def test_poses_are_assessed_but_stay(run, posed, tracks):
+def test_poses_are_assessed_but_stay(run, posed, estimate):
     before = stored(posed)
     status, out, _ = run("audit", posed, "--json")
     assert status == 0
     found, after = json.loads(out)["person"], stored(posed)
-    assert tracks == [[*FRAMES]]
+    assert [[*asked.poses] for asked in estimate.asked] == [[*FRAMES]]
     (doubt,) = found["doubts"]
-    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain without RIGHT")
+    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain")
     assert doubt["probability_off"] > 0.05
     assert after[APART].status == doubt["status"] != "good"
     assert after[APART].errors.shape[1:] == (3, 3)
@@ -63,7 +52,7 @@ def test_poses_are_assessed_but_stay(run, posed, tracks):
 
 
 @pytest.mark.slow
-def test_a_keyframe_is_assessed_and_stays(run, posed, tracks):
+def test_a_keyframe_is_assessed_and_stays(run, posed, estimate):
     with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
         store.commit("keyframes", [MarkChange("person", k, True, True) for k in (APART, 24)], author="eve")
         store.commit("pin", [PinChange("person", APART, "left_wrist", "FRONT", (10.0, 20.0))])
@@ -71,7 +60,7 @@ def test_a_keyframe_is_assessed_and_stays(run, posed, tracks):
     status, out, _ = run("audit", posed, "--json")
     assert status == 0
     (doubt,) = json.loads(out)["person"]["doubts"]
-    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain without RIGHT")
+    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain")
     after = stored(posed)
     assert [(after[k].keyframe, after[k].status) for k in (APART, 24)] == [(True, doubt["status"]), (True, "good")]
     assert after[APART].errors.shape[1:] == (3, 3)
@@ -94,28 +83,32 @@ def test_a_keyframe_is_assessed_and_stays(run, posed, tracks):
 
 
 @pytest.mark.slow
-def test_alternatives_stay_and_keep_a_pose_doubtful(run, posed, tracks):
+def test_alternatives_are_proposed_and_only_those_that_may_be_stay(run, posed, estimate):
     with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
         pose = store.pose("person", 21)
         other = Alternative(pose.values + 0.1, pose.model_revision, 2.0)
         store.commit("alternative", [PoseChange("person", 21, pose, (other,))])
     assert run("audit", posed, "--json")[0] == 0
+    (asked,) = estimate.asked
+    ((proposed, source),) = asked.proposals[21, 0]
+    np.testing.assert_array_equal(proposed, other.values)
+    assert source == "alternative"
     with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
-        (kept,) = store.alternatives("person", 21)
-        assert store.pose("person", 21).status == "doubtful"
-    np.testing.assert_array_equal(kept.values, other.values)
+        assert store.alternatives("person", 21) == ()
 
 
 @pytest.mark.slow
-def test_the_consensus_takes_the_place_of_the_poses_if_that_is_asked(run, posed, tracks):
+def test_the_likeliest_poses_take_the_place_of_the_stored_ones_if_that_is_asked(run, posed, estimate):
     before = stored(posed)
-    status, out, _ = run("audit", posed, "--consensus", "--frames", "22:25")
+    status, out, _ = run("audit", posed, "--replace", "--frames", "22:25")
     assert status == 0
-    assert "person: 3 good" in out  # it lies where most of the tracks are
+    assert "person: 2 good, 1 doubtful" in out
     after = stored(posed)
-    assert not np.array_equal(after[APART].values, before[APART].values)
+    for k in (22, APART, 24):
+        values = before[k].values
+        np.testing.assert_array_equal(after[k].values, values + STEP_M * (np.arange(len(values)) == 1))
     assert after[20].errors is None
-    assert tracks == [[22, 23, 24]]
+    assert [[*asked.poses] for asked in estimate.asked] == [[22, 23, 24]]
 
 
 def test_poses_are_needed(run, session):

@@ -11,6 +11,7 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 from command_line import SAMPLE, WITH_POSE, assert_refused, stored
+from fake_estimate import FakeEstimate
 from gestures import wait_for
 
 from app.cli.track import TrackArguments, settings_of
@@ -20,12 +21,13 @@ from tracker.formats.file_axes import axes_matrix
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
 from tracker.formats.trc import read_trc, write_trc
+from tracker.pipeline import track_session
 from tracker.pipeline.methods import METHODS
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
 from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.estimate import BackwardStep
+from tracker.tracking.runs.run_estimate import Progress
 
 
 def test_new_info_init_track_evaluate(run, tmp_path):
@@ -215,14 +217,14 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
             yield estimate
 
     monkeypatch.setattr(ChamferTracker, "estimates", interrupted)
-    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6", "--json")
+    status, out, _ = run("track", session, "--no-whole-run", "--frames", "0:6", "--json")
     assert status == 130
     assert (json.loads(out)["frames"], json.loads(out)["stopped_at"]) == (3, 3)
     assert sorted(stored(session)) == [0, 1, 2]
     assert not (session / "lock.json").exists()
     monkeypatch.undo()
     done = {k: stored(session)[k].time for k in (1, 2)}
-    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6")  # run again to resume
+    status, out, _ = run("track", session, "--no-whole-run", "--frames", "0:6")  # run again to resume
     assert status == 0
     assert "tracked person over 3 frames, resumed at frame 3" in out
     found = stored(session)
@@ -230,78 +232,64 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert {k: found[k].time for k in (1, 2)} == done
     assert {found[k].status for k in range(1, 6)} <= {"good", "doubtful"}
     assert len(found[3].view_costs_px) == 4
-    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6", "--json")  # a finished run starts over
+    status, out, _ = run("track", session, "--no-whole-run", "--frames", "0:6", "--json")  # a finished run starts over
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 
 
 @pytest.mark.slow
-def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run, session, monkeypatch):
-    """What the backward pass finds better is in the store at once, in the one entry of the history."""
+def test_an_estimate_that_is_interrupted_leaves_the_first_pass_and_goes_on(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    estimates, offered = {}, []
-    original = ChamferTracker.estimates
+    tracked, original, estimate = [], ChamferTracker.estimates, FakeEstimate(0.01, doubted=(3,))
 
-    def tracked(*arguments):
-        for estimate in original(*arguments):
-            estimates[estimate.frame] = estimate
-            yield estimate._replace(statuses=("lost" if estimate.frame in (1, 3) else "good",))
+    def noted(*arguments):
+        for found in original(*arguments):
+            tracked.append(found)
+            yield found
 
-    def elsewhere(frame):
-        found = estimates[frame]
-        notes = ("tracked back from frame 2",)
-        return found._replace(poses=(found.poses[0] + 0.01,), notes=notes, statuses=("good",))
+    def interrupted(run):
+        yield Progress(0, 5)
+        raise KeyboardInterrupt
 
-    def ways_back(run, found, settings, make_estimator):
-        offered.append(found)
-        yield BackwardStep(1, 0, 1, 2, (elsewhere(1),))
-        if len(offered) == 1:
-            raise KeyboardInterrupt
-        yield BackwardStep(3, 0, 2, 2, (elsewhere(3),))
-
-    monkeypatch.setattr(ChamferTracker, "estimates", tracked)
-    monkeypatch.setattr("tracker.tracking.chamfer.tracker.track_backward", ways_back)
-    words = ("track", session, "--no-smooth", "--frames", "0:5", "--json")
+    monkeypatch.setattr(ChamferTracker, "estimates", noted)
+    monkeypatch.setattr(track_session, "estimate_run", interrupted)
+    words = ("track", session, "--frames", "0:5", "--json")
     status, out, _ = run(*words)
     summary = json.loads(out)
-    assert (status, summary["frames"], summary["stopped_at"], summary["improved_backward"]) == (130, 5, 1, 1)
-    assert summary["statuses"] == {"person": {"good": 4, "lost": 1}}
-    found = stored(session)
-    np.testing.assert_array_equal(found[1].values, estimates[1].poses[0] + 0.01)
-    assert (found[1].status, found[1].remark) == ("good", "tracked back from frame 2")
-    for k in (2, 3, 4):
-        np.testing.assert_array_equal(found[k].values, estimates[k].poses[0])
-    assert found[3].status == "lost"
+    assert (status, summary["frames"], summary["moved_by_estimate"]) == (130, 5, 0)
+    assert summary["stopped_at"] == tracked[-1].frame
+    first, before = tracked[:5], stored(session)
+    assert [f.frame for f in first] == [0, 1, 2, 3, 4]
+    for k in (1, 2, 3, 4):
+        np.testing.assert_array_equal(before[k].values, first[k].poses[0])
 
-    def never(*_):
-        raise AssertionError("the first pass is done")
-
-    monkeypatch.setattr(ChamferTracker, "estimates", never)
-    summary = json.loads(run(*words)[1])  # run again: the backward pass alone
-    assert (summary["frames"], summary["stopped_at"], summary["improved_backward"]) == (0, None, 2)
-    assert [f.frame for f in offered[1]] == [0, 1, 2, 3, 4]
-    assert [f.statuses for f in offered[1]] == [("good",)] * 3 + [("lost",), ("good",)]
-    for k, f in enumerate(offered[1]):
-        np.testing.assert_array_equal(f.poses[0], found[k].values)
-    np.testing.assert_array_equal(stored(session)[3].values, estimates[3].poses[0] + 0.01)
-    monkeypatch.setattr(ChamferTracker, "estimates", tracked)
+    tracked.clear()
+    monkeypatch.setattr(track_session, "estimate_run", estimate)
+    summary = json.loads(run(*words)[1])  # run again: the backward pass and the estimate
+    assert {f.frame for f in tracked[:2]} == {4, 3}
+    assert (summary["frames"], summary["stopped_at"], summary["moved_by_estimate"]) == (0, None, 1)
+    assert summary["statuses"] == {"person": {"good": 4, "doubtful": 1}}
+    for k in (1, 2, 3, 4):
+        moved = first[k].poses[0] + 0.01 * (np.arange(len(first[k].poses[0])) == 1)
+        np.testing.assert_array_equal(stored(session)[k].values, moved)
     summary = json.loads(run(*words)[1])  # a finished run starts over, as one entry
     assert (summary["frames"], summary["resumed_at"]) == (5, None)
+    assert "all frames together moved a limb in 1 pose\n" in run(*words[:-1])[1]
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:
-        assert [store.undo() for _ in range(3)] == ["track frames 0:5"] * 3
+        assert [store.undo() for _ in range(4)] == ["track frames 0:5"] * 4
         assert [row.frame for row in store.frames("person")] == [0]
-    offered.clear()
-    assert json.loads(run(*words, "--no-backward-pass")[1])["improved_backward"] == 0
-    assert json.loads(run(*words, "--paper")[1])["improved_backward"] == 0
-    assert offered == []
+    estimate.asked.clear()
+    assert json.loads(run(*words, "--no-whole-run")[1])["moved_by_estimate"] == 0
+    assert json.loads(run(*words, "--paper")[1])["moved_by_estimate"] == 0
+    assert estimate.asked == []
 
 
 @pytest.mark.slow
 def test_going_on_is_as_if_never_stopped(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    run("track", session, "--no-smooth", "--frames", "0:4")
-    run("track", session, "--no-smooth", "--frames", "4:5")  # the motion before is known
+    run("track", session, "--no-whole-run", "--frames", "0:4")
+    run("track", session, "--no-whole-run", "--frames", "4:5")  # the motion before is known
     stepwise = stored(session)[4].values
-    run("track", session, "--no-smooth", "--frames", "0:5")
+    run("track", session, "--no-whole-run", "--frames", "0:5")
     np.testing.assert_allclose(stored(session)[4].values, stepwise, atol=2e-3)
 
 

@@ -63,8 +63,8 @@ def test_what_next_and_between_keyframes_refuse(run, session):
     words = ("track", session, "--between-keyframes")
     assert_refused(run(*words), ["expected two keyframes with other frames between them in frames 0 to 49, found none"])
     assert_refused(run(*words, "--backward"), ["expected --between-keyframes without --init"])
-    assert_refused(run(*words, "--no-backward-pass"), ["expected a backward pass with --between-keyframes"])
-    assert_refused(run(*words, "--method", "voxel"), ["found a method without one"])
+    assert_refused(run(*words, "--no-whole-run"), ["expected a backward pass with --between-keyframes"])
+    assert_refused(run(*words, "--method", "voxel"), ["found a run without one"])
 
 
 @pytest.mark.slow
@@ -73,7 +73,7 @@ def test_only_stretches_whose_keyframes_changed_are_tracked_again(run, session):
         assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", k)[0] == 0
 
     def tracked(*options):
-        status, out, _ = run("track", session, "--between-keyframes", "--no-audit", "--json", *options)
+        status, out, _ = run("track", session, "--between-keyframes", "--json", *options)
         assert status == 0
         found = json.loads(out)
         return [(s["first"], s["last"], s["people"]) for s in found["stretches"]], found["runs"]

@@ -32,7 +32,6 @@ def test_options_of_other_methods_are_refused(run, placed):
         (("--voxel-size", "30"), "'chamfer', found --voxel-size"),
         (("--method", "contour", "--sizes", "always"), "'contour', found --sizes"),
         (("--method", "voxel", "--voxel-size", "0"), "a number from 10 to 100 as 'voxel_size', found 0"),
-        (("--method", "voxel", "--no-backward-pass"), "'voxel', found --no-backward-pass"),
         (("--method", "voxel", "--voxel-size", "nan"), "found nan"),
         (("--method", "voxel", "--paper"), "the paper's body mikic10"),
     ):

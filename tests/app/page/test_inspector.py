@@ -46,7 +46,7 @@ def test_settings_are_shown_changed_one_by_one_and_their_defaults_known(page):
     page.send("search_settings", changes={"bound_rad": 0.5, "theta_px": 25, "passes": [1, 0.5]})
     shown = page.updates()["settings"]
     settings = page.controller.state.settings
-    assert (settings.estimate, settings.recover, settings.backward_pass) == ("search", None, True)
+    assert (settings.estimate, settings.recover, settings.whole_run) == ("search", None, True)
     assert (settings.predict.order, settings.predict.window) == (2, 5)
     assert shown.track.options == {"estimate": "search", "order": "2", "window": 5, "recover": False}
     assert (shown.search.bound_rad, shown.search.theta_px, shown.search.passes) == (0.5, 25, (1, 0.5))
@@ -71,7 +71,7 @@ def test_settings_are_shown_changed_one_by_one_and_their_defaults_known(page):
 @pytest.mark.slow
 def test_track_settings_are_kept_with_the_session(page, opened):
     page.send("track_settings", changes={"options": {"estimate": "search", "order": "2", "recover": False}})
-    page.send("track_settings", changes={"method": "voxel", "options": {"smooth": False, "voxel_size": 25}})
+    page.send("track_settings", changes={"method": "voxel", "options": {"whole_run": False, "voxel_size": 25}})
     page.send("search_settings", changes={"bound_rad": 0.5})
     chosen = page.updates()["settings"]
     page.controller = opened()
@@ -115,13 +115,14 @@ def test_kept_settings_that_cannot_be_used_are_passed_over(opened, kept):
     assert settings.track == settings.track_default
 
 
-def test_settings_of_former_versions_are_read(opened):
-    kept = {"method": "contour", "order": 2, "past_poses": 5, "estimate": "search", "backward_pass": False}
+@pytest.mark.parametrize("switched_off", ["backward_pass", "audit", "smooth"])
+def test_settings_of_former_versions_are_read(opened, switched_off):
+    kept = {"method": "contour", "order": 2, "past_poses": 5, "estimate": "search", switched_off: False}
     opened()._session_state.saver.store_setting("track_settings", kept)
     state = opened().state
     assert (state.settings.estimate, state.settings.predict.order, state.settings.predict.window) == ("search", 2, 5)
     run = track_settings.of_run(state.settings, state.run_choices)
-    assert (run.method, run.predict.order, run.predict.window, run.backward_pass) == ("contour", 2, 5, False)
+    assert (run.method, run.predict.order, run.predict.window, run.whole_run) == ("contour", 2, 5, False)
 
 
 def test_the_3d_view_is_chosen_and_kept_with_the_session(page, opened):

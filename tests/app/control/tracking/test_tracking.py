@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fake_estimate import FakeEstimate
 from fake_tracker import STEP_M
 from gestures import FRONT, PAGE, drag, wait_for
 
@@ -15,7 +16,6 @@ from app.state.run_choices import RunChoices
 from tracker.errors import SessionError, TrackerError
 from tracker.pipeline import track_session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.tracking.estimate import BackwardStep
 
 
 def at(controller, frame):
@@ -371,84 +371,52 @@ def test_a_run_survives_a_restart(placed, tracker, opened):
     assert set(controller.stored_poses.timeline()) == {2}
 
 
-def improved_backward(tracker, steps):
-    """Has the tracker's backward pass find frame 7 better, in so many steps; what it is offered."""
-    offered = []
-
-    def back(found):
-        offered.append(found)
-        for i in range(steps):
-            better = ()
-            if i == steps - 1:
-                poses = tuple(p + STEP_M * (np.arange(len(p)) == 1) for p in found[4].poses)
-                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), notes=("re-initialized",)),)
-            yield BackwardStep(7, 0, i + 1, steps, better)
-
-    tracker.back = back
-    return offered
+@pytest.fixture
+def estimate(tracker, monkeypatch):
+    """Runs end with the estimate of all frames together, which finds everybody a step aside."""
+    tracker.whole_runs, found = True, FakeEstimate(STEP_M, doubted=(7,))
+    monkeypatch.setattr(track_session, "estimate_run", found)
+    return found
 
 
 @pytest.mark.slow
-def test_the_backward_pass_takes_the_place_of_what_was_lost(placed, tracker):
-    offered = improved_backward(tracker, 3)
-    placed.search.set_settings(replace(placed.state.settings, smooth=False))
-    placed.tracking.start(backward=False, until=9)
-    tracker.let_go(7)
-    wait_for(lambda: placed.state.track.message)
-    (found,) = offered
-    assert [(f.frame, f.statuses) for f in found][3:5] == [(6, ("good",)), (7, ("lost",))]
-    assert placed.state.track.message == "done: 7 frames, 1 doubtful"
-    assert placed.state.frame == 9  # nobody is taken elsewhere
-    placed.navigation.seek(7)
-    shown = placed.state.people[0]
-    assert (shown.source, shown.status, shown.remark) == ("tracked", "good", "re-initialized")
-    np.testing.assert_array_equal(placed.state.poses[0], found[4].poses[0] + STEP_M * (np.arange(22) == 1))
-    placed.history.undo()
-    assert set(placed.stored_poses.timeline()) == {2}  # one entry with the first pass
-
-
-def test_a_frame_that_is_looked_at_shows_what_the_backward_pass_found(placed, tracker):
+def test_the_estimate_of_all_frames_takes_the_place_of_what_was_tracked(placed, tracker, estimate):
+    """The frame that is looked at shows its estimated pose, and one undo takes back all of the run."""
     seen = []
     placed.subscribe(lambda state: seen.append(state.track))
-    improved_backward(tracker, 2)
-    placed.tracking.start(backward=False, until=8)
-    tracker.let_go(5)
-    wait_for(at(placed, 7))
-    placed.tracking.follow(False)
-    assert (placed.state.frame, placed.state.people[0].status) == (7, "lost")
-    tracker.let_go(1)
-    wait_for(lambda: placed.state.track.message)
-    assert placed.state.frame == 7
-    assert placed.state.people[0].status == "good"
-    assert {(t.done, t.total) for t in seen if t.stage == "back"} == {(1, 2), (2, 2)}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("smooth", [True, False])
-def test_the_poses_are_smoothed_at_the_end_of_a_run(placed, tracker, smooth):
-    """The frame that is looked at shows its smoothed pose, and one undo takes back all of the run."""
-    tracker.leaps_at = 9
-    placed.search.set_settings(replace(placed.state.settings, smooth=smooth))
     placed.tracking.start(backward=False, until=9)
     tracker.let_go(7)
+    wait_for(at(placed, 9))
+    forward = dict(tracker.last)
+    tracker.let_go(7)
     wait_for(lambda: placed.state.track.message)
+    assert tracker.seen == [*range(3, 10), *range(9, 2, -1)]
+    stages = [(t.stage, t.done, t.total) for t in seen if t.stage != "tracking"]
+    assert sorted(set(stages), key=stages.index) == [
+        *(("back", i, 7) for i in range(1, 8)), *(("solve", i, 7) for i in range(1, 8))
+    ]  # fmt: skip
+    (run,) = estimate.asked
+    assert [p.source for p in run.proposals[5, 0]] == ["backward"]
+    np.testing.assert_array_equal(run.proposals[5, 0][0].pose, tracker.last[5].poses[0])
+    assert placed.state.track.message == "done: 7 frames, 1 doubtful"
+    aside = STEP_M * (np.arange(22) == 1)
     assert (placed.state.frame, placed.state.people[0].source) == (9, "tracked")
-    is_as_tracked = np.array_equal(placed.state.poses[0], tracker.last[9].poses[0])
-    assert is_as_tracked is not smooth
-    placed.navigation.seek(5)
-    np.testing.assert_allclose(placed.state.poses[0], tracker.last[5].poses[0], atol=STEP_M)
+    np.testing.assert_array_equal(placed.state.poses[0], forward[9].poses[0] + aside)
+    placed.navigation.seek(7)
+    shown = placed.state.people[0]
+    assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm uncertain")
+    np.testing.assert_array_equal(placed.state.poses[0], forward[7].poses[0] + aside)
     placed.history.undo()
     assert set(placed.stored_poses.timeline()) == {2}
 
 
 @pytest.mark.slow
-def test_the_backward_pass_can_be_switched_off(placed, tracker):
-    offered = improved_backward(tracker, 1)
-    placed.search.set_settings(replace(placed.state.settings, backward_pass=False))
+def test_the_estimate_of_all_frames_can_be_switched_off(placed, tracker, estimate):
+    placed.search.set_settings(replace(placed.state.settings, whole_run=False))
     placed.tracking.start(backward=False, until=9)
     tracker.let_go(7)
     wait_for(lambda: placed.state.track.message)
-    assert offered == []
+    assert (estimate.asked, tracker.seen) == ([], [*range(3, 10)])
     assert placed.state.track.message == "done: 7 frames, 1 doubtful, 1 lost"
 
 
