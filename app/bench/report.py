@@ -20,7 +20,7 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from app.bench import acquisition_rows, audit_rows, calibration_rows, contour_rows, diagnosis_rows, voxel_rows
+from app.bench import acquisition_rows, calibration_rows, contour_rows, diagnosis_rows, run_rows, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import FRAME, read_crowd, read_frame
@@ -71,7 +71,7 @@ def measure() -> Iterator[Row]:
     yield from contour_rows.pipelines(frame.with_model("gavrila34"), yardstick)
     yield bench_rows.pipeline_of_two(read_crowd(sample_copy("tango"), FRAME), yardstick)
     yield from acquisition_rows.acquisitions(frame, yardstick)
-    yield audit_rows.audited_run(frame.with_model(DEFAULT_MODEL), yardstick)
+    yield run_rows.whole_run(frame.with_model(DEFAULT_MODEL), yardstick)
 
 
 @contextmanager

@@ -119,7 +119,7 @@ def conditions(clips: Sequence[Clip]) -> Conditions:
         f"Frames: {frames}",
         body="`gavrila34` of the true height",
         start="pose fitted to the reference joints of frame 0",
-        settings="defaults but for what the row says, without the backward pass, smoothing and audit. Each cell: mean "
+        settings="defaults but for what the row says, first pass alone. Each cell: mean "
         "error of the 12 limb joints in mm / lost frames (a limb joint off by more than 150 mm) / frames per second",
         chosen="those of evidence, fits, searches and tracking",
         command="python tests/benchmarks/ablation.py --data DIR --write docs/decisions.md",

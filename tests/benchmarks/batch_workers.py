@@ -75,7 +75,7 @@ def run(source: Path, n_workers: int, cores: set[int], words: argparse.Namespace
         for i in range(N_RECORDINGS):
             shutil.copytree(source, lab / f"r{i:02d}")
         (lab / "plan.toml").write_text(
-            'sessions = ["r*"]\nsettings = {acquire = false, options = {audit = false}, '
+            'sessions = ["r*"]\nsettings = {acquire = false, options = {whole_run = false}, '
             f'frames = "0:{words.frames}"}}'
         )
         began, busy, used = time.monotonic(), busy_s(), used_s()

@@ -33,14 +33,14 @@ EVERY = 15
 """Frames from a keyframe to the next."""
 LOST_MM = 150.0
 TABLES = ("between_keyframes",)
-HEADS = ("frames", "from both", "forward", "interpolated", "lost", "seam and error", "processor time")
+HEADS = ("frames", "whole run", "first pass", "interpolated", "lost", "seam and error", "processor time")
 CONDITIONS = Conditions(
     footage="recordings, four cameras with backgrounds",
     body=f"`{DEFAULT_MODEL}`, acquired from the reference joints of frame 0",
     start=f"keyframes on every {EVERY}th frame, fitted to the reference joints",
-    settings="defaults. Mean error over the limb joints of frames between two keyframes, without the audit → with it, "
-    "mm. *Lost:* frames with a joint off by more than 150 mm, with the audit: from both, forward, interpolated. *Seam "
-    "and error:* rank correlation, without the audit → with it. Processor time: from both, as a multiple of forward",
+    settings="defaults. Mean error over the limb joints of frames between two keyframes, mm: by the whole run, by the "
+    "first pass alone, interpolated. *Lost:* frames with a joint off by more than 150 mm, by the same. *Seam and "
+    "error:* rank correlation. Processor time: of the whole run, as a multiple of the first pass",
     chosen="rules of tracking; none of the passes from both keyframes",
     command="python tests/benchmarks/between_keyframes.py SESSIONS --data DIR --write docs/annotation.md",
 )
@@ -117,33 +117,28 @@ def errors(bodies: Mapping[int, PosedBody], reference: Path, fps: float) -> np.n
 
 
 def rows_of(folder: Path, references: list[Path]) -> dict[str, list[str]]:
-    """Track copies of a session in all ways; return the cells of each person."""
-    runs: dict[tuple[bool, bool], list[Between]] = {}
+    """Track copies of a session in both ways; return the cells of each person."""
+    runs = list[list[Between]]()
     with tempfile.TemporaryDirectory() as scratch:
         start = Path(shutil.copytree(folder, Path(scratch) / "start"))
         keyframes = with_keyframes(start, references)
         by_hand = [interpolated(start, i, path, keyframes) for i, path in enumerate(references)]
-        for audit in (False, True):
-            for both in (True, False):
-                at = Path(shutil.copytree(start, Path(scratch) / f"{audit}-{both}"))
-                before = processor_s()
-                options = ["--no-audit"] * (not audit) + ["--no-backward-pass"] * (not both)
-                quadrille("track", at, *options)
-                seconds = processor_s() - before
-                found = [measured(at, i, path, keyframes, seconds) for i, path in enumerate(references)]
-                runs[audit, both] = found
+        for options in ((), ("--no-whole-run",)):
+            at = Path(shutil.copytree(start, Path(scratch) / f"run_{len(runs)}"))
+            before = processor_s()
+            quadrille("track", at, *options)
+            seconds = processor_s() - before
+            runs.append([measured(at, i, path, keyframes, seconds) for i, path in enumerate(references)])
     out = {}
-    for i, reference in enumerate(references):
-        plain, audited = ([runs[a, both][i] for both in (True, False)] for a in (False, True))
+    for i, (reference, whole, first) in enumerate(zip(references, *runs, strict=True)):
         name = folder.name.replace("_", " ") + (f", {reference.stem}" if len(references) > 1 else "")
+        ways = whole, first, by_hand[i]
         out[name] = [
-            str(len(plain[0].seams_mm)),
-            f"{plain[0].mean_mm:.1f} → {audited[0].mean_mm:.1f}",
-            f"{plain[1].mean_mm:.1f} → {audited[1].mean_mm:.1f}",
-            f"{by_hand[i].mean_mm:.1f}",
-            f"{audited[0].n_lost}, {audited[1].n_lost}, {by_hand[i].n_lost}",
-            f"{plain[0].correlation:.2f} → {audited[0].correlation:.2f}",
-            f"x {plain[0].seconds / plain[1].seconds:.1f} → x {audited[0].seconds / audited[1].seconds:.1f}",
+            str(len(whole.seams_mm)),
+            *(f"{way.mean_mm:.1f}" for way in ways),
+            ", ".join(str(way.n_lost) for way in ways),
+            f"{whole.correlation:.2f}",
+            f"x {whole.seconds / first.seconds:.1f}",
         ]
     return out
 

@@ -1,5 +1,7 @@
 """Fit the weights of `tracker/tracking/run_confidence.py` and measure what statuses are worth (docs/accuracy.md).
 
+Statuses follow from these weights in first passes and in runs of the voxel tracker.
+
 `python tests/benchmarks/calibrate_status.py --data DIR` films simulated people of ten builds, couples and a crowd, with
 clutter and noise. It tracks them with the generic body of the height that their joints give, and with the body acquired
 from one of the recordings: with two to eight cameras, at half the frame rate, without backgrounds, and without the
@@ -47,7 +49,7 @@ from tracker.simulate import Simulation, simulate
 from tracker.tracking import confidence
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.estimate import PoseEstimate, TrackedFrame
+from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.run_confidence import N_FEATURES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
@@ -151,40 +153,32 @@ def passes(cameras: Mapping[int, tuple[int, ...]]) -> Iterator[Pass]:
 
 
 def track(footage: Footage, models: Sequence[BodyModel], how: Pass) -> tuple[LimbRows, list[PoseEstimate]]:
-    """Track all people from their joints in frame 0; return the rows, and the estimates of the first pass.
-
-    The rows are of the final poses: those of the backward pass where it found better ones.
-    """
+    """Track all people from their joints in frame 0; return the rows, and the estimates."""
     starts = [_start_of(m, t) for m, t in zip(models, footage.references, strict=True)]
     cameras = [footage.cameras[i] for i in how.cameras]
     cameras = cameras if how.background else [replace(c, background=None, masks=None) for c in cameras]
-    settings = TrackSettings() if how.searched else replace(TrackSettings(), recover=None, backward_pass=False)
+    settings = TrackSettings() if how.searched else replace(TrackSettings(), recover=None)
     frames = range(0, footage.n_frames, how.stride)
     with Recording(cameras) as recording:
         subjects = Subjects.of(models, keyframes={0: dict(enumerate(starts))})
         run = TrackingRun(Observer(cameras, recording), subjects, starts, frames, footage.fps / how.stride)
-        tracker = ChamferTracker(settings)
-        found = list(tracker.estimates(run))
-        final = [dict.fromkeys(range(len(models)), f) for f in found]
-        for step in tracker.backward_pass(run, [TrackedFrame.of(f) for f in found]):
-            for better in step.better:
-                final[frames.index(better.frame)][step.person] = better
-    people = [_rows_of(p, [f[p] for f in final], subjects, settings, footage) for p in range(len(models))]
+        found = list(ChamferTracker(settings).estimates(run))
+    people = [_rows_of(p, found, subjects, settings, footage) for p in range(len(models))]
     return LimbRows(*(np.array(c) for c in zip(*itertools.chain(*people), strict=True))), found
 
 
 def _rows_of(
-    person: int, final: Sequence[PoseEstimate], subjects: Subjects, settings: TrackSettings, footage: Footage
+    person: int, estimates: Sequence[PoseEstimate], subjects: Subjects, settings: TrackSettings, footage: Footage
 ) -> Iterator[tuple[Any, ...]]:
-    """Yield the rows of the limbs of one person, whose final poses are given."""
+    """Yield the rows of the limbs of one person."""
     kept, model, truth = TrackedRows(), subjects.models[person], footage.references[person]
     stored = [StoredPerson(str(p), 1) for p in range(len(subjects.models))]
-    for found in final:
+    for found in estimates:
         for change in tracked_changes([found], stored, [person], subjects.keyframes, settings):
             kept.add(change, found.covariances[person], found.qualities[person])
     features = kept.run_features(model, result_of(kept.smoothed(subjects, person, footage.fps))[1])
     joints = {int(f): dict(zip(truth.names, p, strict=True)) for f, p in zip(truth.frames, truth.points, strict=True)}
-    for found in final:
+    for found in estimates:
         if found.qualities[person] is not None and found.frame in joints:
             errors = _errors_mm(model, joints[found.frame], found.poses[person])
             yield from _frame_rows(person, model, found, errors, features.get(found.frame))

@@ -106,7 +106,7 @@ def conditions(footage: str, body: str, start: str) -> Conditions:
     """Return the conditions of a table."""
     chosen = "the rules of the check, as said above"
     command = "python tests/benchmarks/calibration_repair.py --data DIR --write docs/calibration.md"
-    return Conditions(footage, body, start, "defaults; tracking with `--no-audit`", chosen, command)
+    return Conditions(footage, body, start, "defaults; tracking with `--no-whole-run`", chosen, command)
 
 
 def decoded(name: str, at: Path, folder: Path) -> Footage:
@@ -177,7 +177,7 @@ def _joints(at: Path) -> Path:
 
 def tracked(at: Path) -> Path:
     """Track a session."""
-    quadrille("track", at, "--no-audit")
+    quadrille("track", at, "--no-whole-run")
     return at
 
 
@@ -236,11 +236,11 @@ def bumps(data: Path, folder: Path) -> Measured:
     for name, calibration in (("from right", right), ("from wrong", wrong)):
         at = started(walk, folder / name, None, calibration)
         (at / "annotations.sqlite").unlink()
-        quadrille("track", at, "--init", "auto", "--acquire", "--no-audit")
+        quadrille("track", at, "--init", "auto", "--acquire", "--no-whole-run")
         errors.append(error_mm(at))
     words = f"{FROM_NOTHING}, people found and bodies acquired under it"
     rows[words] = _row(camera, errors[1], repaired(at), error_mm(at), errors[0])
-    quadrille("track", at, "--acquire", "--no-audit")
+    quadrille("track", at, "--acquire", "--no-whole-run")
     rows["the same, sizes acquired again"] = ["", "", "", f"{error_mm(at):.1f}", f"{errors[0]:.1f}"]
     said = conditions(
         "`walk`",

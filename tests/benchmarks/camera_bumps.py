@@ -145,7 +145,7 @@ def started(recording: Recording, at: Path, calibration: Path, bodies: Mapping[s
 
 def tracked(at: Path) -> Path:
     """Track the first frames of a session."""
-    quadrille("track", at, "--no-audit", "--frames", f"0:{N_FRAMES}")
+    quadrille("track", at, "--no-whole-run", "--frames", f"0:{N_FRAMES}")
     return at
 
 
@@ -237,7 +237,7 @@ def conditions(found: Sequence[Judged]) -> Conditions:
         f"the joints shift by {SHIFTS_PX[0]:g} to {SHIFTS_PX[1]:g} px in its picture",
         "acquired under the right calibration, or with sizes by height alone, as the rows say",
         "the reference joints of frame 0",
-        "defaults; tracked under the wrong calibration with `--no-audit`",
+        "defaults; tracked under the wrong calibration with `--no-whole-run`",
         "the rules of the check, on other bumps of the three recordings; none on these",
         COMMAND,
     )

@@ -122,7 +122,7 @@ def conditions(couples: Sequence[Couple]) -> Conditions:
         body="`gavrila34` of the true heights",
         start="poses fitted to the true joints of frame 0; of the tango the mean of "
         f"{STARTS['tango']} starts {APART_RAD:g} rad apart, because the last digit decides what is lost there",
-        settings="defaults but for what the row says, without the backward pass, smoothing and audit. Each cell: mean "
+        settings="defaults but for what the row says, first pass alone. Each cell: mean "
         "error of the 12 limb joints of both in mm / lost frames of both / frames on which somebody is nearer to the "
         "other's joints",
         chosen="those of people near each other",

@@ -1,10 +1,10 @@
-"""Measure the audit of tracked poses: `python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR`.
+"""Measure the estimate of whole runs: `python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR`.
 
 SESSIONS is a folder of sessions that have bodies and start poses, named as the recordings in `--data DIR` or as the
-simulated people in `--scenes DIR`; a name may go on after `@`. Copies of them are tracked without the audit and with
-it. The table has the error of the limb joints, frames with a joint that is off by more than 100 mm, and what the
-statuses are worth: the area under the curve, frames that are flagged, those of them that are fine, and frames called
-good that are off. Coverage is the share of joints within their 90% ellipsoid. Processor times are those of the whole
+simulated people in `--scenes DIR`; a name may go on after `@`. Copies of them are tracked by the first pass
+alone and by the whole run. The table has the error of the limb joints, frames with a joint that is off by more than
+100 mm, and what the statuses are worth: the area under the curve, frames that are flagged, those of them that are fine,
+and frames called good that are off. Coverage is the share of joints within their 90% ellipsoid. Processor times are those of the whole
 command.
 """
 
@@ -37,7 +37,7 @@ CONDITIONS = Conditions(
     "four cameras with backgrounds",
     body=f"`{DEFAULT_MODEL}`, acquired; after `@nothing` of people who were found",
     start="pose fitted to the reference joints of frame 0; after `@nothing` the one that was found",
-    settings="defaults, without the audit → with it",
+    settings="defaults, first pass → whole run",
     chosen="rules of tracking (recordings), the 10 nats of the colours (simulated people), the threshold of 5%, the "
     "median over the tracks, and the 15 mm by which joints lie elsewhere in people without known ones (recordings)",
     command="python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR --write docs/accuracy.md "
@@ -69,14 +69,14 @@ class Assessed(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """A person tracked without the audit and with it."""
+    """A person tracked by the first pass alone and by the whole run."""
 
     name: str
     """Session, and person where there are several."""
-    plain: Assessed
-    audited: Assessed
+    first: Assessed
+    whole: Assessed
     cost: float
-    """Processor time of the run with the audit, as a multiple of that without it."""
+    """Processor time of the whole run, as a multiple of that of the first pass."""
 
     @property
     def session(self) -> str:
@@ -86,7 +86,7 @@ class Compared(NamedTuple):
     @property
     def cells(self) -> list[str]:
         """Cells of the table, in the order of `HEADS`."""
-        a, b = self.plain, self.audited
+        a, b = self.first, self.whole
         return [
             str(len(b.off)),
             f"{np.nanmean(a.errors_mm):.1f} → {np.nanmean(b.errors_mm):.1f}",
@@ -139,19 +139,19 @@ def assessed(folder: Path, person: int, reference: Path) -> Assessed:
 
 
 def measured(folder: Path, references: Sequence[Path]) -> Iterator[Compared]:
-    """Track a copy of a session without the audit and with it; yield the comparison of each person."""
+    """Track copies of a session by the first pass and by the whole run; yield the comparison of each person."""
     runs, seconds = [], []
-    for options in (("--no-audit",), ()):
+    for options in (("--no-whole-run",), ()):
         with tempfile.TemporaryDirectory() as scratch:
             at = Path(shutil.copytree(folder, Path(scratch) / "session"))
             before = processor_s()
             quadrille("track", at, *options)
             seconds.append(processor_s() - before)
             runs.append([assessed(at, i, path) for i, path in enumerate(references)])
-    for reference, plain, audited in zip(references, *runs, strict=True):
+    for reference, first, whole in zip(references, *runs, strict=True):
         name = folder.name + (f", {reference.stem}" if len(references) > 1 else "")
-        if len(plain.off):
-            yield Compared(name.replace("_", " "), plain, audited, seconds[1] / seconds[0])
+        if len(first.off):
+            yield Compared(name.replace("_", " "), first, whole, seconds[1] / seconds[0])
 
 
 def pooled(name: str, found: Sequence[Compared]) -> Compared:
@@ -162,8 +162,8 @@ def pooled(name: str, found: Sequence[Compared]) -> Compared:
         errors = [np.pad(r.errors_mm, ((0, 0), (0, n - r.errors_mm.shape[1])), constant_values=np.nan) for r in runs]
         return Assessed(np.concatenate(errors), *(np.concatenate([r[i] for r in runs]) for i in (1, 2, 3)))
 
-    plain, audited = together([c.plain for c in found]), together([c.audited for c in found])
-    return Compared(name, plain, audited, float(np.mean([c.cost for c in found])))
+    first, whole = together([c.first for c in found]), together([c.whole for c in found])
+    return Compared(name, first, whole, float(np.mean([c.cost for c in found])))
 
 
 def groups(found: Sequence[Compared], names: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:

@@ -129,7 +129,7 @@ def main() -> None:
                 rows[f"{kind}; {title}"] = [str(own.total()), *(str(own[name]) for name in HEADS[1:])]
     conditions = CONDITIONS._replace(
         footage=CONDITIONS.footage.replace("25 or 15 frames/s", "25 or 15 frames/s and at 8"),
-        settings="defaults, with the audit",
+        settings="defaults",
         command="python tests/benchmarks/keyframes_in_doubt.py --write docs/accuracy.md",
     )
     show(given.write, TABLES[0], conditions, table(HEADS, rows, "keyframes that a person sets"))

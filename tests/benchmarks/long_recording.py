@@ -145,7 +145,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=20000)
     parser.add_argument("--stretch", type=int, default=1000)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--options", default="{audit = false}", help="of the tracker, as the plan has them")
+    parser.add_argument("--options", default="{whole_run = false}", help="of the tracker, as the plan has them")
     parser.add_argument("--folder", type=Path, help="to keep footage, session and batch in, and to take them up again")
     words = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:

@@ -5,7 +5,7 @@ Each SESSION has bodies and a start. It is named as a recording in `--data DIR`,
 limb of one frame by pins in two views and a fit, as *Fit* in the page does. The frame becomes a keyframe, and the
 stretches beside it are tracked again. He follows the proposals of `quadrille next`, the list of doubts, or corrects
 everything on keyframes at equal distances. It is counted how many actions it takes until the mean error is at most
-20 mm (30 for two people) and no frame is lost. A folder NAME@plain is the session NAME, tracked without the audit.
+20 mm (30 for two people) and no frame is lost. A folder NAME@plain is the session NAME, tracked by first passes.
 """
 
 import argparse
@@ -82,7 +82,7 @@ class Annotator:
     def __init__(self, folder: Path, references: Sequence[Path], seed: int, is_plain: bool) -> None:
         self.folder, self.references, self.rng = folder, references, np.random.default_rng(seed)
         self.session = load_session(folder)
-        self.settings = TrackSettings(audit=not is_plain)
+        self.settings = TrackSettings(whole_run=not is_plain)
         self.target_mm = TARGETS_MM[len(self.session.people) > 1]
         self.actions, self.curve = 0, list[Measured]()
 
@@ -233,7 +233,7 @@ def cells(curve: Sequence[Measured], target_mm: float, end: str = "") -> list[st
 def rows_of(folder: Path, references: list[Path], seed: int, most: int) -> dict[str, list[str]]:
     """Annotate copies of a session in all ways."""
     out, (name, *plain) = {}, folder.name.replace("_", " ").split("@")
-    name += ", without audit" * bool(plain)
+    name += ", first pass alone" * bool(plain)
     with tempfile.TemporaryDirectory() as scratch:
         new = Annotator(Path(shutil.copytree(folder, Path(scratch) / "new")), references, seed, bool(plain))
         new.track(range(new.session.n_frames), tuple(range(len(new.session.people))))  # by the program as it is now

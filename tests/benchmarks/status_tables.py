@@ -33,8 +33,8 @@ CONDITIONS = Conditions(
     "cameras with backgrounds at the full frame rate, unless the row says otherwise",
     body="`gavrila34`: generic, of the height that the joints give, and acquired from another recording of the person",
     start="pose fitted to the true joints of frame 0",
-    settings="finished runs without the audit. The statuses of a simulated person are by weights fitted to all other "
-    "people, those of recordings by weights fitted to all simulated people",
+    settings="first passes, smoothed. The statuses of a simulated person are by weights fitted to all other people, "
+    "those of recordings by weights fitted to all simulated people",
     chosen="both thresholds (simulated people), rules of tracking (recordings)",
     command="python tests/benchmarks/calibrate_status.py --data DIR --write docs/accuracy.md docs/measurements.md "
     "docs/decisions.md",

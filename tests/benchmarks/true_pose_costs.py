@@ -34,7 +34,6 @@ from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.estimate import TrackedFrame
 from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
 from tracker.tracking.estimation.settings import trust
 from tracker.tracking.subjects import Subjects
@@ -119,18 +118,13 @@ def read_dancer(name: str, folder: Path, reference: Path) -> Dancer:
 
 
 def measure(dancer: Dancer, settings: TrackSettings) -> list[FrameResult]:
-    """Track a recording with both passes, and compare the poses of each frame."""
+    """Track a recording, and compare the poses of each frame."""
     model, start = dancer.model, fit_to_points(dancer.model, dancer.joints[0], centers=True).pose
     with Recording(dancer.cameras) as recording:
         observer = Observer(dancer.cameras, recording)
         subjects = Subjects.of([model], keyframes={0: {0: start}})
-        run, tracker = (
-            TrackingRun(observer, subjects, [start], range(dancer.n_frames), dancer.fps),
-            ChamferTracker(settings),
-        )
-        found = {f.frame: f for f in tracker.estimates(run)}
-        for step in tracker.backward_pass(run, [TrackedFrame.of(f) for f in found.values()]):
-            found.update({f.frame: f for f in step.better})
+        run = TrackingRun(observer, subjects, [start], range(dancer.n_frames), dancer.fps)
+        found = {f.frame: f for f in ChamferTracker(settings).estimates(run)}
         frames = [k for k in found if k in dancer.joints and k > 0]
         return [_compare(dancer, observer, settings, k, found[k].poses[0]) for k in frames]
 
@@ -176,7 +170,7 @@ CONDITIONS = Conditions(
     footage="dances of simulated people, and recordings; four cameras with backgrounds",
     body="`gavrila34` of the height that the true joints give",
     start="pose fitted to the true joints of frame 0",
-    settings="defaults with the backward pass, without smoothing and audit. The shares are those of frames whose "
+    settings="defaults, first pass alone. The shares are those of frames whose "
     "tracked pose costs at most what the pose refined from the truth does. Of the other frames, those are counted "
     "where a barrier lies between the two poses; on the rest both lie in one valley",
     chosen="those of searches",

@@ -2,8 +2,8 @@
 
 It films simulated people in motions and rooms that no other benchmark has, by a seed that none of them uses. Two of the
 three kinds of rooms are met nowhere else. Each body is acquired from the joints of frame 0. Then all are tracked
-without the audit and with it, as by `joint_errors.py`. After a change that was made because of these figures, they no
-longer serve: raise `SEED` and measure again. `--work DIR` keeps scenes and sessions.
+by the first pass alone and by the whole run, as by `joint_errors.py`. After a change that was made because of these
+figures, they no longer serve: raise `SEED` and measure again. `--work DIR` keeps scenes and sessions.
 """
 
 import argparse
@@ -78,7 +78,7 @@ CONDITIONS = Conditions(
     "theater dark. Builds and kinds of motion are those of the other benchmarks; rooms, noise and motions are new",
     body=f"`{DEFAULT_MODEL}`, acquired from the joints of frame 0 by `quadrille acquire`",
     start="pose fitted to the true joints of frame 0",
-    settings="defaults, without the audit → with it",
+    settings="defaults, first pass → whole run",
     chosen="none",
     command="python tests/benchmarks/unseen_people.py --write docs/accuracy.md",
 )

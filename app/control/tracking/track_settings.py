@@ -19,7 +19,7 @@ SETTING = "track_settings"
 _COSTS = ("theta_px", "outliers")
 """Settings of the search that hold for every method that has them."""
 _RENAMED = {"past_poses": "window", **dict.fromkeys(("backward_pass", "audit", "smooth"), "whole_run")}
-"""Options whose names have changed since sessions store them. Parts of the estimate of a run had switches of their own."""
+"""Options whose names have changed since sessions store them. Parts of a whole run had switches of their own."""
 
 
 class _Stored(TypedDict, total=False):
