@@ -20,6 +20,7 @@ import numpy as np
 from app.session.samples import bundled
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.kernel_cache import compiled_mark, record_compiled, record_stage
+from tracker.compute.progress import result_of
 from tracker.contours import occluding_contours
 from tracker.contours.part_edges import points_occluded
 from tracker.errors import SessionError
@@ -133,7 +134,7 @@ def _call_tracking(session: Session) -> None:
     _track(cameras, settings, crowd.models, crowd.values)
     _track(cameras, replace(settings, estimate="search"), crowd.models[:1], crowd.values[:1])
     _track([replace(c, background=None) for c in cameras], settings, crowd.models[:1], crowd.values[:1])
-    _repair(cameras, settings, crowd.models[:1], crowd.values[:1])
+    _estimate(cameras, settings, session.fps, crowd.models[:1], crowd.values[:1])
 
 
 def _call_others(session: Session) -> None:
@@ -193,14 +194,17 @@ def _track(
             pass
 
 
-def _repair(
-    cameras: Sequence[CameraSource], settings: "TrackSettings", models: Sequence[BodyModel], poses: Sequence[Array]
-) -> None:
-    """Learn the colours of a run of one frame, and search a limb with them."""
+def _estimate(
+    cameras: Sequence[CameraSource], settings: "TrackSettings", fps: float, models: Sequence[BodyModel],
+    poses: Sequence[Array],
+) -> None:  # fmt: skip
+    """Estimate the poses of a few frames together, and search a limb with the colours of one."""
     from tracker.appearance.region_learning import LearningFrame, learn_regions
     from tracker.body.limbs import limbs
     from tracker.tracking.estimation.limb_repair import FrameEvidence, better_limbs
     from tracker.tracking.estimation.pose_score import common_evidence
+    from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
+    from tracker.tracking.subjects import Subjects
 
     bodies = tuple(PosedBody(m, pose) for m, pose in zip(models, poses, strict=True))
     with Recording(cameras) as recording:
@@ -210,6 +214,8 @@ def _repair(
         frame = known.frame(views, bodies)
         known.score(frame, bodies)
         better_limbs(FrameEvidence(views, known, frame), bodies, 0, settings, limbs(models[0])[-1:])
+        known_poses = dict.fromkeys(range(_FRAME, _FRAME + _FRAMES), poses)
+        result_of(estimate_run(RunFrames(observer, Subjects.of(models), settings, fps, known_poses)))
 
 
 if __name__ == "__main__":

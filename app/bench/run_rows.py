@@ -14,7 +14,7 @@ from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
 _FRAMES = range(5, 45)
-_MUST = 4.0
+_MUST = 6.0
 """Largest allowed processor time of a whole run, in first passes."""
 
 

@@ -4,8 +4,8 @@ SESSIONS is a folder of sessions that have bodies and start poses, named as the 
 simulated people in `--scenes DIR`; a name may go on after `@`. Copies of them are tracked by the first pass
 alone and by the whole run. The table has the error of the limb joints, frames with a joint that is off by more than
 100 mm, and what the statuses are worth: the area under the curve, frames that are flagged, those of them that are fine,
-and frames called good that are off. Coverage is the share of joints within their 90% ellipsoid. Processor times are those of the whole
-command.
+and frames called good that are off. Coverage is the share of joints within their 90% ellipsoid. Processor times are
+those of the whole command.
 """
 
 import argparse

@@ -25,7 +25,7 @@ FRAMES = range(10, 34)
 def posed(run, session):
     """The sample with known poses on some frames."""
     assert run("init", session, *WITH_POSE, "--frame", "10", "--json")[0] == 0
-    assert run("track", session, "--frames", f"{FRAMES.start}:{FRAMES.stop}", "--no-audit", "--json")[0] == 0
+    assert run("track", session, "--frames", f"{FRAMES.start}:{FRAMES.stop}", "--no-whole-run", "--json")[0] == 0
     return session
 
 
@@ -62,7 +62,7 @@ def test_a_turned_camera_is_named_corrected_and_undone(run, posed):
 
 @pytest.mark.slow
 def test_the_end_of_a_run_says_that_a_camera_is_off_and_nothing_of_healthy_ones(run, posed):
-    words = ("track", posed, "--frames", "10:44", "--no-audit", "--json")
+    words = ("track", posed, "--frames", "10:44", "--no-whole-run", "--json")
     assert json.loads(run(*words)[1])["contradiction"] is None
     turn(posed, "LEFT", 1.5)
     summary = json.loads(run(*words)[1])

@@ -55,7 +55,7 @@ async def test_ellipses_are_switched_on_in_the_inspector_and_kept(page, endpoint
 
 async def test_the_inspector_says_where_errors_come_from_while_none_are_known(page, endpoint):
     switch = await open_inspector(page)
-    why = page.get_by_text("they come from tracking with the audit")
+    why = page.get_by_text("they come from tracking over the whole run")
     assert await why.is_hidden()
     await switch.check()
     await why.wait_for()

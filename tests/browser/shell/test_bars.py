@@ -275,16 +275,15 @@ async def test_the_stages_of_a_run_are_told_apart(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "lost": 2}
     texts = {
         "tracking": "Tracked 4 of 9",
-        "back": "Checking alternatives",
-        "audit": "Checking each camera",
-        "solve": "Solving the whole path",
+        "back": "Tracking backward",
+        "solve": "Estimating all frames together",
     }
     for stage, text in texts.items():
         endpoint.state["track"] = track | {"stage": stage, "done": 4, "total": 9}
         await endpoint.broadcast(endpoint.state)
         await expect(page.locator("#search-stage")).to_have_text(text, use_inner_text=True)
     assert await page.locator("#search-stage").get_attribute("title") == (
-        "Fitting the poses of all frames together; you can go on"
+        "Comparing poses over all frames and cameras; you can go on"
     )
 
 

@@ -65,9 +65,9 @@ async def test_the_backward_pass_says_what_it_does_and_that_one_can_go_on(page, 
         endpoint.state["track"] = track | {"done": done}
         await endpoint.broadcast(endpoint.state)
         await page.wait_for_timeout(1200)
-    assert await work(page, "track").locator("b").inner_text() == "Checking alternatives"
+    assert await work(page, "track").locator("b").inner_text() == "Tracking backward"
     assert await work(page, "track").locator("output").inner_text() == "you can go on, a few seconds left"
-    assert await page.locator("#search-stage").inner_text() == "Checking alternatives"
+    assert await page.locator("#search-stage").inner_text() == "Tracking backward"
 
 
 @pytest.mark.slow
