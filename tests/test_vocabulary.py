@@ -25,7 +25,7 @@ RETIRED = {
     "nearest_alike": "nearest_oriented_segment",
     "nearest_alongside": "nearest_parallel_segment",
     "cheapest_way": "viterbi_path",
-    "follow_back": "track_backward",
+    "follow_back": "TrackSession.backward_pass",
     "Followed": "BackwardStep",
     "MatchedView": "WorkingView",
     "Probes": "SampleGrid",

@@ -131,7 +131,7 @@ function searchedText({ searched, alternatives }) {
 
 /** @param {string} status */
 function noContradiction(status) {
-  const more = status === "doubtful" || status === "lost" ? " The status comes from tracks without one view each, which disagree." : "";
+  const more = status === "doubtful" || status === "lost" ? " The status comes from other poses of the whole run that may be as likely." : "";
   return `No view contradicts this pose clearly.${more}`;
 }
 

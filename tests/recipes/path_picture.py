@@ -95,7 +95,7 @@ def drawing(search, curves):
         out.append(text(LEFT - 8, y(height) + 4, f"{height:.1f}", "end"))
     out += [text(x(t), HEIGHT - BOTTOM + 18, str(t)) for t in range(0, len(sets), 5)]
     out.append(text((LEFT + WIDTH) / 2, HEIGHT - BOTTOM + 38, "frame"))
-    out.append(text(LEFT - 8, TOP - 14, "height, m", "end"))
+    out.append(text(10, 28, "height, m", "start"))
     for t, (of_frame, own) in enumerate(zip(nats, heights, strict=True)):
         masses = np.exp(of_frame.min() - of_frame)
         for mass, height in zip(masses / masses.sum(), own, strict=True):
@@ -111,12 +111,12 @@ def drawing(search, curves):
         out.append(
             f"<polyline points='{points}' fill='none' stroke='{color}' stroke-width='2.2' stroke-dasharray='{dash}'/>"
         )
-        at = LEFT + 40 + 190 * (i + 1)
+        at = (310, 450, 640)[i]
         out.append(f"<path d='M{at} 24h34' stroke='{color}' stroke-width='2.2' stroke-dasharray='{dash}'/>")
         out.append(text(at + 42, 28, name, "start"))
     out += [
-        f"<circle cx='{LEFT + 60}' cy='24' r='4' fill='{GREY}'/>",
-        text(LEFT + 72, 28, "hypotheses, by mass", "start"),
+        f"<circle cx='{LEFT + 70}' cy='24' r='4' fill='{GREY}'/>",
+        text(LEFT + 82, 28, "hypotheses, by mass", "start"),
     ]
     return "\n".join([*out, "</svg>\n"])
 

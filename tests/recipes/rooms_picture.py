@@ -47,6 +47,7 @@ HOUSE = {
         ["calibration", "plausibility"],
         ["acquisition", "initialization"],
         ["tracking/chamfer, tracking/contour, tracking/voxel"],
+        ["tracking/runs"],
         ["tracking/estimation"],
         ["tracking", "initialization/generators"],
         ["search", "appearance", "trajectory"],

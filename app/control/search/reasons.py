@@ -24,7 +24,7 @@ from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.alternative_poses import Tried, alternative_poses, limbs_in_doubt
 from tracker.tracking.estimation.frame_problem import Bodies
-from tracker.tracking.estimation.part_evidence import RunEvidence, contradiction, learn_run, read_frame
+from tracker.tracking.estimation.part_evidence import UsualEvidence, contradiction, learn_run, read_frame
 
 _LOG = logging.getLogger(__name__)
 _REST_S = 0.1
@@ -43,7 +43,7 @@ class _StoppedError(Exception):
 class _Learnt:
     """The usual of a run, and the poses that it was learnt from."""
 
-    run: RunEvidence
+    run: UsualEvidence
     people: tuple[int, ...]
     poses: Mapping[int, tuple[Array, ...]]
     """Of these people in their present bodies by frame, (n_values,) each."""
@@ -158,7 +158,7 @@ class Reasons:
             raise TrackerError(f"expected a pose of {name} on frame {state.frame}, found none; place the body first")
         return tuple(i for i, p in enumerate(state.people) if p.source is not None)
 
-    def _explained(self, state: State, run: RunEvidence, people: tuple[int, ...]) -> Reason:
+    def _explained(self, state: State, run: UsualEvidence, people: tuple[int, ...]) -> Reason:
         """Return the reason for the pose of the selected person, without alternatives."""
         session_state, person = self._session_state, state.person
         seen = read_frame(session_state.frames.observer, state.frame, _bodies(state, people))
@@ -166,7 +166,7 @@ class Reasons:
         worst = contradiction(state.models[person], table, seen.thetas_px, session_state.session.camera_names)
         return Reason(state.frame, person, state.people[person].values, table, worst)
 
-    def _with_alternatives(self, state: State, run: RunEvidence, people: tuple[int, ...], found: Reason) -> Reason:
+    def _with_alternatives(self, state: State, run: UsualEvidence, people: tuple[int, ...], found: Reason) -> Reason:
         """Return a reason with the stored alternatives of its pose, and those that a search of limbs in doubt finds."""
         shown, model = state.people[found.person], state.models[found.person]
         active = self._session_state.active_dofs(found.person)
@@ -195,7 +195,7 @@ class Reasons:
             found = [session_state.saver.pose_now(person, state.frame + step) for step in _AROUND]
         return [values for values in found if values is not None]
 
-    def _run(self, people: tuple[int, ...]) -> RunEvidence:
+    def _run(self, people: tuple[int, ...]) -> UsualEvidence:
         """Return what is usual in the run, learnt if that is to do."""
         session_state = self._session_state
         poses, observer = self._poses(people), session_state.frames.observer

@@ -1,4 +1,4 @@
-"""Assess poses that a user has chosen, in the background, by tracks without each camera in turn."""
+"""Assess poses that a user has chosen, in the background, by the frames around them."""
 
 import logging
 import time

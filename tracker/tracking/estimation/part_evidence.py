@@ -74,7 +74,7 @@ class Contradiction(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class RunEvidence:
+class UsualEvidence:
     """The usual of a run: its colours, and the medians of all measures."""
 
     known: RegionModel
@@ -114,7 +114,7 @@ def read_frame(observer: Observer, frame: int, bodies: Bodies) -> SeenFrame:
     )  # fmt: skip
 
 
-def learn_run(observer: Observer, frames: Sequence[tuple[int, Bodies]], report: Report = unreported) -> RunEvidence:
+def learn_run(observer: Observer, frames: Sequence[tuple[int, Bodies]], report: Report = unreported) -> UsualEvidence:
     """Learn what is usual from some sixty frames of a run, which may have some wrong poses.
 
     Args:
@@ -137,7 +137,7 @@ def learn_run(observer: Observer, frames: Sequence[tuple[int, Bodies]], report: 
         np.where(is_shown, [getattr(s, name) for s in seen], np.nan) for name in ("outside", "contour_px")
     )
     medians = [_medians(cells) for cells in (rates, outside, contour_px)]
-    return RunEvidence(known, medians[0], nats.sum(axis=1), *medians[1:])
+    return UsualEvidence(known, medians[0], nats.sum(axis=1), *medians[1:])
 
 
 def contradiction(model: BodyModel, table: PartTable, thetas_px: Array, views: Sequence[str]) -> Contradiction | None:
