@@ -4,8 +4,8 @@ from math import isfinite
 from typing import Literal, NamedTuple
 
 SearchKind = Literal["limbs", "exchange", "body", "samples", "path", "repair"]
-"""Limbs elsewhere; two limbs exchanged; the whole body best first; samples along the covariance; the pose of the
-backward pass; limbs elsewhere by the colours of the run."""
+"""Limbs elsewhere; two limbs exchanged; the whole body best first; samples along the covariance; limbs elsewhere
+by all frames of a run together; limbs elsewhere by the colours of the run."""
 
 
 class Search(NamedTuple):

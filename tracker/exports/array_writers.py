@@ -22,7 +22,7 @@ from tracker.geometry.cameras import Camera
 def write_person_c3d(
     motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
 ) -> None:
-    """Write the points of one person as C3D; residuals are the errors that the audit expects."""
+    """Write the points of one person as C3D; residuals are the errors that the run expects."""
     found = pose_arrays(motion, options)
     write_c3d(
         paths[0], found.points, found.joints[:, 0], motion.session.fps,

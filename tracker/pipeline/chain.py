@@ -1,4 +1,4 @@
-"""Drive a recording to tracked poses from whatever is there: find, acquire, track out from the start, smooth, assess.
+"""Drive a recording to tracked poses from whatever is there: find, acquire, track out from the start, assess.
 
 Command line, page and batch call `run_chain` with a plan, an open session that stores the results, and a sink that
 shows them. Each stage is stored when it is done. The same plan goes on where it was stopped.

@@ -360,7 +360,7 @@ _SEARCHES: dict[SearchKind, str] = {
     "exchange": "{} exchanged",
     "body": "whole body",
     "samples": "samples around the pose",
-    "path": "pose tracked backward",
+    "path": "{}, by all frames together",
     "repair": "{}, by colours of the run",
 }
 """Words of each kind of search, with the names of its limbs."""
@@ -371,7 +371,7 @@ def tried(trace: Sequence[Search] | None) -> tuple[TriedSearch, ...] | None:
     if trace is None:
         return None
     names = [" and ".join(map(limb_display_name, x.limbs)) for x in trace]
-    words = [_SEARCHES[x.kind].format(own) for x, own in zip(trace, names, strict=True)]
+    words = [_SEARCHES[x.kind].format(own or "pose") for x, own in zip(trace, names, strict=True)]
     return tuple(TriedSearch(w, x.before_nats, x.after_nats, x.taken) for w, x in zip(words, trace, strict=True))
 
 

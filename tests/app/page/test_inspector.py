@@ -244,6 +244,8 @@ def test_the_searches_on_a_frame_are_shown_from_the_store(page):
         Search("limbs", ("left_forearm", "right_calf"), 41.0, 12.0, True),
         Search("samples", (), 12.0, 11.5, False),
         Search("repair", ("left_calf",), -8.0, None, False),
+        Search("path", ("left_forearm",), 20.0, 9.5, True),
+        Search("path", (), 3.0, 1.0, True),
     )
     for frame, known in ((state.frame, trace), (state.frame + 1, ())):
         saver.write("track", [PoseChange("person", frame, replace(record, trace=known))], None, by_program=True)
@@ -256,5 +258,7 @@ def test_the_searches_on_a_frame_are_shown_from_the_store(page):
         ("left arm and right leg", 41.0, 12.0, True),
         ("samples around the pose", 12.0, 11.5, False),
         ("left leg, by colours of the run", -8.0, None, False),
+        ("left arm, by all frames together", 20.0, 9.5, True),
+        ("pose, by all frames together", 3.0, 1.0, True),
     ]
     assert found[1:] == [(), None]
