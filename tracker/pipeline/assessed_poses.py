@@ -41,10 +41,12 @@ def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseR
     errors = point_covariances(model, found.errors_m2)
     searched = [found.is_searched and len(limb.parts) > 1 for limb in limbs(model)]
     odds = np.stack([limb_odds(model, errors), mass_odds(found.elsewhere), elsewhere_odds(found.by_colors, searched)])
-    reasons = [
-        ("", f": elsewhere on {100 * mass:.0f}% of the likely paths", f": {against}")[source]
-        for source, mass, against in zip(odds[:, :, 0].argmax(axis=0), found.elsewhere, found.against, strict=True)
-    ]
+    reasons = [""] * len(searched)
+    for i, source in enumerate(odds[:, :, 0].argmax(axis=0)):
+        if source == 1 and not found.others:  # else the remark on them says so
+            reasons[i] = f": elsewhere on {100 * found.elsewhere[i]:.0f}% of the likely paths"
+        elif source == 2:
+            reasons[i] = f": {found.against[i]}"
     remarks = without_uncertainty(pose.remark, alternatives=True)
     if found.others:
         remarks.append(may_be_elsewhere(PosedBody(model, pose.values), found.others))

@@ -109,26 +109,28 @@ def stored_run(
     locks = load_locks(people, store.setting)
     active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
     others = [i for i in range(len(people)) if i not in plan.people]
-    keyframes = keyframes_of(store, people, frozenset(plan.frames), others)
+    before = [_history(session, store, whole) if plan.start is None else {} for whole in plan.legs]
+    keyframes = keyframes_of(store, people, frozenset([*plan.frames, *(k for own in before for k in own)]), others)
     former = poses_to_replace(store, people, frozenset(plan.frames), plan.people, plan.settings)
     subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes, former)
     floor, left = floor_plane(session.up, session.floor), _frames_left(store, plan)
     legs, done = [], list[int]()
-    for whole, rest in zip(plan.legs, left, strict=True):
-        before = whole[: len(whole) - len(rest)]
-        is_begun = len(before) > 0
+    for whole, rest, history in zip(plan.legs, left, before, strict=True):
+        tracked = whole[: len(whole) - len(rest)]
+        is_begun = len(tracked) > 0
         step = whole[1] - whole[0] if len(whole) > 1 else 1
         start = _start_poses(session, store, (rest or whole)[0], step, plan, is_begun)
-        known = before if is_begun or plan.start is None else [plan.start]
+        known = tracked if is_begun or plan.start is None else [plan.start]
         legs.append(
             Leg(
                 TrackingRun(observer, subjects, start, rest, session.fps, floor),
                 _tracked_before(session, store, known, start, subjects, plan.start),
                 plan.start,
                 _stored_starts(session, store, plan),
+                history,
             )
         )
-        done += [k for k in before if k != plan.start]
+        done += [k for k in tracked if k != plan.start]
     run = TrackSession(
         make_tracker(plan.settings),
         legs,
@@ -146,6 +148,18 @@ def stored_run(
         if not run.finished:
             unfinished = {"task": plan.record(), "next": run.next_frame, "rows": run.rows_record()}
         store.set_setting(UNFINISHED, unfinished)
+
+
+def _history(session: Session, store: AnnotationStore, frames: Sequence[int]) -> dict[int, list[Array]]:
+    """Return the stored poses of all people on the two frames before some frames, as far as all have one."""
+    step = frames[1] - frames[0] if len(frames) > 1 else 1
+    out = dict[int, list[Array]]()
+    for k in (frames[0] - step, frames[0] - 2 * step):
+        found = [pose for p in session.people if (pose := _pose_on(store, p, k)) is not None]
+        if len(found) < len(session.people):
+            break
+        out[k] = found
+    return out
 
 
 def _views(session: Session, plan: TrackPlan) -> list[int | None]:

@@ -65,6 +65,8 @@ class Leg(NamedTuple):
     with the others."""
     stored: Mapping[int, PoseRecord] = {}
     """Stored poses of the start by person."""
+    history: Mapping[int, Sequence[Array]] = {}
+    """Stored poses of all people on the frames just before the leg, which show the motion there."""
 
     @property
     def frames(self) -> list[int]:
@@ -215,7 +217,8 @@ class TrackSession:
                 known = [(pose, "alternative") for pose in (tracked.alternatives[i] if tracked.alternatives else ())]
                 known += [(former[i], "former")] if i in former else []
                 proposals.setdefault((k, i), []).extend(Proposal(*own) for own in known)
-        poses = {k: tracked.poses for k, tracked in self.tracked.items()}
+        poses: dict[int, Sequence[Array]] = {k: p for leg in self.legs for k, p in leg.history.items()}
+        poses |= {k: tracked.poses for k, tracked in self.tracked.items()}
         run = RunFrames(self.observer, subjects, settings, self.legs[0].run.fps, poses, proposals)
         found = yield from mapped(estimate_run(run), lambda step: EstimateStep(*step))
         return self._rows_estimated(found)
@@ -229,6 +232,8 @@ class TrackSession:
             model, stored, rows = subjects.models[i], self._stored[i], self._rows[i]
             between = between_keyframes(subjects.keyframes, i, sorted(of_person))
             for k, pose in of_person.items():
+                if k not in self.tracked:
+                    continue
                 keyframe = subjects.keyframes_at(k).get(i)
                 if keyframe is not None:
                     keyframes.append(assessed_keyframe(model, stored.name, k, keyframe, pose))
@@ -318,6 +323,9 @@ class TrackSession:
             self.n_moved += sum(any(x.kind == "path" for x in pose.trace or ()) for pose in poses.values())
             for frame in statuses.keys() & self.tracked.keys():
                 values = poses[frame].values if frame in poses else None
+                cost_px = poses[frame].cost_px if frame in poses else None
+                if frame in self.costs_px and cost_px is not None:
+                    self.costs_px[frame] = cost_px
                 self.tracked[frame] = self.tracked[frame].assessed(i, status_named(statuses[frame]), values)
         self._write([*step.changes, *step.keyframes])
         self.finished = True

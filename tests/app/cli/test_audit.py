@@ -42,7 +42,7 @@ def test_poses_are_assessed_but_stay(run, posed, estimate):
     found, after = json.loads(out)["person"], stored(posed)
     assert [[*asked.poses] for asked in estimate.asked] == [[*FRAMES]]
     (doubt,) = found["doubts"]
-    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain")
+    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain: elsewhere on 50% of the likely paths")
     assert doubt["probability_off"] > 0.05
     assert after[APART].status == doubt["status"] != "good"
     assert after[APART].errors.shape[1:] == (3, 3)
@@ -60,7 +60,7 @@ def test_a_keyframe_is_assessed_and_stays(run, posed, estimate):
     status, out, _ = run("audit", posed, "--json")
     assert status == 0
     (doubt,) = json.loads(out)["person"]["doubts"]
-    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain")
+    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain: elsewhere on 50% of the likely paths")
     after = stored(posed)
     assert [(after[k].keyframe, after[k].status) for k in (APART, 24)] == [(True, doubt["status"]), (True, "good")]
     assert after[APART].errors.shape[1:] == (3, 3)

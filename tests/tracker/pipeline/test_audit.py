@@ -88,7 +88,7 @@ def test_poses_are_assessed_and_stay(session, store, estimate):
 def test_a_keyframe_is_compared_as_others_are_and_only_its_assessment_is_stored(session, store, estimate):
     before, change = store.pose("person", 19), audited(session, store)[19]
     assert isinstance(change, AssessmentChange)
-    assert (change.status, change.remark) == ("lost", "left arm uncertain")
+    assert (change.status, change.remark) == ("lost", "left arm uncertain: elsewhere on 90% of the likely paths")
     store.commit("audit", [change], by_program=True)
     after = store.pose("person", 19)
     assert (after.status, after.keyframe, after.author) == ("lost", True, before.author)

@@ -92,5 +92,5 @@ def test_the_poses_around_are_compared_and_stay(run, monkeypatch):
     assert (asked.stays, asked.subjects.tracked, dict(asked.subjects.keyframes)) == (True, (0,), {})
     np.testing.assert_array_equal(asked.subjects.active_dofs[0], active)
     assert (found.status, found.keyframe, found.values.tobytes()) == ("doubtful", True, record.values.tobytes())
-    assert found.remark == "left arm uncertain"
+    assert found.remark == "left arm uncertain: elsewhere on 30% of the likely paths"
     assert (len(shown), shown[-1]) == (17, ("comparing poses", 1.0))

@@ -107,6 +107,19 @@ def test_a_run_is_one_entry_of_the_history_and_keeps_keyframes(session, store):
     assert [r.frame for r in store.frames("person")] == [0]
 
 
+def test_the_poses_just_before_a_run_show_the_motion_there_and_stay(session, store, estimate):
+    for k, keyframe in ((2, False), (3, True)):
+        put(session, store, k, STEP_M * k, keyframe=keyframe)
+    before = stored(store, 1)
+    with run_of(session, store, range(4, 4 + N), SETTINGS) as run:
+        track(run)
+    (asked,) = estimate.asked
+    assert sorted(asked.poses) == [2, 3, *range(4, 4 + N)]
+    assert [k for k in sorted(asked.poses) if 0 in asked.subjects.keyframes_at(k)] == [3]
+    assert stored(store, 1)[: len(before)] == before
+    assert run.costs_px == dict.fromkeys(range(4, 4 + N), 1.5)  # of the estimated poses
+
+
 def test_the_estimate_takes_the_place_of_the_poses_of_the_first_pass(session, store, estimate):
     before = store.pose("person", 0)
     with run_of(session, store, settings=SETTINGS) as run:
@@ -184,7 +197,7 @@ def test_the_status_of_the_estimate_counts(session, store, estimate):
         track(run)
     assert run.status_counts() == [{"good": N - 2, "lost": 2}]
     assert [r.status for r in store.poses("person", range(N)).values()] == ["lost", *["good"] * 3, "lost", "good"]
-    assert store.pose("person", 0).remark == "left arm uncertain"
+    assert store.pose("person", 0).remark == "left arm uncertain: elsewhere on 90% of the likely paths"
 
 
 def test_each_person_gets_their_own_rows(session, store, estimate):

@@ -404,7 +404,11 @@ def test_the_estimate_of_all_frames_takes_the_place_of_what_was_tracked(placed, 
     np.testing.assert_array_equal(placed.state.poses[0], forward[9].poses[0] + aside)
     placed.navigation.seek(7)
     shown = placed.state.people[0]
-    assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm uncertain")
+    assert (shown.source, shown.status, shown.remark) == (
+        "tracked",
+        "doubtful",
+        "left arm uncertain: elsewhere on 50% of the likely paths",
+    )
     np.testing.assert_array_equal(placed.state.poses[0], forward[7].poses[0] + aside)
     placed.history.undo()
     assert set(placed.stored_poses.timeline()) == {2}
