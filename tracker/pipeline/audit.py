@@ -119,7 +119,21 @@ def _run_of(
     locks = load_locks(session.people, store.setting)
     active = [active_dofs(m, locked) for m, locked in zip(models, locks, strict=True)]
     subjects = Subjects.of(models, plan.people, active, held)
-    return RunFrames(observer, subjects, plan.settings, session.fps, poses, proposals, stays=not plan.replaces)
+    around = _around(session, store, stretch) if plan.replaces else {}
+    return RunFrames(observer, subjects, plan.settings, session.fps, poses, proposals, around, not plan.replaces)
+
+
+def _around(session: Session, store: AnnotationStore, stretch: Sequence[int]) -> dict[int, list[Array]]:
+    """Return the stored poses of all people on the two frames before a stretch and after it, as far as all have one."""
+    step, out = stretch[1] - stretch[0], dict[int, list[Array]]()
+    for first, way in ((stretch[0], -step), (stretch[-1], step)):
+        for k in (first + way, first + 2 * way):
+            found = [store.pose(p.name, k) for p in session.people]
+            poses = [r.values for r in found if r is not None]
+            if [len(v) for v in poses] != [len(p.model.value_names) for p in session.people]:
+                break
+            out[k] = poses
+    return out
 
 
 def _others(

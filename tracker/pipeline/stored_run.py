@@ -109,28 +109,27 @@ def stored_run(
     locks = load_locks(people, store.setting)
     active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
     others = [i for i in range(len(people)) if i not in plan.people]
-    before = [_history(session, store, whole) if plan.start is None else {} for whole in plan.legs]
-    keyframes = keyframes_of(store, people, frozenset([*plan.frames, *(k for own in before for k in own)]), others)
+    keyframes = keyframes_of(store, people, frozenset(plan.frames), others)
     former = poses_to_replace(store, people, frozenset(plan.frames), plan.people, plan.settings)
     subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes, former)
     floor, left = floor_plane(session.up, session.floor), _frames_left(store, plan)
     legs, done = [], list[int]()
-    for whole, rest, history in zip(plan.legs, left, before, strict=True):
-        tracked = whole[: len(whole) - len(rest)]
-        is_begun = len(tracked) > 0
+    for whole, rest in zip(plan.legs, left, strict=True):
+        before = whole[: len(whole) - len(rest)]
+        is_begun = len(before) > 0
         step = whole[1] - whole[0] if len(whole) > 1 else 1
         start = _start_poses(session, store, (rest or whole)[0], step, plan, is_begun)
-        known = tracked if is_begun or plan.start is None else [plan.start]
+        known = before if is_begun or plan.start is None else [plan.start]
         legs.append(
             Leg(
                 TrackingRun(observer, subjects, start, rest, session.fps, floor),
                 _tracked_before(session, store, known, start, subjects, plan.start),
                 plan.start,
                 _stored_starts(session, store, plan),
-                history,
+                {} if plan.start is not None else _history(session, store, whole),
             )
         )
-        done += [k for k in tracked if k != plan.start]
+        done += [k for k in before if k != plan.start]
     run = TrackSession(
         make_tracker(plan.settings),
         legs,

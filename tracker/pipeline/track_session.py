@@ -217,9 +217,9 @@ class TrackSession:
                 known = [(pose, "alternative") for pose in (tracked.alternatives[i] if tracked.alternatives else ())]
                 known += [(former[i], "former")] if i in former else []
                 proposals.setdefault((k, i), []).extend(Proposal(*own) for own in known)
-        poses: dict[int, Sequence[Array]] = {k: p for leg in self.legs for k, p in leg.history.items()}
-        poses |= {k: tracked.poses for k, tracked in self.tracked.items()}
-        run = RunFrames(self.observer, subjects, settings, self.legs[0].run.fps, poses, proposals)
+        poses = {k: tracked.poses for k, tracked in self.tracked.items()}
+        before = {k: own for leg in self.legs for k, own in leg.history.items()}
+        run = RunFrames(self.observer, subjects, settings, self.legs[0].run.fps, poses, proposals, before)
         found = yield from mapped(estimate_run(run), lambda step: EstimateStep(*step))
         return self._rows_estimated(found)
 
@@ -232,8 +232,6 @@ class TrackSession:
             model, stored, rows = subjects.models[i], self._stored[i], self._rows[i]
             between = between_keyframes(subjects.keyframes, i, sorted(of_person))
             for k, pose in of_person.items():
-                if k not in self.tracked:
-                    continue
                 keyframe = subjects.keyframes_at(k).get(i)
                 if keyframe is not None:
                     keyframes.append(assessed_keyframe(model, stored.name, k, keyframe, pose))

@@ -114,8 +114,8 @@ def test_the_poses_just_before_a_run_show_the_motion_there_and_stay(session, sto
     with run_of(session, store, range(4, 4 + N), SETTINGS) as run:
         track(run)
     (asked,) = estimate.asked
-    assert sorted(asked.poses) == [2, 3, *range(4, 4 + N)]
-    assert [k for k in sorted(asked.poses) if 0 in asked.subjects.keyframes_at(k)] == [3]
+    assert (sorted(asked.around), sorted(asked.poses)) == ([2, 3], [*range(4, 4 + N)])
+    assert asked.around[3][0][0] == pytest.approx(3 * STEP_M)
     assert stored(store, 1)[: len(before)] == before
     assert run.costs_px == dict.fromkeys(range(4, 4 + N), 1.5)  # of the estimated poses
 

@@ -141,22 +141,3 @@ def test_what_is_expected_two_frames_on_is_what_would_be_if_the_next_came_as_exp
     memory.history[-1] = gavrila.neutral()  # it came otherwise
     np.testing.assert_array_equal(twice, memory.predict_before_last(settings))
     np.testing.assert_allclose(gavrila.difference(twice, moved)[:3], 0.04, atol=1e-9)
-
-
-def test_doubtful_poses_are_searched_around_less_and_less_often_and_lost_ones_always(gavrila, monkeypatch):
-    memory = PersonMemory(gavrila, gavrila.neutral())
-    off, frames, status = seen(memory, astray=("left_calf",)), [], {"is": "doubtful"}
-    assert not memory.samples_around(seen(memory))
-    assert memory.samples_around(off)
-    monkeypatch.setattr("tracker.tracking.person_memory.classify", lambda _: status["is"])
-    for frame in range(30):
-        if memory.samples_around(off):
-            memory.record_sampling(found=False)
-            frames.append(frame)
-        memory.update(memory.history[-1], NoColors(), "doubtful", keyframe=False)
-    assert np.diff(frames).tolist() == [2, 4, 8, 9]
-    memory.record_sampling(found=False)
-    assert not memory.samples_around(off)
-    status["is"] = "lost"
-    assert memory.samples_around(off)
-    assert not PersonMemory(gavrila, gavrila.neutral(), alone=False).samples_around(off)

@@ -49,6 +49,8 @@ class RunFrames:
     """First guesses of the poses of all people by frame, (n_values,) each."""
     proposals: Mapping[tuple[int, int], Sequence[Proposal]] = field(default_factory=dict)
     """Other poses by frame and person."""
+    around: Mapping[int, Sequence[Array]] = field(default_factory=dict)
+    """Poses of all people on frames beside these, which stay and show the motion there."""
     stays: bool = False
     """Whether the first guesses are assessed, and stay; else the estimate takes their place."""
 
@@ -76,9 +78,9 @@ class _RunEstimate:
 
     def __init__(self, run: RunFrames) -> None:
         """Begin with the first guesses."""
-        self._run, self._frames = run, sorted(run.poses)
+        self._poses = {k: [*poses] for k, poses in {**run.around, **run.poses}.items()}  # the best so far
+        self._run, self._frames = run, sorted(self._poses)
         self._places = {k: i for i, k in enumerate(self._frames)}
-        self._poses = {k: [*run.poses[k]] for k in self._frames}  # the best so far
         self._views: dict[int, tuple[ViewEvidence, ...]] = {}
         self._found: dict[int, dict[int, RunPose]] = {i: {} for i in run.subjects.tracked}
 
@@ -125,7 +127,7 @@ class _RunEstimate:
             assessed[i] = yield from self._solve(used, i, searches[i], done)
             done += n
         for t, k in enumerate(used):
-            if k in own:
+            if k in own and k in self._run.poses:
                 cost = chamfer_cost(self._views[k], self._bodies(k), self._run.settings).at_prediction()
                 known = {"cost_px": cost.total_px, "view_costs_px": tuple(map(float, cost.view_costs_px))}
                 for i in people:
@@ -147,9 +149,11 @@ class _RunEstimate:
         """Return a person on a frame with hypotheses."""
         subjects = self._run.subjects
         out = FrameHypotheses(evidence, self._bodies(frame), person, self._run.settings, subjects.active_dofs[person])
-        if person in subjects.keyframes_at(frame):
-            out.anchored(subjects.keyframes_at(frame)[person])
-        out.propose(proposals)
+        stays = frame not in self._run.poses
+        if person in subjects.keyframes_at(frame) or stays:
+            out.anchored(subjects.keyframes_at(frame).get(person, self._poses[frame][person]))
+        if not stays:
+            out.propose(proposals)
         return out
 
     def _bodies(self, frame: int) -> Bodies:
@@ -186,7 +190,7 @@ class _RunEstimate:
         self, used: Sequence[int], person: int, search: PathSearch, done: int
     ) -> Generator[int, None, list[RunPose]]:
         """Solve the path of a person, and weigh what else it may be; yield how much is done."""
-        poses, frames, first = search.poses, search.frames, [self._run.poses[k][person] for k in used]
+        poses, frames, first = search.poses, search.frames, [self._first(k)[person] for k in used]
         path = PosedPath(
             search.model, self._times_s(used), poses, lambda t: frames[t].blocks(poses[t]),
             np.array([f.anchor is not None for f in frames]), self._run.subjects.active_dofs[person],
@@ -195,6 +199,10 @@ class _RunEstimate:
         poses = np.array(first) if self._run.stays else solved.poses
         self._take(used, person, poses)
         return assessed_path(search, solved, first, poses, [c.camera.name for c in self._run.observer.cameras])
+
+    def _first(self, frame: int) -> Sequence[Array]:
+        """Return the first guesses of a frame, or its poses that stay."""
+        return self._run.poses[frame] if frame in self._run.poses else self._run.around[frame]
 
     def _take(self, frames: Sequence[int], person: int, poses: Array) -> None:
         for k, pose in zip(frames, poses, strict=True):
