@@ -65,7 +65,7 @@ def audit(at: Target, frames: range, replaces: bool, progress: Reporter) -> dict
     from tracker.store.annotation_store import AnnotationStore
     from tracker.store.records import PoseChange
     from tracker.tracking.chamfer.settings import TrackSettings
-    from tracker.tracking.run_confidence import probability_off
+    from tracker.tracking.pose_errors import probability_off
 
     session, people = at
     require_files(session)

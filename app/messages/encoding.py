@@ -34,7 +34,7 @@ from tracker.geometry.arrays import FloatArray
 from tracker.posing.grab import heading_points, minor_points
 from tracker.session.session import Person, Session
 from tracker.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
-from tracker.tracking.run_confidence import DOUBTFUL_FROM, LOST_FROM
+from tracker.tracking.pose_errors import DOUBTFUL_FROM, LOST_FROM
 
 _FEW_CELLS = 2000
 """Largest number of timeline cells sent by name. More are sent as columns, which take a tenth of the bytes and time."""

@@ -1,6 +1,6 @@
-"""Fit the weights of `tracker/tracking/run_confidence.py` and measure what statuses are worth (docs/accuracy.md).
+"""Fit the weights of `tracker/tracking/confidence.py` and measure what statuses are worth (docs/accuracy.md).
 
-Statuses follow from these weights in first passes and in runs of the voxel tracker.
+Statuses follow from these weights in first passes, and searches of limbs do.
 
 `python tests/benchmarks/calibrate_status.py --data DIR` films simulated people of ten builds, couples and a crowd, with
 clutter and noise. It tracks them with the generic body of the height that their joints give, and with the body acquired
@@ -8,9 +8,8 @@ from one of the recordings: with two to eight cameras, at half the frame rate, w
 search for lost limbs. The weights are fitted to all of that. What they are worth is measured on each body by weights
 fitted to the others, and on the recordings in DIR, to which nothing is fitted.
 
-It prints the weights, and those of `confidence.py`, by which statuses are given while a run goes on; they are to be
-copied into the code. `--write` also draws docs/images/reliability.svg. `--work DIR` keeps scenes, bodies and
-features there: after a change of the tracker, remove `DIR/rows` and run it again.
+It prints the weights; they are to be copied into the code. `--write` also draws docs/images/reliability.svg. `--work
+DIR` keeps scenes, bodies and features there: after a change of the tracker, remove `DIR/rows` and run it again.
 """
 
 import argparse
@@ -31,7 +30,6 @@ from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_
 from tracker.acquisition.from_joints import height_from_joints, place_joints
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.progress import result_of
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import fit_to_points
@@ -41,8 +39,6 @@ from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.model_toml import format_model, load_model, parse_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
-from tracker.pipeline.smoothing import TrackedRows
-from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
@@ -50,7 +46,6 @@ from tracker.tracking import confidence
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.estimate import PoseEstimate
-from tracker.tracking.run_confidence import N_FEATURES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
@@ -163,38 +158,32 @@ def track(footage: Footage, models: Sequence[BodyModel], how: Pass) -> tuple[Lim
         subjects = Subjects.of(models, keyframes={0: dict(enumerate(starts))})
         run = TrackingRun(Observer(cameras, recording), subjects, starts, frames, footage.fps / how.stride)
         found = list(ChamferTracker(settings).estimates(run))
-    people = [_rows_of(p, found, subjects, settings, footage) for p in range(len(models))]
+    people = [_rows_of(p, found, subjects, footage) for p in range(len(models))]
     return LimbRows(*(np.array(c) for c in zip(*itertools.chain(*people), strict=True))), found
 
 
 def _rows_of(
-    person: int, estimates: Sequence[PoseEstimate], subjects: Subjects, settings: TrackSettings, footage: Footage
+    person: int, estimates: Sequence[PoseEstimate], subjects: Subjects, footage: Footage
 ) -> Iterator[tuple[Any, ...]]:
     """Yield the rows of the limbs of one person."""
-    kept, model, truth = TrackedRows(), subjects.models[person], footage.references[person]
-    stored = [StoredPerson(str(p), 1) for p in range(len(subjects.models))]
-    for found in estimates:
-        for change in tracked_changes([found], stored, [person], subjects.keyframes, settings):
-            kept.add(change, found.covariances[person], found.qualities[person])
-    features = kept.run_features(model, result_of(kept.smoothed(subjects, person, footage.fps))[1])
+    model, truth = subjects.models[person], footage.references[person]
     joints = {int(f): dict(zip(truth.names, p, strict=True)) for f, p in zip(truth.frames, truth.points, strict=True)}
     for found in estimates:
         if found.qualities[person] is not None and found.frame in joints:
             errors = _errors_mm(model, joints[found.frame], found.poses[person])
-            yield from _frame_rows(person, model, found, errors, features.get(found.frame))
+            yield from _frame_rows(person, model, found, errors)
 
 
 def _frame_rows(
-    person: int, model: BodyModel, found: PoseEstimate, errors: Mapping[str, float], of_run: Array | None
+    person: int, model: BodyModel, found: PoseEstimate, errors: Mapping[str, float]
 ) -> Iterator[tuple[Any, ...]]:
-    """Yield the rows of one frame; `of_run` has the features of the run, (n_limbs, n), if there are any."""
+    """Yield the rows of one frame."""
     quality = found.qualities[person]
     assert quality is not None
     worst, of_frame = np.nanmax([errors.get(n, np.nan) for n in LIMB_JOINTS]), confidence.frame_features(quality)
-    of_run = np.zeros((len(of_frame), N_FEATURES)) if of_run is None else of_run
-    for limb, of_limb, own in zip(limbs(model), of_run, of_frame, strict=True):
+    for limb, own in zip(limbs(model), of_frame, strict=True):
         error = max([errors[n] for n in _joints_of(model, limb.name) if n in errors], default=np.nan)
-        yield of_limb, own, error, worst, person, found.frame, quality.is_unseen, bool(found.alternatives[person])
+        yield own, error, worst, person, found.frame, quality.is_unseen, bool(found.alternatives[person])
 
 
 def _errors_mm(model: BodyModel, truth: Mapping[str, Array], pose: Array) -> dict[str, float]:

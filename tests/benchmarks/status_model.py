@@ -28,8 +28,6 @@ class LimbRows(NamedTuple):
     """The limbs of all frames of one or several runs, one row each."""
 
     features: Array
-    """See `run_confidence.run_features`, (n, n_features); zeros where no edge is near the body."""
-    frame_features: Array
     """See `confidence.features`, (n, 8)."""
     error_mm: Array
     """Largest error of a joint of the limb, of the head for a head, (n,)."""
@@ -140,13 +138,11 @@ def fit_weights(features: Array, error_mm: Array, weights: Array) -> Array:
     return np.append(scaled, b[n:] - scaled @ middle)
 
 
-def fitted(
-    runs: Sequence[Run], without: str | None = None, features: Callable[[LimbRows], Array] = lambda rows: rows.features
-) -> Array:
+def fitted(runs: Sequence[Run], without: str | None = None) -> Array:
     """Fit to all rows of some runs, without those of one body."""
     parts = [(r.rows, weights_of(r) * _is_other(r, without)) for r in runs]
     return fit_weights(
-        np.concatenate([features(rows) for rows, _ in parts]), np.concatenate([rows.error_mm for rows, _ in parts]),
+        np.concatenate([rows.features for rows, _ in parts]), np.concatenate([rows.error_mm for rows, _ in parts]),
         np.concatenate([w for _, w in parts]),
     )  # fmt: skip
 

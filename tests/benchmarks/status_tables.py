@@ -33,7 +33,7 @@ CONDITIONS = Conditions(
     "cameras with backgrounds at the full frame rate, unless the row says otherwise",
     body="`gavrila34`: generic, of the height that the joints give, and acquired from another recording of the person",
     start="pose fitted to the true joints of frame 0",
-    settings="first passes, smoothed. The statuses of a simulated person are by weights fitted to all other people, "
+    settings="first passes. The statuses of a simulated person are by weights fitted to all other people, "
     "those of recordings by weights fitted to all simulated people",
     chosen="both thresholds (simulated people), rules of tracking (recordings)",
     command="python tests/benchmarks/calibrate_status.py --data DIR --write docs/accuracy.md docs/measurements.md "
@@ -67,9 +67,7 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run], write: Sequence[P
         write: documents whose tables are replaced; the picture lies beside them.
     """
     weights = fitted(runs)
-    of_frame = fitted(runs, features=lambda rows: rows.frame_features)
-    print("at the end of a run: weights, constants of off and lost:", np.round(weights, 3).tolist())
-    print("while it goes on:", np.round(of_frame, 3).tolist())
+    print("weights, constants of off and lost:", np.round(weights, 3).tolist())
     odds = held_out_odds(runs)
     found = [statuses(r.rows, o) for r, o in zip(runs, odds, strict=True)]
     simulated = list(zip(runs, found, strict=True))

@@ -20,8 +20,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array, IntArray
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.stored_poses import StoredPose
-from tracker.tracking.pose_errors import point_covariances
-from tracker.tracking.run_confidence import LOST_FROM
+from tracker.tracking.pose_errors import LOST_FROM, point_covariances
 
 TRUNK = "trunk"
 """Name of the unit of the joints that belong to no limb: shoulders and hips."""

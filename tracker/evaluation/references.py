@@ -130,7 +130,7 @@ def stored_motion(session: Session, person: int) -> Reference:
 
 
 def _assessment(record: PoseRecord) -> PoseDoubt:
-    from tracker.tracking.run_confidence import probability_off  # imported lazily: it loads kernels
+    from tracker.tracking.pose_errors import probability_off  # imported lazily: it loads kernels
 
     off = float(probability_off(np.array(record.limbs_lost)).max()) if record.limbs_lost else None
     return PoseDoubt("keyframe" if record.keyframe else record.status, off, record.remark, record.seam_mm)

@@ -134,22 +134,6 @@ class PosePrior:
         return np.diag(self.weights**2)
 
 
-@dataclass(frozen=True, eq=False)
-class GaussianPrior:
-    """Gaussian prior on a pose whose degrees of freedom are correlated, such as an estimate by other evidence."""
-
-    pose: Array
-    """Mean of the prior, (n_values,)."""
-    information: Array
-    """Inverse of its covariance, (n_dofs, n_dofs)."""
-
-    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
-        """See `ResidualBlock`."""
-        r = model.difference(pose, self.pose)
-        force = self.information @ r
-        return NormalEquations(0.5 * float(r @ force), force, self.information)
-
-
 class Fit(NamedTuple):
     """Result of the solver."""
 

@@ -1,33 +1,16 @@
-"""Give a pose its status and the reason for it: by the whole run, or by the features of its limbs on their frame."""
+"""Give a pose its status, and the reason for it, by the whole run."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.geometry.arrays import Array
 from tracker.store.records import PoseRecord
-from tracker.tracking.confidence import Status, classify_limbs, probabilities, status_named, worst
+from tracker.tracking.confidence import classify_limbs, probabilities
 from tracker.tracking.pose_errors import elsewhere_odds, limb_odds, mass_odds, point_covariances
 from tracker.tracking.remarks import may_be_elsewhere, uncertain, without_uncertainty
-from tracker.tracking.run_confidence import log_odds
 from tracker.tracking.runs.path_assessment import RunPose
-
-
-def assessed_by_features(model: BodyModel, pose: PoseRecord, features: Array, is_ambiguous: bool) -> PoseRecord:
-    """Return a pose with the status that follows from the features of its limbs.
-
-    Args:
-        model: the body.
-        pose: the pose.
-        features: see `run_confidence.run_features`, (n_limbs, 8).
-        is_ambiguous: whether other poses are about as good.
-    """
-    found = _classified(model, pose, log_odds(features), [""] * len(features))
-    least: Status = "doubtful" if is_ambiguous else "good"
-    return replace(found, status=worst([status_named(found.status), least]))
 
 
 def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseRecord:
@@ -50,15 +33,9 @@ def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseR
     remarks = without_uncertainty(pose.remark, alternatives=True)
     if found.others:
         remarks.append(may_be_elsewhere(PosedBody(model, pose.values), found.others))
-    pose = replace(pose, errors=errors, remark=", ".join(remarks))
-    return _classified(model, pose, odds.max(axis=0), reasons)
-
-
-def _classified(model: BodyModel, pose: PoseRecord, odds: Array, reasons: Sequence[str]) -> PoseRecord:
-    """Return a pose with the status that follows from the log odds that its limbs are off and lost, (n_limbs, 2)."""
-    status = classify_limbs(odds)
-    remarks, worst_limb = without_uncertainty(pose.remark), int(odds[:, 1].argmax())
-    if status != "good" and (reasons[worst_limb] or not remarks):
-        remarks = [uncertain(limbs(model)[worst_limb].name, reasons[worst_limb]), *remarks]
+    odds = odds.max(axis=0)
+    status, worst = classify_limbs(odds), int(odds[:, 1].argmax())
+    if status != "good" and (reasons[worst] or not remarks):
+        remarks = [uncertain(limbs(model)[worst].name, reasons[worst]), *remarks]
     lost = tuple(map(float, probabilities(odds[:, 1])))
-    return replace(pose, status=status, limbs_lost=lost, remark=", ".join(remarks))
+    return replace(pose, errors=errors, status=status, limbs_lost=lost, remark=", ".join(remarks))

@@ -9,7 +9,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, part_of, result_of, unreported
 from tracker.errors import TrackerError
 from tracker.evidence.keypoints import PersonKeypoints
-from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, covariance, solve, weak_pull
+from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, solve, weak_pull
 from tracker.fitting.interpenetration import SelfPenetration
 from tracker.fitting.keypoints import KeypointBlock
 from tracker.formats.model_toml import format_model
@@ -19,7 +19,7 @@ from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.trajectory.pose_track import PoseTrack, smooth_poses
+from tracker.trajectory.solve import PosedPath, solve_path
 
 
 def store_keypoint_poses(
@@ -107,20 +107,20 @@ def keypoint_poses(
     for k, body in first.items():
         report("fitting poses to key points", len(fits) / len(first))
         fits[k] = _fit(body, seen, k, cameras)
-    frames, n = sorted(fits), model.n_dofs
-    track = PoseTrack(
+    frames = sorted(fits)
+    path = PosedPath(
         model, np.array(frames) / fps, np.array([fits[k].pose for k in frames]),
-        np.array([covariance(model, fits[k]) for k in frames]), np.zeros(len(frames), np.bool_),
-        np.ones((len(frames), n), np.bool_),
+        lambda t: _blocks(model, seen, frames[t], cameras), np.zeros(len(frames), np.bool_),
     )  # fmt: skip
-    poses = result_of(smooth_poses(track))
-    return {k: PosedBody(model, pose) for k, pose in zip(frames, poses, strict=True)}
+    solved = result_of(solve_path(path))
+    return {k: PosedBody(model, pose) for k, pose in zip(frames, solved.poses, strict=True)}
 
 
 def _fit(body: PosedBody, seen: PersonKeypoints, frame: int, cameras: Sequence[Camera]) -> Fit:
-    views = [(c.pinhole, seen.in_view(frame, v, c.pinhole)) for v, c in enumerate(cameras)]
     model = body.model
-    blocks: list[ResidualBlock] = [
-        KeypointBlock.of(views), PosePrior.of_spreads(model), SelfPenetration(), weak_pull(model, body.values)
-    ]  # fmt: skip
-    return solve(model, body.values, blocks)
+    return solve(model, body.values, [*_blocks(model, seen, frame, cameras), weak_pull(model, body.values)])
+
+
+def _blocks(model: BodyModel, seen: PersonKeypoints, frame: int, cameras: Sequence[Camera]) -> list[ResidualBlock]:
+    views = [(c.pinhole, seen.in_view(frame, v, c.pinhole)) for v, c in enumerate(cameras)]
+    return [KeypointBlock.of(views), PosePrior.of_spreads(model), SelfPenetration()]

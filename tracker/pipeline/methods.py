@@ -9,6 +9,7 @@ from tracker.tracking.method import Method, Option
 from tracker.tracking.voxel.method import VOXEL
 
 if TYPE_CHECKING:
+    from tracker.tracking.estimation.settings import EstimationSettings
     from tracker.tracking.tracker import Tracker, TrackerSettings
 
 METHODS: dict[str, Method] = {method.name: method for method in (CHAMFER, CONTOUR, VOXEL)}
@@ -33,6 +34,15 @@ def make_tracker(settings: "TrackerSettings") -> "Tracker":
         TrackerError: the method is unknown.
     """
     return method_named(settings.method).make_tracker(settings)
+
+
+def compared_by(settings: "TrackerSettings") -> "EstimationSettings":
+    """Return the settings of the evidence by which the poses of a run are compared: its own, or those of contours where
+    the method measures something else."""
+    from tracker.tracking.chamfer.settings import TrackSettings
+    from tracker.tracking.estimation.settings import EstimationSettings
+
+    return settings if isinstance(settings, EstimationSettings) else TrackSettings()
 
 
 def all_options() -> dict[str, Option]:

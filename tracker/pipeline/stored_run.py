@@ -17,7 +17,6 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
 from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, with_keypoints
 from tracker.pipeline.methods import make_tracker
-from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.track_session import Leg, TrackSession, outward
 from tracker.pipeline.tracked_changes import (
     StoredPerson,
@@ -30,7 +29,7 @@ from tracker.pipeline.tracked_changes import (
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import PoseRecord
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import TrackedFrame
 from tracker.tracking.person_memory import HISTORY_FRAMES
@@ -137,7 +136,7 @@ def stored_run(
         StoreWriter(store, _views(session, plan)),
         f"track frames {min(plan.frames)}:{max(plan.frames) + 1}",
         _SAVE_FRAMES,
-        _rows_before(session, store, done, subjects),
+        _records_before(session, store, done, subjects),
     )
     try:
         yield run
@@ -145,7 +144,7 @@ def stored_run(
         run.save()
         unfinished = None
         if not run.finished:
-            unfinished = {"task": plan.record(), "next": run.next_frame, "rows": run.rows_record()}
+            unfinished = {"task": plan.record(), "next": run.next_frame}
         store.set_setting(UNFINISHED, unfinished)
 
 
@@ -244,19 +243,12 @@ def _stored_starts(session: Session, store: AnnotationStore, plan: TrackPlan) ->
     return {i: record for i, record in found.items() if record is not None}
 
 
-def _rows_before(
+def _records_before(
     session: Session, store: AnnotationStore, frames: Sequence[int], subjects: Subjects
-) -> dict[int, TrackedRows]:
-    """Return the rows of an interrupted run by person."""
-    unfinished = store.setting(UNFINISHED)
-    if not frames or unfinished is None:
-        return {}
-    rows = {}
-    for i in subjects.tracked:
-        name = session.people[i].name
-        records = ((f, store.pose(name, f)) for f in frames)
-        rows[i] = tuple(PoseChange(name, f, r, tuple(store.alternatives(name, f))) for f, r in records if r is not None)
-    return resumed_rows(rows, unfinished.get("rows", {}))
+) -> dict[tuple[int, int], PoseRecord]:
+    """Return the poses that an interrupted run has stored, by person and frame."""
+    found = {(i, k): store.pose(session.people[i].name, k) for i in subjects.tracked for k in frames}
+    return {at: record for at, record in found.items() if record is not None}
 
 
 def _status(record: PoseRecord | None) -> Status:

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tracker.compute.progress import mapped
 from tracker.evidence.observer import Observer
@@ -11,13 +11,12 @@ from tracker.geometry.arrays import Array
 from tracker.pipeline.calibration_check import contradiction
 from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row
 from tracker.pipeline.keyframe_stretches import between_keyframes, seam_of, with_seam
+from tracker.pipeline.methods import compared_by
 from tracker.pipeline.posed_recording import PosedRecording
-from tracker.pipeline.smoothing import TrackedRows
 from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson, settings_record, tracked_changes
 from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
-from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.runs.frame_hypotheses import Proposal
 from tracker.tracking.runs.path_assessment import RunPose
 from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
@@ -107,7 +106,7 @@ class TrackSession:
         writer: PoseWriter,
         label: str,
         save_frames: int | None = None,
-        rows_before: Mapping[int, TrackedRows] | None = None,
+        records_before: Mapping[tuple[int, int], PoseRecord] | None = None,
     ) -> None:
         """Prepare a run; no frame is read yet.
 
@@ -118,7 +117,7 @@ class TrackSession:
             writer: where poses are saved.
             label: of the entry of the history.
             save_frames: frames after which `take` saves; None leaves that to calls of `save`.
-            rows_before: rows of an interrupted run by person; this run adds its own.
+            records_before: poses that an interrupted run has stored, by person and frame.
         """
         self.tracker, self.legs, self.label = tracker, legs, label
         self._stored, self._writer, self._save_frames = stored, writer, save_frames
@@ -138,7 +137,7 @@ class TrackSession:
         """A sentence if the contours contradict the calibration; empty before the end, or if they do not."""
         self._proposals: dict[tuple[int, int], list[Proposal]] = {}
         self._backward: dict[int, tuple[Array, ...]] = {}
-        self._rows = {i: (rows_before or {}).get(i, TrackedRows()) for i in self.subjects.tracked}
+        self._records = dict(records_before or {})
         self._waiting: list[PoseChange] = []
         self._n_waiting = 0
         self._edit: int | None = None
@@ -178,7 +177,7 @@ class TrackSession:
 
     def backward_pass(self) -> Iterator[BackwardStep]:
         """Track each leg once more from its last frame back to its first. Its poses are proposals."""
-        if not self._compares:
+        if not self.tracker.settings.whole_run:
             return
         legs = [leg for leg in self.legs if len(leg.whole) > 1]
         done, total = 0, sum(len(leg.whole) for leg in legs)
@@ -189,27 +188,14 @@ class TrackSession:
                 done += 1
                 yield BackwardStep(TrackedFrame.of(found), done, total)
 
-    @property
-    def _compares(self) -> bool:
-        """Whether poses are compared over the whole run; the estimates of other methods are smoothed."""
-        settings = self.tracker.settings
-        return settings.whole_run and isinstance(settings, EstimationSettings)
-
     def estimate(self) -> Iterator[EstimateStep | EstimatedRows]:
         """Estimate the poses of all people and assess them. Their rows come last: as a whole or not at all."""
-        if self._compares:
+        if self.tracker.settings.whole_run:
             yield (yield from self._estimated())
-        elif self.tracker.settings.whole_run:
-            changes, n = list[PoseChange](), len(self.tracked)
-            for i, (person, rows) in enumerate(self._rows.items()):
-                steps = rows.finished(self.subjects, person, self.legs[0].run.fps)
-                changes += yield from mapped(steps, lambda done, i=i: EstimateStep(i * n + done, len(self._rows) * n))
-            yield EstimatedRows(tuple(changes))
         self.finished = True
 
     def _estimated(self) -> Generator[EstimateStep, None, EstimatedRows]:
-        settings, subjects = self.tracker.settings, self.subjects
-        assert isinstance(settings, EstimationSettings)
+        settings, subjects = compared_by(self.tracker.settings), self.subjects
         proposals = {at: [*found] for at, found in self._proposals.items()}
         for k, tracked in self.tracked.items():
             former = subjects.former.get(k, {})
@@ -229,14 +215,14 @@ class TrackSession:
         settings = settings_record(self.tracker.settings)
         starts = {leg.start: leg.stored for leg in self.legs if leg.start is not None}
         for i, of_person in found.items():
-            model, stored, rows = subjects.models[i], self._stored[i], self._rows[i]
+            model, stored = subjects.models[i], self._stored[i]
             between = between_keyframes(subjects.keyframes, i, sorted(of_person))
             for k, pose in of_person.items():
                 keyframe = subjects.keyframes_at(k).get(i)
                 if keyframe is not None:
                     keyframes.append(assessed_keyframe(model, stored.name, k, keyframe, pose))
                     continue
-                before = rows.pose(k) or starts.get(k, {}).get(i)
+                before = self._records.get((i, k)) or starts.get(k, {}).get(i)
                 row = estimated_row(model, before, pose, stored.revision, settings)
                 if k in between and k in self._backward:
                     ends = between[k]
@@ -294,10 +280,6 @@ class TrackSession:
         done, frames = len(self.costs_px), self.frames
         return frames[done] if done < len(frames) else None
 
-    def rows_record(self) -> dict[str, Any]:
-        """Return the covariances and features with which a resumed run smooths the frames of this one."""
-        return {str(person): rows.record() for person, rows in self._rows.items()}
-
     def status_counts(self) -> list[Counter[Status]]:
         """Return how often each person had which status on the frames of this run; on all if none was left to track."""
         of_frames = [self.tracked[k].statuses for k in self.costs_px or self.tracked]
@@ -333,8 +315,7 @@ class TrackSession:
         changes = list[PoseChange]()
         for i in self.subjects.tracked:
             rows = tracked_changes([found], self._stored, [i], self.subjects.keyframes, self.tracker.settings)
-            for change in rows:
-                self._rows[i].add(change, found.covariances[i], found.qualities[i])
+            self._records |= {(i, c.frame): c.pose for c in rows if c.pose is not None}
             changes += rows
         return changes
 

@@ -12,7 +12,6 @@ __all__ = [
     "person_memory",
     "pose_errors",
     "remarks",
-    "run_confidence",
     "subjects",
     "tracker",
     "view_regions",

@@ -5,7 +5,7 @@ limb is off by more than 100 mm, or by more than 150 mm. The weights were fitted
 where the error is known (`tests/benchmarks/calibrate_status.py`).
 
 Searches have odds of their own: they begin before the pose is settled, and a needless search costs only time. At the
-end of a run `run_confidence` classifies its poses again.
+end of a run `pose_errors` classifies its poses again.
 """
 
 from collections.abc import Sequence

@@ -13,7 +13,7 @@ from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import OTHER_BODY_M
 from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M
 from tracker.geometry.arrays import Array
-from tracker.tracking.run_confidence import RUN_MODEL
+from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, probabilities
 
 SHARED_M = 0.006
 """Standard deviation along each axis with which sizes acquired from known joints determine the joints, metres. Of those
@@ -25,6 +25,11 @@ limbs of twelve simulated people in their place, 0.2% had more; of 83 that were 
 (`tests/benchmarks/region_evidence.py --displaced`)."""
 OFF_M = SAME_POSE_M
 """A limb is off where one of its joints is farther from its true place, metres: in another pose."""
+LOST_NATS = 1.75
+"""How much less likely a limb is lost than off, nats: the difference of the intercepts that were fitted for both
+thresholds on simulated people (`tests/benchmarks/calibrate_status.py`, tree `cec254b1`)."""
+DOUBTFUL_FROM, LOST_FROM = probabilities(np.array([OFF_ODDS - LOST_NATS, LOST_ODDS])).tolist()
+"""Probabilities of a lost limb above which it is doubtful, and lost."""
 
 
 def acquired_sigma_m(joints_are_given: bool) -> float:
@@ -57,7 +62,7 @@ def limb_odds(model: BodyModel, covariances: Array) -> Array:
 
     sigmas = np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 3)
     worst = np.array([sigmas[np.isin(model.point_parts, limb.parts)].max() for limb in limbs(model)])
-    return np.asarray(logit(beyond(OFF_M, worst))[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
+    return np.asarray(logit(beyond(OFF_M, worst))[:, None] + (0.0, -LOST_NATS))
 
 
 def elsewhere_odds(nats: Array, is_searched: Sequence[bool]) -> Array:
@@ -71,7 +76,7 @@ def elsewhere_odds(nats: Array, is_searched: Sequence[bool]) -> Array:
         is_searched: whether a search has left each limb where it is, (n_limbs,).
     """
     odds = nats - SELDOM_NATS - np.where(is_searched, CLEAR_NATS, 0.0)
-    return np.asarray(odds[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
+    return np.asarray(odds[:, None] + (0.0, -LOST_NATS))
 
 
 def mass_odds(masses: Array) -> Array:
@@ -80,7 +85,7 @@ def mass_odds(masses: Array) -> Array:
     from scipy.special import logit  # imported lazily, as above
 
     odds = np.asarray(logit(np.clip(masses, 1e-12, 1 - 1e-12)))
-    return odds[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off)
+    return odds[:, None] + (0.0, -LOST_NATS)
 
 
 def beyond(radius_m: float, sigma_m: Array) -> Array:
@@ -94,3 +99,9 @@ def beyond(radius_m: float, sigma_m: Array) -> Array:
 
     x = radius_m / np.maximum(sigma_m, 1e-9)
     return np.asarray(erfc(x / np.sqrt(2)) + np.sqrt(2 / np.pi) * x * np.exp(-(x**2) / 2))
+
+
+def probability_off(lost: Array) -> Array:
+    """Return the probabilities that limbs are off by those that they are lost, of any shape."""
+    with np.errstate(divide="ignore"):
+        return probabilities(np.log(lost) - np.log1p(-lost) + LOST_NATS)

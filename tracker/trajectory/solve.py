@@ -5,7 +5,7 @@ The scales of the accelerations are learnt by expectation maximization (R. H. Sh
 Series Anal. 3:253). The covariance of the path counts: without it the smoothest path makes itself ever smoother.
 """
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -54,8 +54,6 @@ class PosedPath:
     """Whether a pose is exact, (T,): a keyframe."""
     active_dofs: Mask | None = None
     """Degrees of freedom that may change, (n_dofs,); None: all."""
-    seen: Mask | None = None
-    """Whether the evidence shows a degree of freedom, (T, n_dofs); None: all of them. Others follow their motion."""
     freedom: float = FREEDOM
     """Degrees of freedom of Student's t of the accelerations, once their scales are learnt; infinite for a Gaussian, to
     which a leap is an error."""
@@ -78,7 +76,7 @@ def solve_path(path: PosedPath) -> Generator[int, None, SolvedPath]:
     """
     n, n_read = path.model.n_dofs, 0
     poses, covariances = np.array(path.poses), np.zeros((len(path.poses), n, n))
-    for own, used in _blocks(path):
+    for own, used in even_blocks(len(path.poses)):
         solver = _Solver(path, used)
         for t in range(used.start, used.stop):
             solver.read(t)
@@ -87,18 +85,6 @@ def solve_path(path: PosedPath) -> Generator[int, None, SolvedPath]:
         found, within = solver.solve(), slice(own.start - used.start, own.stop - used.start)
         poses[own], covariances[own] = found.poses[within], found.covariances[within]
     return SolvedPath(poses, covariances)
-
-
-def _blocks(path: PosedPath) -> Iterator[tuple[slice, slice]]:
-    """Yield the frames of each block, and those that it is solved with.
-
-    Whatever is not seen at a border is solved with the frames that show it again.
-    """
-    T = len(path.poses)
-    seen = np.ones((T, path.model.n_dofs), bool) if path.seen is None else path.seen | path.fixed[:, None]
-    for own, used in even_blocks(T):
-        before, after = _unseen_frames(seen[: own.start][::-1]), _unseen_frames(seen[own.stop :])
-        yield own, slice(max(0, used.start - before), min(T, used.stop + after))
 
 
 def even_blocks(n_frames: int) -> list[tuple[slice, slice]]:
@@ -110,11 +96,6 @@ def even_blocks(n_frames: int) -> list[tuple[slice, slice]]:
         (slice(first, end), slice(max(0, first - _OVERLAP_FRAMES), min(n_frames, end + _OVERLAP_FRAMES)))
         for first, end in pairwise(bounds)
     ]
-
-
-def _unseen_frames(seen: Mask) -> int:
-    """Return the frames, (n, n_dofs), before all that is ever seen has been seen."""
-    return int(np.where(seen.any(axis=0), seen.argmax(axis=0), 0).max(initial=0)) if len(seen) else 0
 
 
 class _State(NamedTuple):

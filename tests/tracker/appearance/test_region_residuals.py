@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gaussian_prior import GaussianPrior
 from region_scenes import Walk
 from staging import SUIT
 
 from tracker.appearance.region_kernels import RegionTables
 from tracker.appearance.region_residuals import region_residuals
 from tracker.body.model import PosedBody
-from tracker.fitting.gauss_newton import GaussianPrior, solve
+from tracker.fitting.gauss_newton import solve
 
 pytestmark = pytest.mark.slow  # its kernels are compiled for the benchmark alone
 

@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import ARM, with_center
+from gaussian_prior import GaussianPrior
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from staging import at, posed, shaken, solid
 
 from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import (
-    GaussianPrior,
     PointTargets,
     PosePrior,
     covariance,

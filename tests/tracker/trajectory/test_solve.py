@@ -1,14 +1,12 @@
 """The solve of a whole path against a general minimizer, and what stays in it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from bodies import MODELS
+from gaussian_prior import GaussianPrior
 from scipy.optimize import minimize
 
 from tracker.compute.progress import result_of
-from tracker.fitting.gauss_newton import GaussianPrior
 from tracker.trajectory import solve
 from tracker.trajectory.motion_model import MotionModel, motion_points
 from tracker.trajectory.solve import PosedPath, solve_path
@@ -27,7 +25,7 @@ def measured(n_frames=T, sigma=0.02):
 
 def path_of(poses, evidence, fixed=(), active=None, freedom=4.0):
     at = np.isin(np.arange(len(poses)), fixed)
-    return PosedPath(MODEL, np.arange(len(poses)) / FPS, poses, evidence.__getitem__, at, active, None, freedom)
+    return PosedPath(MODEL, np.arange(len(poses)) / FPS, poses, evidence.__getitem__, at, active, freedom)
 
 
 def cost_of(path, poses, motion):
@@ -100,18 +98,6 @@ def test_blocks_give_nearly_what_one_piece_gives(monkeypatch):
     whole = solved(path)
     in_blocks(monkeypatch, 25, 20)
     assert 0 < far_apart(solved(path), whole) < 0.005
-
-
-def test_a_gap_across_the_border_of_two_blocks_is_interpolated(monkeypatch):
-    poses, evidence = measured(n_frames=36)
-    seen = np.ones((36, MODEL.n_dofs), bool)
-    for t in range(12, 26):
-        evidence[t], seen[t] = [], False
-    poses[12:26] = poses[11]
-    path = path_of(poses, evidence)
-    whole = solved(path)
-    in_blocks(monkeypatch, 18, 6)
-    assert far_apart(solved(replace(path, seen=seen)), whole) < 0.5 * far_apart(solved(path), whole)
 
 
 def test_frames_are_counted_once_as_their_evidence_is_read(monkeypatch):
