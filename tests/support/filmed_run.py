@@ -41,7 +41,7 @@ class FilmedRun:
         n, keyframes = 1 + len(others), {k: {0: v} for k, v in (keyframes or {}).items()}
         subjects = Subjects.of([self.model] * n, range(n), [active, *[None] * len(others)], keyframes)
         poses = {k: tuple(map(np.array, of_people)) for k, of_people in enumerate(zip(first, *others, strict=True))}
-        return RunFrames(self.observer, subjects, TrackSettings(), FPS, poses, proposals or {}, stays)
+        return RunFrames(self.observer, subjects, TrackSettings(), FPS, poses, proposals or {}, stays=stays)
 
     def errors_m(self, found, person=0):
         """Largest distance of a point of a person from its true place by frame, (T,)."""
