@@ -66,16 +66,6 @@ class Repair(NamedTuple):
         """Whether a limb is better elsewhere."""
         return self.gain > MIN_GAIN_NATS
 
-    def staying(self, body: PosedBody) -> "Repair":
-        """Return the same of a pose that stays: a better one is an alternative to it."""
-        if not self.is_better:
-            return self
-        better = Hypothesis(PosedBody(body.model, self.pose), "repair", self.cost)
-        return self._replace(
-            pose=body.values, cost=self.cost + self.gain, alternatives=(better, *self.alternatives),
-            entry=self.entry._replace(taken=False),
-        )  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
 class RegionScorer(PoseScorer):
