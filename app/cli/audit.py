@@ -57,9 +57,10 @@ def audit(at: Target, frames: range, replaces: bool, progress: Reporter) -> dict
     """
     import numpy as np
 
+    from tracker.compute.progress import mapped, result_of
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
-    from tracker.pipeline.audit import AuditPlan, audit_poses
+    from tracker.pipeline.audit import AuditPlan, PoseAudit
     from tracker.session.lock import SessionLock
     from tracker.session.relink import require_files
     from tracker.store.annotation_store import AnnotationStore
@@ -77,11 +78,8 @@ def audit(at: Target, frames: range, replaces: bool, progress: Reporter) -> dict
         people = tuple(i for i in people if store.frames(session.people[i].name)) or people
         plan = AuditPlan(frames, people, TrackSettings(), replaces)
         with progress.share("comparing poses") as advance:
-
-            def report(stage: str, share: float, text: str = "", /) -> None:
-                advance(share)
-
-            rows = audit_poses(session, store, Observer(session.cameras, recording).in_time(), plan, report)
+            audit = PoseAudit(session, store, Observer(session.cameras, recording).in_time(), plan)
+            rows = result_of(mapped(audit.steps(), advance))
         if rows:
             store.commit(f"audit frames {rows[0].frame}:{rows[-1].frame + 1}", rows, by_program=True)
     out: dict[str, Any] = {}

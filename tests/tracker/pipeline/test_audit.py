@@ -1,7 +1,7 @@
 """The audit of stored poses: what is compared, what stays, and what takes their place."""
 
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,11 +10,13 @@ from run_poses import MOVED, Estimate
 from run_with_doubt import WRONG_FRAME, store_run
 
 from tracker.body.model import PosedBody
+from tracker.compute.progress import mapped, result_of
 from tracker.errors import Remedy, TrackerError
 from tracker.fitting.hypothesis import Hypothesis
+from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model
 from tracker.pipeline import audit
-from tracker.pipeline.audit import AuditPlan, audit_poses
+from tracker.pipeline.audit import AuditPlan, PoseAudit
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Alternative, AssessmentChange, MarkChange, PoseChange, PoseRecord
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -52,7 +54,7 @@ def estimate(session, store, monkeypatch):
 
 
 def audited(session, store, plan=PLAN):
-    return {change.frame: change for change in audit_poses(session, store, OBSERVER, plan)}
+    return {change.frame: change for change in result_of(PoseAudit(session, store, OBSERVER, plan).steps())}
 
 
 def test_poses_are_assessed_and_stay(session, store, estimate):
@@ -109,6 +111,38 @@ def test_the_estimate_takes_the_place_of_poses_but_not_of_keyframes(session, sto
     assert found[WRONG_FRAME].pose.trace == (*before[WRONG_FRAME].trace, MOVED)
 
 
+def test_a_pose_that_is_estimated_again_was_reviewed_or_interpolated_no_more(session, store, estimate):
+    """Nobody has seen it, and the pictures speak for it."""
+    own = store.pose("person", 18)
+    between = replace(own, sources=("interpolated",) * len(own.values), settings={"method": "interpolate"})
+    store.commit("put", [PoseChange("person", 18, between), MarkChange("person", 17, False, True)])
+    found = audited(session, store, replace(PLAN, replaces=True))
+    assert not found[17].pose.reviewed
+    assert set(found[18].pose.sources) == {"tracked"}
+    assert found[18].pose.settings == {"method": "chamfer", **asdict(PLAN.settings)}
+    assert audited(session, store)[17].pose.reviewed
+
+
+def test_poses_of_an_earlier_body_are_compared_in_the_present_one(session, store, estimate):
+    """Those that stay keep their body; the estimate belongs to the present one. A keyframe keeps its joints."""
+    (person,) = session.people
+    before, former = store.poses("person", FRAMES), person.model
+    longer = former.with_height(1.1 * former.height_m)
+    resized = replace(session, people=(replace(person, model=longer),))
+    found = audited(resized, store, replace(PLAN, replaces=True))
+    (asked,) = estimate.asked
+    held = retarget_pose(before[19].values, former, longer)
+    assert not np.allclose(held, before[19].values)
+    np.testing.assert_allclose(asked.subjects.keyframes[19][0], held)
+    np.testing.assert_array_equal(found[19].values, before[19].values)
+    revisions = {store.model_revision(found[k].pose.model_revision).toml for k in set(FRAMES) - {19}}
+    assert revisions == {format_model(longer)}
+    stay = audited(resized, store)
+    for k in set(FRAMES) - {19}:
+        assert stay[k].pose.model_revision == before[k].model_revision
+        np.testing.assert_array_equal(stay[k].pose.values, before[k].values)
+
+
 def test_what_is_locked_stays_and_other_people_are_held(session, store, estimate):
     """They are taken where they are stored, in their neutral pose on other frames."""
     (person,) = session.people
@@ -132,14 +166,19 @@ def test_frames_that_follow_one_another_are_compared_together(session, store, es
     store.commit("clear", [PoseChange("person", k, None) for k in (19, 21)])
     shown = []
     plan = replace(PLAN, frames=range(17, 26))
-    rows = audit_poses(session, store, OBSERVER, plan, lambda stage, share, text="": shown.append(share))
+    rows = result_of(mapped(PoseAudit(session, store, OBSERVER, plan).steps(), shown.append))
     assert [sorted(run.poses) for run in estimate.asked] == [[17, 18], [22, 23, 24, 25]]
     assert [c.frame for c in rows] == [17, 18, 22, 23, 24, 25]
     assert shown == pytest.approx([k / 6 for k in range(1, 7)])
 
 
+def test_a_keyframe_between_the_frames_of_a_stride_belongs_to_them(session, store, estimate):
+    audited(session, store, replace(PLAN, frames=(14, 16, 18, 19, 20, 22, 26, 28, 30)))
+    assert [sorted(run.poses) for run in estimate.asked] == [[14, 16, 18, 19, 20, 22], [26, 28, 30]]
+
+
 def test_alternatives_of_another_body_are_left_out(session, store, estimate):
-    other = Alternative(np.zeros(3), 1)
+    other = Alternative(np.zeros(3), store.add_model_revision("person", "another body"))
     pose = store.pose("person", 18)
     store.commit("put", [PoseChange("person", 18, pose, (other,))])
     audited(session, store)
@@ -147,8 +186,8 @@ def test_alternatives_of_another_body_are_left_out(session, store, estimate):
 
 
 def test_too_little_is_refused(session, store, estimate):
-    with pytest.raises(TrackerError, match="expected two cameras or more to audit poses, found one"):
-        audit_poses(session, store, SimpleNamespace(cameras=(None,)), PLAN)
+    with pytest.raises(TrackerError, match="expected two cameras or more to compare poses, found one"):
+        PoseAudit(session, store, SimpleNamespace(cameras=(None,)), PLAN)
     store.commit("clear", [PoseChange("person", k, None) for k in range(18, 24)])
     with pytest.raises(TrackerError, match="two frames in a row on which all these people have a pose") as caught:
         audited(session, store)
