@@ -49,6 +49,7 @@ RangeAction: TypeAlias = Literal[
     "track_forward",
     "track_backward",
     "interpolate",
+    "estimate",
     "clear",
     "keyframe",
     "reviewed",
@@ -166,7 +167,7 @@ class ControlTracking(Command, frozen=True, tag="track"):
 
 
 class EditRange(Command, frozen=True, tag="range"):
-    """Track, interpolate, clear or mark a range of frames, or take the poses that its poses replaced."""
+    """Track, interpolate, estimate, clear or mark a range of frames, or take the poses that its poses replaced."""
 
     action: RangeAction
     first: Frame

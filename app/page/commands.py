@@ -105,6 +105,8 @@ def _range(controller: Controller, _: int, message: wire.EditRange) -> None:
     match message.action:
         case "interpolate":
             ranges.interpolate(first, last, people)
+        case "estimate":
+            ranges.estimate(first, last, people)
         case "clear":
             ranges.clear(first, last, people)
         case "track_forward" | "track_backward":

@@ -2,9 +2,14 @@
 
 import { scopePerson, hasTrack, personCells } from "./selectors.js";
 
+/** Poses on both sides that are estimated with one that was corrected: farther ones hardly change. */
+const ESTIMATED_AROUND = 4;
+
 export class Actions {
   #store;
   #send;
+  /** Range that was marked to estimate it: the next frame has another. @type {import("./store.js").Facts["range"]} */
+  #around = null;
 
   /**
    * @param {import("./store.js").Store} store
@@ -88,6 +93,16 @@ export class Actions {
   onRange(action, person) {
     const { range } = this.#store.facts;
     if (range) this.#send({ type: "range", action, first: range.first, last: range.last, person });
+  }
+
+  /** Estimate the poses of the marked range again, or mark the frames around the shown one and estimate those. */
+  estimateAgain() {
+    const { range, timeline, target } = this.#store.facts;
+    if (!range || range === this.#around) {
+      this.#around = timeline.around(target, ESTIMATED_AROUND);
+      this.#store.set({ range: this.#around });
+    }
+    this.onRange("estimate", null);
   }
 
   /**

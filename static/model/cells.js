@@ -26,6 +26,9 @@ export const REVIEWED = 2;
 /** An alternative fits about as well, and nobody has confirmed this pose. */
 export const AMBIGUOUS = 4;
 
+/** Frames from one pose of a run to the next, at most: poses farther apart show no motion of a limb. */
+const MAX_STRIDE = 10;
+
 export class Cells {
   /** Number of frames that have a pose. */
   size = 0;
@@ -53,7 +56,25 @@ export class Cells {
 
   /** @param {number} frame */
   has(frame) {
-    return frame < this.frames && this.sources[frame] !== NO_POSE;
+    return frame >= 0 && frame < this.frames && this.sources[frame] !== NO_POSE;
+  }
+
+  /**
+   * Frames around one as far as they have poses, at the distance of the nearest pose.
+   *
+   * @param {number} frame
+   * @param {number} count of poses on either side, at most
+   * @returns {{first: number, last: number}} `last` is included
+   */
+  around(frame, count) {
+    let stride = 1;
+    while (stride < MAX_STRIDE && !this.has(frame - stride) && !this.has(frame + stride)) stride += 1;
+    const end = (/** @type {1 | -1} */ way) => {
+      let found = frame;
+      for (let i = 1; i <= count && this.has(frame + way * i * stride); i += 1) found = frame + way * i * stride;
+      return found;
+    };
+    return { first: end(-1), last: end(1) };
   }
 
   /**

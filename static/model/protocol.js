@@ -8,8 +8,8 @@
  *   "axes"} Layer
  * @typedef {"" | "good" | "doubtful" | "lost"} Status
  * @typedef {"arms" | "torso" | "legs" | "cost"} CurveGroup
- * @typedef {"track_forward" | "track_backward" | "interpolate" | "clear" | "keyframe" | "reviewed" | "unreviewed" |
- *   "none" | "take_replaced"} RangeAction
+ * @typedef {"track_forward" | "track_backward" | "interpolate" | "estimate" | "clear" | "keyframe" | "reviewed" |
+ *   "unreviewed" | "none" | "take_replaced"} RangeAction
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
  * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |

@@ -9,6 +9,7 @@ const BUTTONS = [
   ["range-backward", "track_backward"],
   ["range-forward", "track_forward"],
   ["range-interpolate", "interpolate"],
+  ["range-estimate", "estimate"],
   ["range-clear", "clear"],
   ["range-keyframe", "keyframe"],
   ["range-reviewed", "reviewed"],
@@ -74,6 +75,7 @@ export class RangeBar {
     this.#text.textContent = n === 1 ? `Frame ${range.first}` : `Frames ${range.first} – ${range.last}`;
     this.#text.title = `${count(n)} frame${n === 1 ? "" : "s"}`;
     const isBusy = !!work?.running;
+    if (isBusy) this.#old = "";
     for (const one of this.#buttons) one.disabled = !connected || isBusy || !!state?.track.running;
     this.#stop.disabled = !connected || !isBusy;
     this.#stop.hidden = !isBusy;

@@ -154,6 +154,14 @@ function markBindings(store, actions, reasons) {
       why: reasons.range,
       run: interpolate,
     },
+    {
+      keys: ["Shift R"],
+      label: "Estimate the marked range again, or the poses around this frame",
+      words: "correct keyframe",
+      matches: shift("r"),
+      why: reasons.away,
+      run: () => actions.estimateAgain(),
+    },
   ];
 }
 

@@ -11,7 +11,6 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
-from tracker.pipeline.methods import compared_by
 from tracker.pipeline.pose_check import PoseInRun, checked_pose, frames_around
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 
@@ -69,7 +68,7 @@ class PoseChecks:
         person = self._person(change)
         try:
             state = session_state.state
-            settings = compared_by(track_settings.of_run(state.settings, state.run_choices))
+            settings = track_settings.of_estimates(state.settings, state.run_choices)
             pose = self._in_run(person, change)
             if pose is not None:
                 observer = session_state.frames.observer.in_time()

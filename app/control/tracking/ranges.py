@@ -1,6 +1,6 @@
-"""Interpolate, clear, mark or track a range of frames; each is one entry of the history."""
+"""Interpolate, clear, mark, track or estimate a range of frames; each is one entry of the history."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
@@ -9,6 +9,7 @@ import numpy as np
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from app.control.tracking import track_settings
 from app.control.tracking.comparing_runs import nothing_replaced
 from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
@@ -16,13 +17,17 @@ from app.runtime.jobs import Job
 from app.state.progress import RangeState
 from tracker.errors import TrackerError
 from tracker.motion.interpolation import interpolate_pose
-from tracker.store.records import BETWEEN, Change, FrameRow, MarkChange, PoseChange, PoseRecord
+from tracker.pipeline.audit import AuditPlan, PoseAudit
+from tracker.store.records import BETWEEN, AssessmentChange, Change, FrameRow, MarkChange, PoseChange, PoseRecord
 
 Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]
 """`unreviewed` leaves keyframes unchanged; `none` removes the mark of keyframes too."""
 
 _AT_ONCE = 500
 """Frames written at once; shorter work is done before the call returns."""
+
+Step = Sequence[Change] | float
+"""Changes to write, or the share of the work before them that is done, 0 to 1."""
 
 
 @dataclass(eq=False)
@@ -35,7 +40,9 @@ class _Run:
     """Verb of the final message: `interpolated`."""
     by_program: bool
     """Whether keyframes stay unchanged."""
-    job: Job[Sequence[Change]] = field(init=False)
+    before: Mapping[tuple[str, int], PoseRecord] = field(default_factory=dict)
+    """Stored poses that slow work began with, by name and frame. A pose that changes meanwhile keeps the change."""
+    job: Job[Step] = field(init=False)
     edit: int | None = None
     """Entry of the history; None before the first frames are written."""
     written: dict[str, set[int]] = field(default_factory=dict)
@@ -83,7 +90,7 @@ class Ranges:
                 )
             poses = [(i, frame) for i, start, end in gaps for frame in range(start + 1, end)]
             run = _Run(self._label(f"interpolate frames {first} to {last}", people), "interpolated", by_program=True)
-            self._begin(run, "interpolating", poses, (c for gap in gaps for c in self._filled(*gap)))
+            self._begin(run, "interpolating", poses, _pieces(c for gap in gaps for c in self._filled(*gap)))
 
     def clear(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
         """Remove the poses of a range, except keyframes.
@@ -101,7 +108,7 @@ class Ranges:
                 )
             changes = (PoseChange(self._name(i), row.frame, None) for i, row in rows)
             run = _Run(self._label(f"clear frames {first} to {last}", people), "cleared", by_program=True)
-            self._begin(run, "clearing", [(i, row.frame) for i, row in rows], changes)
+            self._begin(run, "clearing", [(i, row.frame) for i, row in rows], _pieces(changes))
 
     def mark(self, first: int, last: int, mark: Mark, people: Sequence[int] | None = None) -> None:
         """Mark the poses of a range.
@@ -118,7 +125,30 @@ class Ranges:
             where = f"frame {first}" if first == last else f"frames {first} to {last}"
             how = {"keyframe": "as keyframe", "none": "as no keyframe"}.get(mark, f"as {mark}")
             run = _Run(self._label(f"mark {where} {how}", people), "marked", by_program=False)
-            self._begin(run, "marking", list(marked), iter(marked.values()))
+            self._begin(run, "marking", list(marked), _pieces(marked.values()))
+
+    def estimate(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
+        """Estimate the poses of a range again from all its frames together; keyframes stay, nothing is tracked.
+
+        All poses are written at the end.
+
+        Raises:
+            TrackerError: there is one camera, or no two frames in a row have poses.
+        """
+        first, last = self._within(first, last)
+        with self._activities.editing():
+            session_state, frames = self._session_state, range(first, last + 1)
+            saver, state = session_state.saver, session_state.state
+            posed = tuple(i for i in self._checked(people) if saver.index.within(i, frames))
+            settings = track_settings.of_estimates(state.settings, state.run_choices)
+            plan = AuditPlan(frames, posed or tuple(self._checked(people)), settings, replaces=True)
+            audit = PoseAudit(session_state.session, saver.store, self._tracking.observer(), plan)
+            before = {(self._name(i), frame): record for (i, frame), record in audit.records.items()}
+            label = self._label(f"estimate frames {first} to {last}", people)
+            run = _Run(label, "estimated", by_program=True, before=before)
+            self._begin(
+                run, "estimating", [at for at, record in audit.records.items() if not record.keyframe], _together(audit)
+            )
 
     def take_replaced(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
         """Put the poses back that those of a range replaced; keyframes stay. Doing it again takes the present ones.
@@ -139,7 +169,7 @@ class Ranges:
                 raise nothing_replaced(first, last)
             label = self._label(f"take the other poses of frames {first} to {last}", people)
             run = _Run(label, "exchanged", by_program=True)
-            self._begin(run, "exchanging", list(changes), iter(changes.values()))
+            self._begin(run, "exchanging", list(changes), _pieces(changes.values()))
 
     def toggle_keyframe(self) -> None:
         """Make the shown pose of the selected person a keyframe, or remove the mark; a draft is stored."""
@@ -156,7 +186,7 @@ class Ranges:
             )
             change = PoseChange(self._name(state.person), state.frame, record)
             run = _Run(self._label(f"keyframe, frame {state.frame}", [state.person]), "marked", by_program=False)
-            self._begin(run, "marking", [(state.person, state.frame)], iter([change]))
+            self._begin(run, "marking", [(state.person, state.frame)], iter([[change]]))
 
     def toggle_reviewed(self) -> None:
         """Mark the shown pose of the selected person as reviewed, or remove the mark."""
@@ -194,14 +224,14 @@ class Ranges:
         """Stop the work, see `halt`."""
         self.halt()
 
-    def _begin(self, run: _Run, what: str, poses: Sequence[tuple[int, int]], changes: Iterator[Change]) -> None:
-        """Write changes: a few before this returns, many in the background.
+    def _begin(self, run: _Run, what: str, poses: Sequence[tuple[int, int]], steps: Iterator[Step]) -> None:
+        """Write changes: a few before this returns, many or slow ones in the background.
 
         Args:
             run: the work, which begins.
             what: its kind, as text for the user.
             poses: person and frame of each change.
-            changes: in the order in which they are written.
+            steps: in the order in which they are done.
 
         Raises:
             TurnError: somebody else works on one of the poses.
@@ -217,16 +247,16 @@ class Ranges:
         within = range(min(ends), max(ends) + 1) if ends else range(0)
         self._session_state.set(ranges=RangeState(True, what, 0, len(poses), frozenset(frames), within))
         run.job = Job(
-            lambda: _pieces(changes),
-            lambda piece, _: self._write(run, piece),
+            lambda: steps,
+            lambda step, _: self._take(run, step),
             lambda error: self._ended(run, error),
             lambda: None,
         )
         self._run = run
-        if len(poses) <= _AT_ONCE:
+        if len(poses) <= _AT_ONCE and not run.before:
             try:
-                for piece in _pieces(changes):
-                    self._write(run, piece)
+                for step in steps:
+                    self._take(run, step)
             except TrackerError as error:
                 self._end(run, f"stopped, because {page_text(error)}")
                 raise
@@ -234,21 +264,35 @@ class Ranges:
         else:
             run.job.run()
 
-    def _write(self, run: _Run, piece: Sequence[Change]) -> None:
+    def _take(self, run: _Run, step: Step) -> None:
         session_state = self._session_state
         with session_state.lock:
             if run is not self._run:
                 return
+            ranges = session_state.state.ranges
+            if isinstance(step, float):
+                session_state.set(ranges=replace(ranges, done=int(step * ranges.total)))
+                return
+            piece = [change for change in step if self._stands(run, change)]
             run.edit = session_state.saver.write(run.label, piece, run.edit, run.by_program)
             for change in piece:
-                run.written.setdefault(change.person, set()).add(change.frame)
-            done = session_state.state.ranges
-            done = replace(done, done=done.done + len(piece))
+                if not isinstance(change, AssessmentChange):
+                    run.written.setdefault(change.person, set()).add(change.frame)
+            ranges = replace(ranges, done=_count(run))
             if any(c.frame == session_state.state.frame for c in piece):
-                session_state.show_frame(session_state.state.frame, ranges=done)
+                session_state.show_frame(session_state.state.frame, ranges=ranges)
             else:
-                session_state.set(ranges=done)
+                session_state.set(ranges=ranges)
             session_state.refresh_saving()
+
+    def _stands(self, run: _Run, change: Change) -> bool:
+        """Return whether the pose that a change is about is as it was when the work began."""
+        before = run.before.get((change.person, change.frame))
+        if before is None:
+            return True
+        names = [p.name for p in self._session_state.session.people]
+        now = self._session_state.saver.record(names.index(change.person), change.frame)
+        return now is not None and now.values.tolist() == before.values.tolist()
 
     def _ended(self, run: _Run, error: Exception | None) -> None:
         with self._session_state.lock:
@@ -262,7 +306,7 @@ class Ranges:
         did = f"{run.did} {frames}" + (f" of {n_people} people" if n_people > 1 else "")
         if how != "done":
             unit = "frames" if n_people < 2 else "poses"
-            did = f"{how}: {run.did} {state.done} of {state.total} {unit}"
+            did = f"{how}: {run.did} {_count(run)} of {state.total} {unit}"
         self._run = None
         run.job.discard()
         self._session_state.refresh_saving()
@@ -323,7 +367,18 @@ def _marked(name: str, row: FrameRow, mark: Mark) -> MarkChange | None:
     return None if same else MarkChange(name, row.frame, keyframe, reviewed)
 
 
-def _pieces(changes: Iterator[Change]) -> Iterator[Sequence[Change]]:
+def _count(run: _Run) -> int:
+    """Return how many poses are written."""
+    return sum(map(len, run.written.values()))
+
+
+def _together(audit: PoseAudit) -> Iterator[Step]:
+    """Do the work of an estimate, and write all its poses at once."""
+    rows = yield from audit.steps()
+    yield rows
+
+
+def _pieces(changes: Iterable[Change]) -> Iterator[Step]:
     """Split changes into pieces that are written at once."""
     piece: list[Change] = []
     for change in changes:

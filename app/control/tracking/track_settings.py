@@ -8,9 +8,10 @@ import msgspec
 
 from app.state.run_choices import MAX_STRIDE, RunChoices
 from tracker.errors import TrackerError
-from tracker.pipeline.methods import METHODS, all_options, method_named
+from tracker.pipeline.methods import METHODS, all_options, compared_by, method_named
 from tracker.session.matching import check_names
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.method import Method, OptionValue
 from tracker.tracking.tracker import TrackerSettings
 
@@ -92,6 +93,16 @@ def of_run(settings: TrackSettings, choices: RunChoices) -> TrackerSettings:
     shared = {f.name: getattr(settings, f.name) for f in fields(own) if f.name in _COSTS}
     chosen: TrackerSettings = method.with_options(replace(own, **shared), choices.options)
     return chosen if choices.stride == 1 else method.at_stride(chosen, choices.stride)
+
+
+def of_estimates(settings: TrackSettings, choices: RunChoices) -> EstimationSettings:
+    """Return the settings of estimates of stored poses: those of a run, or the usual ones if its method has none.
+
+    Args:
+        settings: of the page's search.
+        choices: of the user.
+    """
+    return compared_by(of_run(settings, choices))
 
 
 def stored(choices: RunChoices) -> dict[str, Any]:

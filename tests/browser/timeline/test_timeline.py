@@ -243,16 +243,18 @@ async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
     await mark(page, 24, 36)
     assert await page.locator("#range-text").inner_text() == "Frames 24 – 36"
     assert await page.locator("#range-work").inner_text() == "13 frames"
-    names = ["backward", "forward", "interpolate", "clear", "keyframe", "reviewed", "unreviewed"]
+    names = ["backward", "forward", "interpolate", "estimate", "clear", "keyframe", "reviewed", "unreviewed"]
     for name in names:
         await page.locator(f"#range-{name}").click()
     await page.keyboard.press("Shift+I")
+    await page.keyboard.press("Shift+R")
     await page.locator("#range-compare").click()
-    await until(lambda: len(endpoint.heard("range")) == 8 and endpoint.heard("compare_range"))
+    await until(lambda: len(endpoint.heard("range")) == 10 and endpoint.heard("compare_range"))
     assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": 24, "last": 36}]
     await shows(page, "quadrille.state.drawer === 'runs'")
     assert [m["action"] for m in endpoint.heard("range")] == [
-        "track_backward", "track_forward", "interpolate", "clear", "keyframe", "reviewed", "unreviewed", "interpolate",
+        "track_backward", "track_forward", "interpolate", "estimate", "clear", "keyframe", "reviewed", "unreviewed",
+        "interpolate", "estimate",
     ]  # fmt: skip
     assert {(m["first"], m["last"], m["person"]) for m in endpoint.heard("range")} == {(24, 36, None)}
     endpoint.state["range"] |= {"running": True, "what": "interpolating", "done": 500, "total": 12000}
@@ -267,6 +269,30 @@ async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
     await page.keyboard.press("Escape")
     await shows(page, "quadrille.state.range === null")
     assert await page.locator("#range-bar").is_hidden()
+
+
+@pytest.mark.slow
+async def test_poses_around_a_frame_are_estimated_again_in_a_range_of_their_own(page, endpoint):
+    """The next frame has another range; one that a user marked stays. A message that comes again is shown again."""
+    for frame, first, last in ((30, 26, 34), (3, 0, 7), (99, 95, 99), (112, 112, 112)):
+        await go_to(page, frame)
+        await page.keyboard.press("Shift+R")
+        await shows(page, f"quadrille.state.range?.first === {first} && quadrille.state.range.last === {last}")
+        for running, text in ((True, "estimating"), (False, "estimated 8 frames")):
+            endpoint.state["range"] |= {"running": running, "what": "estimating", "message": "" if running else text}
+            await endpoint.broadcast(endpoint.state)
+            await shows(page, f"document.querySelector('#range-work').textContent.startsWith('{text}')")
+    await mark(page, 24, 36)
+    await page.keyboard.press("Shift+R")
+    await until(lambda: len(endpoint.heard("range")) == 5)
+    assert endpoint.heard("range")[-1] == {
+        "type": "range",
+        "action": "estimate",
+        "first": 24,
+        "last": 36,
+        "person": None,
+    }
+    assert {(m["action"], m["person"]) for m in endpoint.heard("range")} == {("estimate", None)}
 
 
 @pytest.mark.slow
