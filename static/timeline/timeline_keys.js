@@ -156,7 +156,7 @@ function markBindings(store, actions, reasons) {
     },
     {
       keys: ["Shift R"],
-      label: "Estimate the marked range again, or the poses around this frame",
+      label: "Estimate again: the marked range, or around this frame",
       words: "correct keyframe",
       matches: shift("r"),
       why: reasons.away,

@@ -1,11 +1,14 @@
 """Range actions against the real program on the sample: what is on the page, in the store, and after undo."""
 
 import shutil
+from contextlib import closing
 
+import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import dragging, shows, state_of
 from program import ROOT, started, visited
+from run_with_doubt import store_run
 
 from tracker.store.annotation_store import AnnotationStore
 
@@ -50,6 +53,30 @@ async def test_a_range_is_interpolated_reviewed_cleared_and_given_back(live):
         await shows(page, expected, 30)
     assert [row.frame for row in store.frames("person")] == [0, 10]
     store.close()
+
+
+@pytest.mark.slow
+async def test_the_poses_around_a_correction_are_estimated_again_and_given_back(browser, tmp_path):
+    folder = shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", tmp_path / "session")
+    store_run(folder)
+    async with started(folder) as program, visited(browser, program.address) as page:
+        await go_to(page, 30)
+        async with dragging(page, 0, "left_wrist", (0, 15), (0, 45)):
+            pass
+        await shows(page, "quadrille.state.timeline[30]?.keyframe", 30)
+        before = poses_of(folder)
+        await page.keyboard.press("Shift+R")
+        await shows(page, "document.querySelector('#range-work').textContent === 'estimated 8 frames'", 120)
+        after = poses_of(folder)
+        assert {k for k in before if not np.array_equal(before[k], after[k])} == {*range(26, 35)} - {30}
+        await page.keyboard.press("Control+z")
+        await shows(page, "quadrille.state.state.redo === 'estimate frames 26 to 34'", 30)
+        np.testing.assert_array_equal([*poses_of(folder).values()], [*before.values()])
+
+
+def poses_of(folder):
+    with closing(AnnotationStore(folder / "annotations.sqlite", read_only=True)) as store:
+        return {frame: record.values for frame, record in store.poses("person", range(50)).items()}
 
 
 async def place_of(page, frame):
