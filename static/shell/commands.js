@@ -158,7 +158,7 @@ export function suitingLabels(facts) {
     [hasTrack(state), ["Pause or continue tracking", "Follow the tracker (toggle)"]],
     [hasSearch(state), ["Search: this frame", "Search: one step", "Search panel"]],
     [!isPlaced && !finding?.running, ["Find people", "New session from videos and a calibration"]],
-    [range !== null, ["Interpolate the marked range", "Estimate again: the marked range, or around this frame", "Track forward"]],
+    [range !== null, ["Interpolate the marked range", "Estimate the poses here again", "Track forward"]],
     [state.compared !== null, ["Show the pose before the last fit or search, or its result"]],
     [(state.people[state.person]?.alternatives ?? 0) > 0, ["Switch to the alternative pose, or back"]],
     [state.status === "doubtful" || state.status === "lost", ["Search: this frame", "Accept the doubtful or lost poses here: mark them as reviewed"]],

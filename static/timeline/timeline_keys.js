@@ -156,8 +156,8 @@ function markBindings(store, actions, reasons) {
     },
     {
       keys: ["Shift R"],
-      label: "Estimate again: the marked range, or around this frame",
-      words: "correct keyframe",
+      label: "Estimate the poses here again",
+      words: "marked range, or the poses around this frame",
       matches: shift("r"),
       why: reasons.away,
       run: () => actions.estimateAgain(),
