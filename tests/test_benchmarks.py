@@ -17,7 +17,7 @@ def benchmark_module(monkeypatch):
 def test_limbs_of_several_runs_are_pooled(benchmark_module):
     model = benchmark_module("status_model")
     rows = model.LimbRows(
-        *(np.zeros((2, 3)), np.zeros((2, 8)), np.array([120.0, np.nan]), np.array([120.0, 120.0])),
+        *(np.zeros((2, 8)), np.array([120.0, np.nan]), np.array([120.0, 120.0])),
         *(np.zeros(2, int), np.zeros(2, int), np.zeros(2, bool), np.zeros(2, bool)),
     )
     run = model.Run("walk", ("man",), "", "generic", True, rows)
