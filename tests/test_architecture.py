@@ -104,6 +104,31 @@ def test_each_room_of_the_library_names_what_others_use():
     assert stated == used
 
 
+WRITERS = {
+    "tracker.batch.join": "stretches of a long recording, as they were tracked",
+    "tracker.pipeline.audit": "stored poses, by `run_estimate`",
+    "tracker.pipeline.body_acquisition": "the start, in other sizes",
+    "tracker.pipeline.find_people": "starts that are found",
+    "tracker.pipeline.given_pose": "starts that are given",
+    "tracker.pipeline.given_pose": "starts that are given",
+    "tracker.pipeline.keypoint_poses": "poses by key points, by `solve_path`",
+    "tracker.pipeline.track_session": "poses of a run, by `run_estimate`",
+    "tracker.pipeline.tracked_changes": "poses of the first pass",
+}
+"""Modules of the library that write poses, and which: the pose of a run is decided in one place."""
+
+
+def test_poses_are_written_where_they_are_known_to_be():
+    found = {
+        module
+        for module, tree in trees().items()
+        if module.startswith("tracker.")
+        for n in ast.walk(tree)
+        if isinstance(n, ast.Call) and ast.unparse(n.func) == "PoseChange"
+    }
+    assert found == WRITERS.keys()
+
+
 def test_no_folder_is_crowded():
     """Next to nothing at a root, at most 22 files in a room."""
     folders = {p.parent for p in [*FILES.values(), *STATIC.rglob("*.js"), *STATIC.rglob("*.css")]}
