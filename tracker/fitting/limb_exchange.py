@@ -20,13 +20,27 @@ def paired_limbs(limbs: Sequence[Limb]) -> list[tuple[Limb, Limb]]:
 
 def exchanged(body: PosedBody, pair: tuple[Limb, Limb]) -> Array:
     """Return the pose, (n_values,), in which two limbs lie where the other was, as far as the joints allow."""
-    model, pose, points_world = body.model, body.values, body.points_world
-    names = list(model.point_names)
-    of_pair = np.isin(model.point_parts, np.concatenate([limb.parts for limb in pair]))
-    targets = {i: names.index(other) for i in np.flatnonzero(of_pair) if (other := mirror_part(names[i])) in names}
+    of_pair = np.isin(body.model.point_parts, np.concatenate([limb.parts for limb in pair]))
+    blocks = _mirrored(body, np.flatnonzero(of_pair).tolist())
+    moving = pair[0].dofs | pair[1].dofs
+    return solve(body.model, body.values, blocks, moving, max_iterations=40, tolerance=1e-4).pose
+
+
+def turned_round(body: PosedBody) -> Array:
+    """Return the pose, (n_values,), in which a person faces the other way and limbs lie where the others were."""
+    model = body.model
+    half_turn = np.zeros(model.n_dofs)
+    half_turn[np.flatnonzero((model.dof_joint == 0) & ~model.dof_is_length)[-1]] = np.pi
+    blocks = _mirrored(body, range(len(model.point_names)))
+    return solve(model, model.retract(body.values, half_turn), blocks, None, max_iterations=25, tolerance=1e-3).pose
+
+
+def _mirrored(body: PosedBody, moved: Sequence[int]) -> list[ResidualBlock]:
+    """Return what draws some points of a body, by their indices, to where those of the other side are."""
+    model, names = body.model, list(body.model.point_names)
+    targets = {i: names.index(other) for i in moved if (other := mirror_part(names[i])) in names}
     points = np.array([*targets], dtype=np.int64)
-    blocks: list[ResidualBlock] = [
-        PointTargets(points, points_world[[*targets.values()]], np.full(len(points), 1 / JOINT_M)),
+    return [
+        PointTargets(points, body.points_world[[*targets.values()]], np.full(len(points), 1 / JOINT_M)),
         PosePrior(model.neutral(), np.full(model.n_dofs, 1 / UNKNOWN)),
     ]
-    return solve(model, pose, blocks, pair[0].dofs | pair[1].dofs, max_iterations=40, tolerance=1e-4).pose

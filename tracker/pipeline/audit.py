@@ -16,17 +16,17 @@ from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.pipeline.assessed_poses import assessed_by_run
-from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row
+from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row, pose_change
 from tracker.pipeline.tracked_changes import settings_record
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
+from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.runs.frame_hypotheses import Proposal
 from tracker.tracking.runs.path_assessment import RunPose
-from tracker.tracking.runs.run_estimate import Progress, RunFrames, estimate_run
+from tracker.tracking.runs.run_estimate import Progress, RunFrames, estimate_run, poses_beside
 from tracker.tracking.subjects import Subjects
 
 
@@ -130,7 +130,7 @@ class PoseAudit:
                 if self._plan.replaces:
                     before = None if "interpolated" in own.sources else replace(own, reviewed=False)
                     row = estimated_row(model, before, pose, revision, settings)
-                yield PoseChange(name, k, row, tuple(Alternative(h.pose, revision) for h in pose.others))
+                yield pose_change(name, k, row, pose, revision)
 
     def _run_of(self, stretch: Sequence[int]) -> RunFrames:
         """Return what is known of the frames of a stretch."""
@@ -164,14 +164,13 @@ class PoseAudit:
 
     def _around(self, stretch: Sequence[int]) -> dict[int, list[Array]]:
         """Return the poses of all people on the two frames before a stretch and after it, as far as all have one."""
-        step, out = stretch[1] - stretch[0], dict[int, list[Array]]()
-        for first, way in ((stretch[0], -step), (stretch[-1], step)):
-            for k in (first + way, first + 2 * way):
-                found = [self._read(i, range(k, k + 1)) for i in range(len(self._session.people))]
-                if not all(found):
-                    break
-                out[k] = [own[k].pose for own in found]
-        return out
+        step, people = stretch[1] - stretch[0], range(len(self._session.people))
+
+        def poses_on(k: int) -> list[Array | None]:
+            found = [self._read(i, range(k, k + 1)) for i in people]
+            return [own[k].pose if own else None for own in found]
+
+        return poses_beside(stretch[0], -step, poses_on) | poses_beside(stretch[-1], step, poses_on)
 
 
 def _stretches(frames: Sequence[int]) -> list[list[int]]:

@@ -8,7 +8,7 @@ from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 from tracker.pipeline.assessed_poses import assessed_by_run
 from tracker.pipeline.tracked_changes import number
-from tracker.store.records import AssessmentChange, PoseRecord
+from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.runs.path_assessment import RunPose
 
 
@@ -37,6 +37,11 @@ def estimated_row(
         trace=(*(x for x in before.trace or () if x.kind != "path"), *searches),
     )
     return assessed_by_run(model, pose, found)
+
+
+def pose_change(name: str, frame: int, row: PoseRecord, found: RunPose, revision: int) -> PoseChange:
+    """Return what stores the pose of a person with its alternatives, which are in a revision of the body."""
+    return PoseChange(name, frame, row, tuple(Alternative(h.pose, revision) for h in found.others))
 
 
 def assessed_keyframe(model: BodyModel, name: str, frame: int, keyframe: Array, found: RunPose) -> AssessmentChange:

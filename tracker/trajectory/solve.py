@@ -6,7 +6,7 @@ Series Anal. 3:253). The covariance of the path counts: without it the smoothest
 """
 
 from collections.abc import Callable, Generator, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -27,11 +27,8 @@ from tracker.fitting.gauss_newton import (
 )
 from tracker.geometry.arrays import Array, Mask
 from tracker.trajectory.block_band import factor
-from tracker.trajectory.motion_model import FREEDOM, MotionModel, acceleration, motion_points
+from tracker.trajectory.motion_model import LEARNING_ROUNDS, MotionModel, acceleration, motion_points
 
-_ROUNDS = 10
-"""Rounds of expectation maximization. With three and with thirty, the mean error of joints differs by 0.04 mm on `walk`
-and on a simulated child."""
 _BLOCK_FRAMES, _OVERLAP_FRAMES = 120, 20
 """Frames are solved in blocks, because the evidence of one takes 5 to 10 MB. Frames that are seen beyond the overlap
 hardly matter to a pose."""
@@ -54,9 +51,6 @@ class PosedPath:
     """Whether a pose is exact, (T,): a keyframe."""
     active_dofs: Mask | None = None
     """Degrees of freedom that may change, (n_dofs,); None: all."""
-    freedom: float = FREEDOM
-    """Degrees of freedom of Student's t of the accelerations, once their scales are learnt; infinite for a Gaussian, to
-    which a leap is an error."""
 
 
 class SolvedPath(NamedTuple):
@@ -154,12 +148,10 @@ class _Solver:
                 # A smooth first guess shows too little motion: each frame is taken to be as unsure as it is alone.
                 self._learn(here, self._inverse(here._replace(hessian=here.hessian[:1])))
                 self.reach = np.inf  # the evidence stays as it is linearized: learning takes many steps
-                for _ in range(_ROUNDS):
+                for _ in range(LEARNING_ROUNDS):
                     here = self._descended(self._linearized(here.poses, here))
                     self._learn(here, self._inverse(here))
                 self.reach = CLOSE_ENOUGH
-            if self.motion is not None:
-                self.motion = replace(self.motion, freedom=self.path.freedom)
             found = self._descended(self._linearized(first.poses, first))
             covariances = np.where(self.locked[:, None] | self.locked[:, :, None], 0.0, self._inverse(found)[0])
             return SolvedPath(np.array(found.poses), covariances)

@@ -23,9 +23,9 @@ def measured(n_frames=T, sigma=0.02):
     return np.array(poses), [[GaussianPrior(pose, np.eye(n) / sigma**2)] for pose in poses]
 
 
-def path_of(poses, evidence, fixed=(), active=None, freedom=4.0):
+def path_of(poses, evidence, fixed=(), active=None):
     at = np.isin(np.arange(len(poses)), fixed)
-    return PosedPath(MODEL, np.arange(len(poses)) / FPS, poses, evidence.__getitem__, at, active, freedom)
+    return PosedPath(MODEL, np.arange(len(poses)) / FPS, poses, evidence.__getitem__, at, active)
 
 
 def cost_of(path, poses, motion):
@@ -114,7 +114,7 @@ def test_covariances_are_those_of_a_linear_problem(monkeypatch):
     groups = motion_points(MODEL).groups
     motion = MotionModel(groups, np.full(len(groups), 1e-2), np.inf)
     monkeypatch.setattr(MotionModel, "learned", lambda *_: motion)
-    found, covariances = result_of(solve_path(path_of(poses, evidence, freedom=np.inf)))
+    found, covariances = result_of(solve_path(path_of(poses, evidence)))
     n, c = MODEL.n_dofs, np.array([1.0, -2.0, 1.0])
     kinematics = [MODEL.kinematics(pose) for pose in found]
     J = [motion_points(MODEL).jacobian(k, motion_points(MODEL).at(k)) for k in kinematics]

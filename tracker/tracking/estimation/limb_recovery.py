@@ -104,12 +104,12 @@ def _search_limb(
 
     of_limb = scorer.restricted_to(limb)
     if away is None:
-        poses = np.array([_with_limb(model, beam[0].pose, other, limb) for other in others])
+        poses = np.array([with_limb(model, beam[0].pose, other, limb) for other in others])
         poses = _best_apart(model, limb, poses, -of_limb.costs(poses), scorer.settings.n_limb_refined)
     else:
         poses = _candidates(model, limb, away, beam[0].pose, others, of_limb)
     if len(beam) > 1:
-        poses = np.array([*poses, *(_with_limb(model, k.pose, pose, limb) for k in beam[1:] for pose in poses)])
+        poses = np.array([*poses, *(with_limb(model, k.pose, pose, limb) for k in beam[1:] for pose in poses)])
         poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: scorer.settings.n_limb_refined]]
     # Both sets of angles of a shoulder have the same prior then.
     poses = nearest_equivalent(model, poses, beam[0].pose, scorer.active_dofs)
@@ -133,7 +133,7 @@ def _candidates(
         for i, spread in enumerate(settings.perturbations_rad)
     ]
     best = np.concatenate(_map_split(lambda *share: _perturbed(model, dofs, score, *share), best, *rounds))
-    best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
+    best = np.array([*best, *(with_limb(model, here, other, limb) for other in others)])
     return _best_apart(model, limb, best, -scorer.costs(best), settings.n_limb_refined)
 
 
@@ -164,7 +164,7 @@ def _put(Ts: Array, parts: IntArray, points: Array, places: Array) -> None:
                 places[m, k, i] = T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3]
 
 
-def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:
+def with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:
     """Return a pose, (n_values,), with the limb of another."""
     change = np.where(limb.dofs, model.difference(other, values), 0.0)
     return model.clip(model.retract(values, change))

@@ -165,7 +165,7 @@ def scorer_without_prediction(
 
 
 class FrameBlocks(NamedTuple):
-    """What a frame tells of one person's pose, and what holds on every frame."""
+    """Residual blocks of one person's pose: those of a frame, and priors of every frame."""
 
     residuals: PersonResiduals
     """Of contours."""

@@ -77,7 +77,8 @@ class EstimationSettings:
     occlusion: bool = True
     """Whether people occlude each other and edges are assigned; else each is tracked as if alone."""
     rounds: int = 2
-    """Largest number of rounds in which all people are refined again with the others where they were found."""
+    """Largest number of rounds in which all people are refined again with the others where they were found, and of
+    turns in which the paths of a run are searched."""
     whole_run: bool = True
     """Whether the poses of all frames are estimated together at the end of a run; see `tracker.tracking.runs`."""
     apart: float = 1.0

@@ -6,11 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.appearance.part_colors import Colors, PartColors
-from tracker.appearance.region_model import RegionFrame, RegionModel
 from tracker.appearance.region_residuals import region_residuals
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.threads import kernel_pool
-from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import ResidualBlock, with_locked_dofs
 from tracker.fitting.keypoints import keypoint_blocks
 from tracker.geometry.arrays import Array, IntArray, Mask
@@ -32,22 +30,11 @@ class Proposal(NamedTuple):
     """Name of what proposed it."""
 
 
-class RunEvidence(NamedTuple):
-    """Evidence of one frame, for all poses that are compared on it."""
-
-    views: Sequence[ViewEvidence]
-    """Of each view around all proposals, with all edges that may be theirs; see `common_evidence`."""
-    known: RegionModel
-    """Appearance of the people and places of the run."""
-    regions: RegionFrame
-    """Region evidence of the frame."""
-
-
 class FrameHypotheses:
     """A person on one frame: evidence, and hypotheses, no two of them alike."""
 
     def __init__(
-        self, evidence: RunEvidence, bodies: Bodies, person: int, settings: EstimationSettings,
+        self, evidence: FrameEvidence, bodies: Bodies, person: int, settings: EstimationSettings,
         active_dofs: Mask | None = None,
     ) -> None:  # fmt: skip
         """Prepare the evidence; there is no hypothesis yet.
@@ -129,8 +116,8 @@ class FrameHypotheses:
 
     def blocks(self, pose: Array) -> list[ResidualBlock]:
         """Return the residual blocks of the frame near a pose, (n_values,)."""
-        _, known, regions = self.evidence
-        return [*self._scorer.blocks, region_residuals(known, regions, self.posed(pose), self.person)]
+        of_regions = region_residuals(self.evidence.known, self.evidence.regions, self.posed(pose), self.person)
+        return [*self._scorer.blocks, of_regions]
 
     def posed(self, pose: Array) -> Bodies:
         """Return all people, the person in a pose, (n_values,)."""
@@ -143,11 +130,9 @@ class FrameHypotheses:
 
     def limb_scorer(self, pose: Array, part_colors: PartColors | None) -> RegionScorer:
         """Return what compares poses with limbs elsewhere than in a pose, (n_values,)."""
-        views, known, regions = self.evidence
         bodies = self.posed(pose)
-        plain = self._scorer.with_part_colors(Colors(views, bodies, self.person), part_colors)
-        evidence = FrameEvidence(views, known, regions, part_colors, self._scorer.active_dofs)
-        return with_regions(plain, evidence, bodies, self.person)
+        plain = self._scorer.with_part_colors(Colors(self.evidence.views, bodies, self.person), part_colors)
+        return with_regions(plain, self.evidence, bodies, self.person)
 
     def _scored(self, poses: Array, sources: tuple[str, ...]) -> HypothesisSet:
         """Return poses, (K, n_values), as hypotheses."""

@@ -64,14 +64,12 @@ def assessed_path(
         cameras: names of the views.
     """
     model, paths = search.model, search.paths
-    free = [f.found for f in search.frames]
-    masses = masses_elsewhere(model, paths, search.sets, poses)
-    others = _about_as_good(paths, search.sets, poses, model)
+    masses, others = _compared(model, paths, search.sets, poses)
     is_key = np.array([f.anchor is not None for f in search.frames])
     if is_key.any():
-        masses[is_key] = masses_elsewhere(model, paths, free, poses)[is_key]
-        of_keys = _about_as_good(paths, free, poses, model)
-        others = [k if key else own for k, own, key in zip(of_keys, others, is_key, strict=True)]
+        masses_if_free, others_if_free = _compared(model, paths, [f.found for f in search.frames], poses)
+        masses[is_key] = masses_if_free[is_key]
+        others = [free if key else own for free, own, key in zip(others_if_free, others, is_key, strict=True)]
     by_colors, parts, nats = search.elsewhere(poses)
     views = np.take_along_axis(worst_views(nats, [model]), parts, axis=1)
     names = [display_name(p.name) for p in model.parts]
@@ -94,12 +92,20 @@ def _entry(frame: FrameHypotheses, first: Array, pose: Array) -> Search | None:
     return Search.of("path", moved, frame.nats(first), frame.nats(pose), True) if moved else None
 
 
+def _compared(
+    model: BodyModel, paths: Paths, sets: Sequence[HypothesisSet], poses: Array
+) -> tuple[Array, list[tuple[Hypothesis, ...]]]:
+    """Return `masses_elsewhere`, and `_about_as_good` of each frame."""
+    motion = paths.motion_nats(sets)
+    return masses_elsewhere(model, motion, sets, poses), _about_as_good(model, motion, sets, poses)
+
+
 def _about_as_good(
-    paths: Paths, sets: Sequence[HypothesisSet], poses: Array, model: BodyModel
+    model: BodyModel, motion: Sequence[Array], sets: Sequence[HypothesisSet], poses: Array
 ) -> list[tuple[Hypothesis, ...]]:
     """Return the hypotheses of each frame with paths about as good as the likeliest, and a limb elsewhere."""
     out = []
-    of_frames = through([s.costs() for s in sets], paths.motion_nats(sets), cheapest)
+    of_frames = through([s.costs() for s in sets], motion, cheapest)
     for own, costs, pose in zip(sets, of_frames, poses, strict=True):
         here, near = PosedBody(model, pose), np.flatnonzero(costs < costs.min() + CLEAR_NATS)
         found = [Hypothesis(PosedBody(model, own.poses[i]), own.sources[i], costs[i] - costs.min()) for i in near]
@@ -107,18 +113,17 @@ def _about_as_good(
     return out
 
 
-def masses_elsewhere(model: BodyModel, paths: Paths, sets: Sequence[HypothesisSet], poses: Array) -> Array:
+def masses_elsewhere(model: BodyModel, motion: Sequence[Array], sets: Sequence[HypothesisSet], poses: Array) -> Array:
     """Return the mass of the paths on which a point of each limb is more than `SAME_POSE_M` elsewhere, (T, n_limbs).
 
     Args:
         model: the body.
-        paths: how its points move.
+        motion: cost of each triple of hypotheses of successive frames; see `Paths.motion_nats`.
         sets: hypotheses of each frame.
         poses: from which distances count, (T, n_values).
     """
     n_views = sets[0].view_nats.shape[1]
     views = range(n_views) if n_views > 2 else (None,)  # one view shows no depth
-    motion = paths.motion_nats(sets)
     apart = [_apart(model, s.poses, pose) for s, pose in zip(sets, poses, strict=True)]
     out = np.zeros((len(views), len(sets), len(limbs(model))))
     for i, view in enumerate(views):

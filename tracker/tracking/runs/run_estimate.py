@@ -6,7 +6,7 @@ problem moves its poses (`tracker.trajectory.solve`). The hypotheses that are le
 (`path_assessment`).
 """
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -22,17 +22,15 @@ from tracker.evidence.view_evidence import ViewEvidence, with_colors_only
 from tracker.geometry.arrays import Array
 from tracker.motion.velocity import velocity
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
+from tracker.tracking.estimation.limb_repair import FrameEvidence
 from tracker.tracking.estimation.pose_score import common_evidence
 from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
-from tracker.tracking.runs.frame_hypotheses import FrameHypotheses, Proposal, RunEvidence
+from tracker.tracking.runs.frame_hypotheses import FrameHypotheses, Proposal
 from tracker.tracking.runs.path_assessment import RunPose, assessed_path
 from tracker.tracking.runs.path_search import ROUNDS, PathSearch
 from tracker.tracking.runs.proposals import other_sides
 from tracker.tracking.subjects import Subjects
 from tracker.trajectory.solve import PosedPath, even_blocks, solve_path
-
-_TURNS = 2
-"""Turns in which the paths of several people are searched, each with the others where they are by then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +51,24 @@ class RunFrames:
     """Poses of all people on frames beside these, which stay and show the motion there."""
     stays: bool = False
     """Whether the first guesses are assessed, and stay; else the estimate takes their place."""
+
+
+def poses_beside(frame: int, step: int, poses_on: Callable[[int], Sequence[Array | None]]) -> dict[int, list[Array]]:
+    """Return the poses of all people on the two frames beside one, as far as all have some; see `RunFrames.around`.
+
+    Args:
+        frame: the first or last frame of a run.
+        step: to the next frame beside it.
+        poses_on: returns the pose of each person on a frame; None without one.
+    """
+    out = dict[int, list[Array]]()
+    for k in (frame + step, frame + 2 * step):
+        poses = poses_on(k)
+        known = [pose for pose in poses if pose is not None]
+        if len(known) < len(poses):
+            break
+        out[k] = known
+    return out
 
 
 class Progress(NamedTuple):
@@ -87,7 +103,7 @@ class _RunEstimate:
     def steps(self) -> Generator[Progress, None, dict[int, dict[int, RunPose]]]:
         """Do the work, block by block."""
         blocks, people = even_blocks(len(self._frames)), self._run.subjects.tracked
-        n_turns = _TURNS if len(people) > 1 else 1
+        n_turns = max(1, self._run.settings.rounds) if len(people) > 1 else 1
         # Of each frame: evidence and, for each person, proposals, two sweeps a round, and the solve.
         per_frame = 1 + len(people) * (n_turns * (1 + 2 * ROUNDS) + 1)
         total, first = per_frame * sum(used.stop - used.start for _, used in blocks), 0
@@ -144,7 +160,7 @@ class _RunEstimate:
         ]  # fmt: skip
 
     def _proposed(
-        self, evidence: RunEvidence, frame: int, person: int, proposals: Sequence[Proposal]
+        self, evidence: FrameEvidence, frame: int, person: int, proposals: Sequence[Proposal]
     ) -> FrameHypotheses:
         """Return a person on a frame with hypotheses."""
         subjects = self._run.subjects
@@ -173,9 +189,9 @@ class _RunEstimate:
         others = (with_body(here, i, PosedBody(here[i].model, pose, here[i].velocity)) for i, pose in proposals)
         return common_evidence(self._run.observer, frame, [here, *others], self._run.settings)
 
-    def _evidence(self, frame: int) -> RunEvidence:
+    def _evidence(self, frame: int) -> FrameEvidence:
         views = self._views[frame]
-        return RunEvidence(views, self._colors, self._colors.frame(views, self._bodies(frame)))
+        return FrameEvidence(views, self._colors, self._colors.frame(views, self._bodies(frame)))
 
     @cached_property
     def _colors(self) -> RegionModel:

@@ -17,7 +17,7 @@ def frame(model, poses, view_nats, prior_nats=None):
 
 def masses(model, sets, poses):
     paths = Paths(acceleration(np.arange(len(sets)) / 25.0), motion_points(model).groups)
-    return masses_elsewhere(model, paths, sets, np.array(poses))
+    return masses_elsewhere(model, paths.motion_nats(sets), sets, np.array(poses))
 
 
 @pytest.fixture
@@ -68,8 +68,8 @@ def test_motion_tells_hypotheses_of_a_frame_apart(gavrila, raised):
         for t in range(9)
     ]
     paths = Paths(acceleration(np.arange(9) / 25.0), motion_points(gavrila).groups)
-    even = masses_elsewhere(gavrila, paths, sets, np.array([here] * 9))
+    even = masses_elsewhere(gavrila, paths.motion_nats(sets), sets, np.array([here] * 9))
     assert even[4] == pytest.approx(of_arm(gavrila, 0.5))
     paths.likeliest(sets)
-    moved = masses_elsewhere(gavrila, paths, sets, np.array([here] * 9))
+    moved = masses_elsewhere(gavrila, paths.motion_nats(sets), sets, np.array([here] * 9))
     assert moved[4].max() < 1e-3

@@ -8,7 +8,8 @@ from staging import in_posture
 from tracker.body.dimensions import mirror_part
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.tracking.runs.proposals import combined, continued, other_sides, turned_round
+from tracker.fitting.limb_exchange import turned_round
+from tracker.tracking.runs.proposals import combined, continued, other_sides
 
 
 def posture(model):
