@@ -25,7 +25,7 @@ from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames, outdated_sizes
 from tracker.pipeline.seen_points import with_drag_ends, without_moved
-from tracker.pipeline.tracked_changes import keyframes_of, poses_to_replace
+from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.calibration_log import present_revision
@@ -40,7 +40,6 @@ from tracker.store.records import (
     PoseChange,
     PoseRecord,
 )
-from tracker.tracking.tracker import TrackerSettings
 
 T = TypeVar("T")
 
@@ -227,18 +226,6 @@ class Saver:
         found = keyframes_of(self._store, self._session.people, frames)
         now = {frame: {p: self.pose_now(p, frame) for p in people} for frame, people in found.items()}
         return {frame: {p: v for p, v in people.items() if v is not None} for frame, people in now.items()}
-
-    def poses_to_replace(
-        self, frames: Collection[int], people: Collection[int], settings: TrackerSettings
-    ) -> dict[int, dict[int, Array]]:
-        """Return the poses that a run of some people with the same settings replaces, (n_values,), by frame and person.
-
-        Args:
-            frames: of the run.
-            people: indices of the people who are tracked.
-            settings: of the run.
-        """
-        return poses_to_replace(self._store, self._session.people, frames, people, settings)
 
     def pose_rows(self, person: int, frames: Sequence[int]) -> list[FramePose]:
         """Return the stored poses of some frames, ascending. Needs no lock."""

@@ -22,7 +22,6 @@ from tracker.pipeline.tracked_changes import (
     StoredPerson,
     StoreWriter,
     keyframes_of,
-    poses_to_replace,
     recorded_method,
     settings_record,
 )
@@ -110,8 +109,7 @@ def stored_run(
     active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
     others = [i for i in range(len(people)) if i not in plan.people]
     keyframes = keyframes_of(store, people, frozenset(plan.frames), others)
-    former = poses_to_replace(store, people, frozenset(plan.frames), plan.people, plan.settings)
-    subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes, former)
+    subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes)
     floor, left = floor_plane(session.up, session.floor), _frames_left(store, plan)
     legs, done = [], list[int]()
     for whole, rest in zip(plan.legs, left, strict=True):

@@ -198,11 +198,8 @@ class TrackSession:
         settings, subjects = compared_by(self.tracker.settings), self.subjects
         proposals = {at: [*found] for at, found in self._proposals.items()}
         for k, tracked in self.tracked.items():
-            former = subjects.former.get(k, {})
-            for i in subjects.tracked:
-                known = [(pose, "alternative") for pose in (tracked.alternatives[i] if tracked.alternatives else ())]
-                known += [(former[i], "former")] if i in former else []
-                proposals.setdefault((k, i), []).extend(Proposal(*own) for own in known)
+            for i in subjects.tracked if tracked.alternatives else ():
+                proposals.setdefault((k, i), []).extend(Proposal(p, "alternative") for p in tracked.alternatives[i])
         poses = {k: tracked.poses for k, tracked in self.tracked.items()}
         before = {k: own for leg in self.legs for k, own in leg.history.items()}
         run = RunFrames(self.observer, subjects, settings, self.legs[0].run.fps, poses, proposals, before)

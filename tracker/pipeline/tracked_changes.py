@@ -1,17 +1,14 @@
 """Convert pose estimates to rows of the store, write them, and read stored keyframes as input of a tracker."""
 
-import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.session.session import Person
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_log import present_revision, revisions_of_poses
 from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import PoseQuality
 from tracker.tracking.estimate import PoseEstimate
@@ -149,38 +146,6 @@ def keyframes_of(
             record = store.pose(person.name, row.frame) if is_taken else None
             if record is not None and len(record.values) == len(person.model.value_names):
                 found.setdefault(row.frame, {})[index] = record.values
-    return found
-
-
-def poses_to_replace(
-    store: AnnotationStore, people: Sequence[Person], frames: Collection[int], tracked: Collection[int],
-    settings: TrackerSettings,
-) -> dict[int, dict[int, Array]]:  # fmt: skip
-    """Return the stored poses that a run of the same kind replaces, by frame and index of the person.
-
-    Poses by other settings, of other sizes or of another calibration are left out: a run with new ones owes nothing to
-    them.
-
-    Args:
-        store: annotations of the session.
-        people: of the session.
-        frames: of the run.
-        tracked: indices of the people who are tracked.
-        settings: of the run.
-    """
-    found: dict[int, dict[int, Array]] = {}
-    same = json.loads(json.dumps(settings_record(settings)))
-    calibration = present_revision(store)
-    for index in tracked:
-        name, text = people[index].name, format_model(people[index].model)
-        bodies = {body.id for body in store.model_revisions(name) if body.toml == text}
-        calibrations = revisions_of_poses(store, name)
-        made = store.frames_by_settings(name, range(min(frames), max(frames) + 1))
-        alike = [f for by, own in made if all(by.get(key) == value for key, value in same.items()) for f in own]
-        kept = {f for f in alike if f in frames and calibrations.get(f, calibration) == calibration}
-        for pose in store.frame_poses(name, range(min(kept), max(kept) + 1)) if kept else ():
-            if pose.frame in kept and pose.model_revision in bodies:
-                found.setdefault(pose.frame, {})[index] = pose.values
     return found
 
 

@@ -152,21 +152,6 @@ class AnnotationStore:
         """Return the poses and costs of a person in the frames of a range that have a pose, ascending."""
         return self._within(rows.FRAME_POSE_COLUMNS, person, frames, rows.row_to_frame_pose)
 
-    def frames_by_settings(self, person: str, frames: range) -> list[tuple[Mapping[str, Any], list[int]]]:
-        """Return the frames of a range whose pose is no keyframe, ascending, by the settings that made the pose."""
-        sql = (
-            f"SELECT p.frame, coalesce(t.settings, c.settings) {rows.CURRENT_POSES} {rows.ORIGIN} "
-            "WHERE p.person = ? AND p.frame BETWEEN ? AND ? AND NOT c.keyframe ORDER BY p.frame"
-        )
-
-        def convert(row: Sequence[Any]) -> tuple[int, Any]:
-            return rows.frame_number(row[0], rows.PoseLabel(person, row[0])), row[1]
-
-        found: dict[Any, list[int]] = {}
-        for frame, text in self._connection.all(sql, (person, frames.start, frames.stop - 1), convert):
-            found.setdefault(text, []).append(frame)
-        return [(rows.settings(text, rows.PoseLabel(person, own[0])), own) for text, own in found.items()]
-
     def pins(self, person: str, frame: int) -> list[Pin]:
         """Return the pins of a person in a frame, by point and camera."""
         return self._connection.all(

@@ -1,7 +1,7 @@
 """The people of a tracking run: their bodies, whom to track, what may move, and keyframes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,6 @@ class Subjects:
     that of the last keyframe."""
     keyframes: Keyframes
     """Poses that stay as they are; tracking goes on from them."""
-    former: Keyframes = field(default_factory=dict)
-    """Poses of the people to track that the run replaces. They are proposed, too."""
 
     @classmethod
     def of(
@@ -36,7 +34,6 @@ class Subjects:
         tracked: Sequence[int] | None = None,
         active_dofs: Sequence[NDArray[np.bool_] | None] | None = None,
         keyframes: Keyframes | None = None,
-        former: Keyframes | None = None,
     ) -> "Subjects":
         """Return the subjects; by default everybody is tracked, everything may move, and no pose is known."""
         return cls(
@@ -44,7 +41,6 @@ class Subjects:
             tuple(range(len(models))) if tracked is None else tuple(tracked),
             (None,) * len(models) if active_dofs is None else tuple(active_dofs),
             {} if keyframes is None else keyframes,
-            {} if former is None else former,
         )
 
     def keyframes_at(self, frame: int) -> Mapping[int, Array]:

@@ -182,9 +182,7 @@ class Tracking:
     def _subjects(self, people: tuple[int, ...], frames: Sequence[int]) -> Subjects:
         session_state, models = self._session_state, self._session_state.present
         active = [session_state.active_dofs(person) for person in range(len(models))]
-        saver, settings = session_state.saver, self._settings
-        former = saver.poses_to_replace(frames, people, settings)
-        return Subjects.of(models, people, active, saver.keyframes(frames), former)
+        return Subjects.of(models, people, active, session_state.saver.keyframes(frames))
 
     @property
     def _settings(self) -> TrackerSettings:

@@ -8,9 +8,8 @@ import pytest
 from run_poses import Estimate
 
 from tracker.errors import TrackerError
-from tracker.formats.model_toml import format_model, load_model
+from tracker.formats.model_toml import format_model
 from tracker.pipeline import track_session
-from tracker.pipeline.calibration_revisions import change_calibration
 from tracker.pipeline.keyframe_stretches import KeyframeStretch, frames_of, stretches_to_track
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan, stored_run
@@ -112,35 +111,6 @@ def test_after_a_correction_only_the_stretches_beside_it_are_tracked(session, st
     assert to_track()[(0,)][1:] == [KeyframeStretch(5, 7), KeyframeStretch(7, 10)]
     with pytest.raises(TrackerError, match="two keyframes with other frames between them in frames 1 to 4"):
         to_track(range(1, 5))
-
-
-def test_a_run_knows_the_poses_that_it_replaces(session, store):
-    track(session, store)
-    stored = store.poses("person", range(11))
-    with stored_run(session, store, None, TrackPlan(range(3, 9), (0,), SETTINGS)) as run:
-        assert sorted(run.subjects.former) == [3, 4, 6, 7, 8]  # no keyframe
-        for frame, poses in run.subjects.former.items():
-            np.testing.assert_array_equal(poses[0], stored[frame].values)
-    other = replace(SETTINGS, max_iterations=SETTINGS.max_iterations + 1)
-    for plan in (TrackPlan(range(3, 9), (), SETTINGS), TrackPlan(range(3, 9), (0,), other)):
-        with stored_run(session, store, None, plan) as run:
-            assert run.subjects.former == {}
-
-
-def test_poses_of_other_sizes_or_another_calibration_are_replaced_unseen(session, store):
-    track(session, store)
-    plan, (person,) = TrackPlan(range(3, 9), (0,), SETTINGS), session.people
-    taller = replace(person, model=load_model("gavrila22", 1.1 * person.model.height_m))
-    assert taller.model.n_dofs == person.model.n_dofs
-    with stored_run(replace(session, people=(taller,)), store, None, plan) as run:
-        assert run.subjects.former == {}
-    first, *others = session.cameras
-    T_world_camera = first.camera.T_world_camera.copy()
-    T_world_camera[0, 3] += 0.01
-    moved = replace(first, camera=replace(first.camera, T_world_camera=T_world_camera))
-    changed = change_calibration(session, store, replace(session, cameras=(moved, *others)), "Move a camera")
-    with stored_run(changed, store, None, plan) as run:
-        assert run.subjects.former == {}
 
 
 def test_frames_with_a_gap_are_tracked_as_legs_of_their_own():
