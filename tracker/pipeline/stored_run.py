@@ -1,5 +1,6 @@
 """Prepare a tracking run from the stored poses of a session, and resume one that was interrupted."""
 
+import itertools
 import json
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
@@ -35,6 +36,7 @@ from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.runs.run_estimate import poses_beside
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackerSettings, TrackingRun
+from tracker.trajectory.solve import even_blocks
 
 _SAVE_FRAMES = 10
 """Frames after which a run is saved."""
@@ -110,24 +112,20 @@ def stored_run(
     others = [i for i in range(len(people)) if i not in plan.people]
     keyframes = keyframes_of(store, people, frozenset(plan.frames), others)
     subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes)
-    floor, left = floor_plane(session.up, session.floor), _frames_left(store, plan)
-    legs, done = [], list[int]()
-    for whole, rest in zip(plan.legs, left, strict=True):
-        before = whole[: len(whole) - len(rest)]
-        is_begun = len(before) > 0
-        step = whole[1] - whole[0] if len(whole) > 1 else 1
-        start = _start_poses(session, store, (rest or whole)[0], step, plan, is_begun)
-        known = before if is_begun or plan.start is None else [plan.start]
+    floor, legs, done = floor_plane(session.up, session.floor), list[Leg](), list[int]()
+    for frames, n_done in zip(plan.legs, _frames_done(session, store, plan), strict=True):
+        start = _start_poses(session, store, frames, plan)
+        known = frames[:n_done] or ([] if plan.start is None else [plan.start])
         legs.append(
             Leg(
-                TrackingRun(observer, subjects, start, rest, session.fps, floor),
+                TrackingRun(observer, subjects, start, frames, session.fps, floor),
                 _tracked_before(session, store, known, start, subjects, plan.start),
                 plan.start,
                 _stored_starts(session, store, plan),
-                {} if plan.start is not None else _history(session, store, whole),
+                {} if plan.start is not None else _history(session, store, frames),
             )
         )
-        done += [k for k in before if k != plan.start]
+        done += [k for k in frames[:n_done] if k != plan.start]
     run = TrackSession(
         make_tracker(plan.settings),
         legs,
@@ -159,23 +157,20 @@ def _views(session: Session, plan: TrackPlan) -> list[int | None]:
     return [used.index(c.camera.name) if c.camera.name in used else None for c in session.cameras]
 
 
-def _frames_left(store: AnnotationStore, plan: TrackPlan) -> list[Sequence[int]]:
-    """Return the frames still to track of each leg: all, or the rest of an interrupted run; none in its backward pass.
-
-    A leg that has stored no frame yet begins with the start.
-    """
-    legs = plan.legs
+def _frames_done(session: Session, store: AnnotationStore, plan: TrackPlan) -> list[int]:
+    """Return how many frames of each leg an interrupted run has stored, in whole blocks; the others are tracked."""
+    out = [0] * len(plan.legs)
     if not is_interrupted(store, plan):
-        return legs
+        return out
     following = store.setting(UNFINISHED)["next"]
-    if following is None:
-        return [leg[len(leg) :] for leg in legs]
-    for number, leg in enumerate(legs):
+    rows = [store.frames(session.people[i].name) for i in plan.people]
+    posed = set.intersection(*({row.frame for row in of_person} for of_person in rows))
+    for number, leg in enumerate(plan.legs):
+        n_stored = len([*itertools.takewhile(lambda k: k != following and k in posed, leg)])
+        out[number] = max([0, *(own.stop for own, _ in even_blocks(len(leg)) if own.stop <= n_stored)])
         if following in leg and following != plan.start:
-            at = list(leg).index(following)
-            rest = leg if at == 1 and plan.start is not None else leg[at:]
-            return [*(done[len(done) :] for done in legs[:number]), rest, *legs[number + 1 :]]
-    return legs
+            break
+    return out
 
 
 def forget_unfinished(store: AnnotationStore) -> None:
@@ -199,10 +194,7 @@ def _tracked_before(
     session: Session, store: AnnotationStore, frames: Sequence[int], start: Sequence[Sequence[Array]],
     subjects: Subjects, held: int | None,
 ) -> list[TrackedFrame]:  # fmt: skip
-    """Return the stored frames of an interrupted run, from the one after the last that has been cleared since.
-
-    The pose of the frame `held`, which the run goes out from, is trusted.
-    """
+    """Return stored frames. The pose of the frame `held`, which the run goes out from, is trusted."""
     out: list[TrackedFrame] = []
     poses = [p[-1] for p in start]
     for frame in frames:
@@ -213,11 +205,8 @@ def _tracked_before(
             poses[i] = keyframes[i] if i in keyframes else poses[i] if record is None else record.values
         is_trusted = [i in keyframes or frame == held for i in range(len(poses))]
         statuses = tuple(_status(None if trusted else records.get(i)) for i, trusted in enumerate(is_trusted))
-        if any(r is None and i not in keyframes for i, r in records.items()):
-            out.clear()
-        else:
-            others = tuple(_others(store, session, i, frame) if i in records else () for i in range(len(poses)))
-            out.append(TrackedFrame(frame, tuple(poses), statuses, others))
+        others = tuple(_others(store, session, i, frame) if i in records else () for i in range(len(poses)))
+        out.append(TrackedFrame(frame, tuple(poses), statuses, others))
     return out
 
 
@@ -249,15 +238,12 @@ def _status(record: PoseRecord | None) -> Status:
     return "good" if record is None else status_named(record.status)
 
 
-def _start_poses(
-    session: Session, store: AnnotationStore, first: int, step: int, plan: TrackPlan, is_begun: bool
-) -> list[list[Array]]:
+def _start_poses(session: Session, store: AnnotationStore, frames: Sequence[int], plan: TrackPlan) -> list[list[Array]]:
     """Return the poses from which each person is tracked: those before the first frame, or that of the start alone."""
-    start = None if is_begun else plan.start
-    out = []
+    out, step = [], frames[1] - frames[0] if len(frames) > 1 else 1
     for i, person in enumerate(session.people):
-        known = None if start is None else _pose_on(store, person, start)
-        out.append(_poses_before(store, person, first, step, i in plan.people) if known is None else [known])
+        known = None if plan.start is None else _pose_on(store, person, plan.start)
+        out.append(_poses_before(store, person, frames[0], step, i in plan.people) if known is None else [known])
     return out
 
 

@@ -17,11 +17,13 @@ from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
+from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.runs.frame_hypotheses import Proposal
 from tracker.tracking.runs.path_assessment import RunPose
 from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import Tracker, TrackingRun
+from tracker.trajectory.solve import even_blocks
 
 
 class EstimateStep(NamedTuple):
@@ -53,12 +55,15 @@ camera that is off."""
 
 
 class Leg(NamedTuple):
-    """One direction of a run."""
+    """One direction of a run. It is tracked in blocks, each from the poses before it alone.
+
+    A run that was interrupted goes on at a block, as one that was not.
+    """
 
     run: TrackingRun
-    """Gives the frames that are left to track, in their order; none where all are tracked."""
+    """All frames of the leg, in the order of tracking."""
     before: Sequence[TrackedFrame] = ()
-    """Frames of the same leg that are known: those of an interrupted run, or the start. In the order of tracking."""
+    """Frames that are known: the first blocks of an interrupted run, or the start. In the order of tracking."""
     start: int | None = None
     """Frame whose stored pose the run goes out from. It is tracked to learn from it; a pose that was found is estimated
     with the others."""
@@ -68,15 +73,15 @@ class Leg(NamedTuple):
     """Stored poses of all people on the frames just before the leg, which show the motion there."""
 
     @property
-    def frames(self) -> list[int]:
-        """The frames that this leg stores poses of."""
-        return [k for k in self.run.frames if k != self.start]
+    def left(self) -> list[slice]:
+        """Places of the blocks that are left to track."""
+        frames, known = self.run.frames, {f.frame for f in self.before}
+        return [own for own, _ in even_blocks(len(frames)) if frames[own][-1] not in known]
 
     @property
-    def whole(self) -> list[int]:
-        """All frames from the first known one on, in the order of tracking."""
-        known = [f.frame for f in self.before]
-        return [*known, *(k for k in self.run.frames if k not in known)]
+    def frames(self) -> list[int]:
+        """The frames that are left to track and store."""
+        return [k for own in self.left for k in self.run.frames[own] if k != self.start]
 
 
 def outward(frames: Sequence[int], start: int) -> list[Sequence[int]]:
@@ -172,17 +177,26 @@ class TrackSession:
     def first_pass(self) -> Iterator[PoseEstimate]:
         """Track the frames of each leg."""
         for leg in self.legs:
-            if leg.frames:
-                yield from (found for found in self.tracker.estimates(leg.run) if found.frame != leg.start)
+            for own in leg.left:
+                run = self._run_of(leg, own)
+                yield from (found for found in self.tracker.estimates(run) if found.frame != leg.start)
+
+    def _run_of(self, leg: Leg, own: slice) -> TrackingRun:
+        """Return the run of a block of a leg, which begins at the poses before it."""
+        frames = leg.run.frames
+        if own.start == 0:
+            return replace(leg.run, frames=frames[own])
+        before = [self.tracked[k].poses for k in frames[max(0, own.start - HISTORY_FRAMES) : own.start]]
+        return replace(leg.run, start=[*zip(*before, strict=True)], frames=frames[own])
 
     def backward_pass(self) -> Iterator[BackwardStep]:
         """Track each leg once more from its last frame back to its first. Its poses are proposals."""
         if not self.tracker.settings.whole_run:
             return
-        legs = [leg for leg in self.legs if len(leg.whole) > 1]
-        done, total = 0, sum(len(leg.whole) for leg in legs)
+        legs = [leg for leg in self.legs if len(leg.run.frames) > 1]
+        done, total = 0, sum(len(leg.run.frames) for leg in legs)
         for leg in legs:
-            frames = leg.whole[::-1]
+            frames = leg.run.frames[::-1]
             last = [[pose] for pose in self.tracked[frames[0]].poses]
             for found in self.tracker.estimates(replace(leg.run, start=last, frames=frames)):
                 done += 1
