@@ -13,12 +13,16 @@ from tracker.appearance.region_deficit import worst_views
 from tracker.body.limbs import display_name, limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.searches import Search
-from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M, Hypothesis, distance_m, distinct, limbs_elsewhere
+from tracker.fitting.hypothesis import SAME_POSE_M, Hypothesis, distance_m, distinct, limbs_elsewhere
 from tracker.geometry.arrays import Array, Mask
+from tracker.tracking.confidence import OFF_ODDS, probabilities
 from tracker.tracking.runs.frame_hypotheses import FrameHypotheses
 from tracker.tracking.runs.path_search import PathSearch
 from tracker.trajectory.hypotheses import HypothesisSet, Paths, all_together, cheapest, through
 from tracker.trajectory.solve import SolvedPath
+
+DOUBTFUL_MASS = float(probabilities(np.array(OFF_ODDS)))
+"""Mass of the paths on which a limb is elsewhere, from which it is doubtful."""
 
 
 class RunPose(NamedTuple):
@@ -41,8 +45,8 @@ class RunPose(NamedTuple):
     is_searched: bool
     """Whether limbs were searched on the frame."""
     others: tuple[Hypothesis, ...]
-    """Poses with a limb elsewhere that are about as good on the frame, or better, cheapest first. Their costs are
-    relative to that of the pose, nats."""
+    """Poses with a limb elsewhere on paths of more than `DOUBTFUL_MASS`, cheapest first. Their costs are relative to
+    that of the likeliest path, nats."""
     cost_px: float = np.nan
     """Cost of the poses of all people on the frame, px of the footage."""
     view_costs_px: tuple[float, ...] = ()
@@ -64,10 +68,10 @@ def assessed_path(
         cameras: names of the views.
     """
     model, paths = search.model, search.paths
-    masses, others = _compared(model, paths, search.sets, poses)
+    masses, others = compared(model, paths, search.sets, poses)
     is_key = np.array([f.anchor is not None for f in search.frames])
     if is_key.any():
-        masses_if_free, others_if_free = _compared(model, paths, [f.found for f in search.frames], poses)
+        masses_if_free, others_if_free = compared(model, paths, [f.found for f in search.frames], poses)
         masses[is_key] = masses_if_free[is_key]
         others = [free if key else own for free, own, key in zip(others_if_free, others, is_key, strict=True)]
     by_colors, parts, nats = search.elsewhere(poses)
@@ -92,46 +96,35 @@ def _entry(frame: FrameHypotheses, first: Array, pose: Array) -> Search | None:
     return Search.of("path", moved, frame.nats(first), frame.nats(pose), True) if moved else None
 
 
-def _compared(
+def compared(
     model: BodyModel, paths: Paths, sets: Sequence[HypothesisSet], poses: Array
 ) -> tuple[Array, list[tuple[Hypothesis, ...]]]:
-    """Return `masses_elsewhere`, and `_about_as_good` of each frame."""
+    """Return the mass of the paths on which a point of each limb is more than `SAME_POSE_M` elsewhere than in poses,
+    (T, n_values): (T, n_limbs). Return also the hypotheses of each frame by which a limb is doubtful."""
     motion = paths.motion_nats(sets)
-    return masses_elsewhere(model, motion, sets, poses), _about_as_good(model, motion, sets, poses)
-
-
-def _about_as_good(
-    model: BodyModel, motion: Sequence[Array], sets: Sequence[HypothesisSet], poses: Array
-) -> list[tuple[Hypothesis, ...]]:
-    """Return the hypotheses of each frame with paths about as good as the likeliest, and a limb elsewhere."""
-    out = []
+    masses, elsewhere, others = _path_masses(motion, sets), list[Array](), list[tuple[Hypothesis, ...]]()
     of_frames = through([s.costs() for s in sets], motion, cheapest)
-    for own, costs, pose in zip(sets, of_frames, poses, strict=True):
-        here, near = PosedBody(model, pose), np.flatnonzero(costs < costs.min() + CLEAR_NATS)
-        found = [Hypothesis(PosedBody(model, own.poses[i]), own.sources[i], costs[i] - costs.min()) for i in near]
-        out.append(tuple(h for h in distinct(found) if distance_m(h.body, here) > SAME_POSE_M))
-    return out
+    for own, mass, costs, pose in zip(sets, masses, of_frames, poses, strict=True):
+        elsewhere.append(mass @ _apart(model, own.poses, pose))
+        here, likely = PosedBody(model, pose), np.flatnonzero(mass > DOUBTFUL_MASS)
+        found = [Hypothesis(PosedBody(model, own.poses[i]), own.sources[i], costs[i] - costs.min()) for i in likely]
+        others.append(tuple(h for h in distinct(found) if distance_m(h.body, here) > SAME_POSE_M))
+    return np.array(elsewhere), others
 
 
-def masses_elsewhere(model: BodyModel, motion: Sequence[Array], sets: Sequence[HypothesisSet], poses: Array) -> Array:
-    """Return the mass of the paths on which a point of each limb is more than `SAME_POSE_M` elsewhere, (T, n_limbs).
+def _path_masses(motion: Sequence[Array], sets: Sequence[HypothesisSet]) -> list[Array]:
+    """Return the mass of the paths through each hypothesis, (K,) for each frame, averaged over views that are left out.
 
     Args:
-        model: the body.
         motion: cost of each triple of hypotheses of successive frames; see `Paths.motion_nats`.
         sets: hypotheses of each frame.
-        poses: from which distances count, (T, n_values).
     """
+    from scipy.special import softmax  # imported lazily: loading takes 0.1 s
+
     n_views = sets[0].view_nats.shape[1]
     views = range(n_views) if n_views > 2 else (None,)  # one view shows no depth
-    apart = [_apart(model, s.poses, pose) for s, pose in zip(sets, poses, strict=True)]
-    out = np.zeros((len(views), len(sets), len(limbs(model))))
-    for i, view in enumerate(views):
-        nats = through([s.costs(view) for s in sets], motion, all_together)
-        for t, (of_frame, is_apart) in enumerate(zip(nats, apart, strict=True)):
-            weights = np.exp(of_frame.min() - of_frame)
-            out[i, t] = weights @ is_apart / weights.sum()
-    return np.asarray(out.mean(axis=0))
+    masked = [through([s.costs(view) for s in sets], motion, all_together) for view in views]
+    return [np.mean([softmax(-nats) for nats in of_frame], axis=0) for of_frame in zip(*masked, strict=True)]
 
 
 def _apart(model: BodyModel, poses: Array, pose: Array) -> Mask:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tracker.body.limbs import limbs
-from tracker.tracking.runs.path_assessment import masses_elsewhere
+from tracker.tracking.runs.path_assessment import compared
 from tracker.trajectory.hypotheses import HypothesisSet, Paths
 from tracker.trajectory.motion_model import acceleration, motion_points
 
@@ -17,7 +17,7 @@ def frame(model, poses, view_nats, prior_nats=None):
 
 def masses(model, sets, poses):
     paths = Paths(acceleration(np.arange(len(sets)) / 25.0), motion_points(model).groups)
-    return masses_elsewhere(model, paths.motion_nats(sets), sets, np.array(poses))
+    return compared(model, paths, sets, np.array(poses))[0]
 
 
 @pytest.fixture
@@ -68,8 +68,19 @@ def test_motion_tells_hypotheses_of_a_frame_apart(gavrila, raised):
         for t in range(9)
     ]
     paths = Paths(acceleration(np.arange(9) / 25.0), motion_points(gavrila).groups)
-    even = masses_elsewhere(gavrila, paths.motion_nats(sets), sets, np.array([here] * 9))
+    even = compared(gavrila, paths, sets, np.array([here] * 9))[0]
     assert even[4] == pytest.approx(of_arm(gavrila, 0.5))
     paths.likeliest(sets)
-    moved = masses_elsewhere(gavrila, paths.motion_nats(sets), sets, np.array([here] * 9))
+    moved = compared(gavrila, paths, sets, np.array([here] * 9))[0]
     assert moved[4].max() < 1e-3
+
+
+def test_poses_that_the_evidence_without_a_view_prefers_are_kept(gavrila, raised):
+    """They are about as good only without the first view. A pose that no view prefers is not kept."""
+    here, other, near = raised
+    nats = [[0.0, 9.0, 9.0], [50.0, 0.0, 0.0], [0.0, 9.0, 9.1]]
+    sets = [frame(gavrila, [here, other, near], nats), frame(gavrila, [here, other], [[0.0] * 3, [20.0] * 3])]
+    paths = Paths(acceleration(np.arange(2) / 25.0), motion_points(gavrila).groups)
+    _, (first, second) = compared(gavrila, paths, sets, np.array([here, here]))
+    assert [(h.pose.tobytes(), h.cost) for h in first] == [(other.tobytes(), 32.0)]
+    assert second == ()
