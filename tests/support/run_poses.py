@@ -17,7 +17,7 @@ def run_pose(model, pose, **known):
     n, n_points = len(limbs(model)), len(model.point_names)
     sure = RunPose(
         pose, None, np.ones(len(model.parts)), np.zeros((n_points, 3, 3)), np.zeros(n), np.full(n, -20.0), ("",) * n,
-        False, (), 1.5, (0.5,) * N_VIEWS,
+        np.ones(n, bool), False, (), 1.5, (0.5,) * N_VIEWS,
     )  # fmt: skip
     return sure._replace(**known)
 

@@ -85,6 +85,12 @@ class KeypointBlock:
         )
 
 
+def keypoints_of(view: ViewEvidence, person: int) -> ViewKeypoints | None:
+    """Return the key points of a person in a view; None if there is none."""
+    own = view.keypoints[person] if person < len(view.keypoints) else None
+    return own if own is not None and len(own.parts) else None
+
+
 def keypoint_blocks(views: Sequence[ViewEvidence], person: int, velocity: Array | None) -> list[ResidualBlock]:
     """Return the residuals of a person's key points, one block for the views of each time.
 
@@ -96,8 +102,8 @@ def keypoint_blocks(views: Sequence[ViewEvidence], person: int, velocity: Array 
     """
     by_time = dict[float, list[tuple[Camera, ViewKeypoints]]]()
     for view in views:
-        own = view.keypoints[person] if person < len(view.keypoints) else None
-        if own is not None and len(own.parts):
+        own = keypoints_of(view, person)
+        if own is not None:
             by_time.setdefault(0.0 if velocity is None else view.ahead_frames, []).append((view.camera, own))
     return [at_time(KeypointBlock.of(seen), velocity, time) for time, seen in by_time.items()]
 

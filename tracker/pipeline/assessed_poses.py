@@ -8,7 +8,7 @@ from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.store.records import PoseRecord
 from tracker.tracking.confidence import classify_limbs, probabilities
-from tracker.tracking.pose_errors import elsewhere_odds, limb_odds, mass_odds, point_covariances
+from tracker.tracking.pose_errors import elsewhere_odds, limb_odds, mass_odds, point_covariances, unshown_odds
 from tracker.tracking.remarks import may_be_elsewhere, uncertain, without_uncertainty
 from tracker.tracking.runs.path_assessment import RunPose
 
@@ -23,13 +23,18 @@ def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseR
     """
     errors = point_covariances(model, found.errors_m2)
     searched = [found.is_searched and len(limb.parts) > 1 for limb in limbs(model)]
-    odds = np.stack([limb_odds(model, errors), mass_odds(found.elsewhere), elsewhere_odds(found.by_colors, searched)])
+    odds = np.stack([
+        limb_odds(model, errors), mass_odds(found.elsewhere), elsewhere_odds(found.by_colors, searched),
+        unshown_odds(found.is_shown),
+    ])  # fmt: skip
     reasons = [""] * len(searched)
     for i, source in enumerate(odds[:, :, 0].argmax(axis=0)):
         if source == 1 and not found.others:  # else the remark on them says so
             reasons[i] = f": elsewhere on {100 * found.elsewhere[i]:.0f}% of the likely paths"
         elif source == 2:
             reasons[i] = f": {found.against[i]}"
+        elif source == 3:
+            reasons[i] = ": fewer than two views show it"
     remarks = without_uncertainty(pose.remark, alternatives=True)
     if found.others:
         remarks.append(may_be_elsewhere(PosedBody(model, pose.values), found.others))

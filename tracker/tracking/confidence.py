@@ -21,7 +21,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.images.silhouette_contour import MIN_TRUST
 from tracker.tracking.remarks import uncertain
 from tracker.tracking.view_regions import px_per_m
@@ -269,8 +269,7 @@ def quality(
     model, chains, layout = body.model, limbs(body.model), _layout(body.model)
     far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
     n_views = int(np.count_nonzero(costs.length_px.sum(axis=1) > 0))
-    scale = px_per_m([v.camera for v in views], body)
-    beside_px = 2.0 * scale * np.array([2.0 * s.half_axes[2] for s in model.shapes])
+    scale, beside_px = px_per_m([v.camera for v in views], body), _beside_px(body, views)
     color, worst_drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
@@ -298,6 +297,29 @@ def quality(
             for c, points, spread, free_spread in zip(chains, layout.points, spreads, free_spreads, strict=True)
         ),
     )  # fmt: skip
+
+
+def views_of_limbs(body: PosedBody, costs: PartCosts, views: Sequence[ViewEvidence]) -> Mask:
+    """Return whether each view shows each limb by its contour, (V, n_limbs).
+
+    Args:
+        body: in a pose.
+        costs: of its parts there.
+        views: the evidence of each view.
+    """
+    beside_px = _beside_px(body, views)
+    return np.stack([_shows(costs, beside_px, limb.parts) for limb in limbs(body.model)], axis=1)
+
+
+def _beside_px(body: PosedBody, views: Sequence[ViewEvidence]) -> Array:
+    """Return the length of each part's contour seen from the side, (n_parts,), working px."""
+    half_axes_m = np.array([s.half_axes[2] for s in body.model.shapes])
+    return np.asarray(4.0 * px_per_m([v.camera for v in views], body) * half_axes_m)
+
+
+def _shows(costs: PartCosts, beside_px: Array, parts: IntArray) -> Mask:
+    """Return whether each view shows some parts, (V,)."""
+    return np.asarray(costs.length_px[:, parts].sum(axis=1) > _MIN_SHOWN * beside_px[parts].sum())
 
 
 class _Layout(NamedTuple):
@@ -351,9 +373,8 @@ class _Contours(NamedTuple):
 
     def second_forward(self, parts: IntArray, otherwise: float) -> float:
         """Return the feature `second_forward` of some parts, or another value where no view shows them."""
-        lengths = self.costs.length_px[:, parts].sum(axis=1)
-        shows = lengths > _MIN_SHOWN * self.beside_px[parts].sum()
-        forward = np.sort(self.far[:, parts].sum(axis=1)[shows] / lengths[shows])
+        shows = _shows(self.costs, self.beside_px, parts)
+        forward = np.sort(self.far[:, parts].sum(axis=1)[shows] / self.costs.length_px[:, parts].sum(axis=1)[shows])
         return float(forward[max(0, len(forward) - 2)]) if len(forward) else otherwise
 
 

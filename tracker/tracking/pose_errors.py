@@ -12,7 +12,7 @@ from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import OTHER_BODY_M
 from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Mask
 from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, probabilities
 
 SHARED_M = 0.006
@@ -86,6 +86,14 @@ def mass_odds(masses: Array) -> Array:
 
     odds = np.asarray(logit(np.clip(masses, 1e-12, 1 - 1e-12)))
     return odds[:, None] + (0.0, -LOST_NATS)
+
+
+def unshown_odds(is_shown: Mask) -> Array:
+    """Return the log odds that each limb is off and lost, (n_limbs, 2), where fewer than two views show it.
+
+    It is then off as likely as not. Nothing follows of limbs that are shown, (n_limbs,).
+    """
+    return np.where(is_shown, -np.inf, 0.0)[:, None] + (0.0, -LOST_NATS)
 
 
 def beyond(radius_m: float, sigma_m: Array) -> Array:

@@ -74,6 +74,13 @@ def test_status_by_the_colors_of_the_run(gavrila, nats, is_searched, status):
     assert found.remark == ("" if status == "good" else "left arm uncertain: left hand elsewhere in A")
 
 
+def test_a_limb_that_fewer_than_two_views_show_is_doubtful(gavrila):
+    found = assessed(gavrila, is_shown=at_limb(gavrila, False, rest=True))
+    assert (found.status, found.remark) == ("doubtful", "left arm uncertain: fewer than two views show it")
+    lost = assessed(gavrila, is_shown=at_limb(gavrila, False, rest=True), elsewhere=at_limb(gavrila, 0.9))
+    assert lost.status == "lost"
+
+
 def test_the_head_is_not_searched():
     """A limb of one part is not, wherever others are."""
     model = load_model("gavrila34")

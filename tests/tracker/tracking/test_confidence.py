@@ -22,6 +22,7 @@ from tracker.tracking.confidence import (
     probabilities,
     quality,
     reason,
+    views_of_limbs,
     worst,
 )
 
@@ -225,6 +226,20 @@ def test_contours_view_by_view():
     one = contours._replace(costs=costs._replace(length_px=length * [[0], [1], [0], [0]]))
     assert one.second_forward(both, 0.7) == pytest.approx(0.4)
     assert contours.explained(both) == pytest.approx(0.2)
+
+
+def test_views_show_the_limbs_of_which_they_show_enough(gavrila):
+    body, cameras = PosedBody(gavrila, posed(gavrila, 1)), cameras_around()
+    views, n = own_evidence([body], cameras), len(gavrila.parts)
+    arm, leg = limbs(gavrila)[0], limbs(gavrila)[-1]
+    length_px = np.full((len(views), n), 100.0)
+    length_px[0, arm.parts[0]] = 0.0  # the forearm is seen
+    length_px[1, arm.parts] = 10.0
+    length_px[2, leg.parts] = 0.0
+    shown = views_of_limbs(body, PartCosts(length_px, np.zeros_like(length_px), length_px, np.ones(len(views))), views)
+    assert shown[:, 0].tolist() == [True, False, True]
+    assert shown[:, -1].tolist() == [True, True, False]
+    assert shown[:, 1:-1].all()
 
 
 def test_quality_where_nothing_is_seen(gavrila):

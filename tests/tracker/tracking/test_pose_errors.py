@@ -9,7 +9,15 @@ from tracker.body.limbs import limbs
 from tracker.fitting.gauss_newton import OTHER_BODY_M
 from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.tracking.confidence import classify_limbs, probabilities
-from tracker.tracking.pose_errors import SELDOM_NATS, beyond, elsewhere_odds, limb_odds, mass_odds, point_covariances
+from tracker.tracking.pose_errors import (
+    SELDOM_NATS,
+    beyond,
+    elsewhere_odds,
+    limb_odds,
+    mass_odds,
+    point_covariances,
+    unshown_odds,
+)
 
 
 @pytest.mark.parametrize(("sigma", "radius"), [(0.02, 0.03), (0.05, 0.1), (0.1, 0.1)])
@@ -53,3 +61,9 @@ def test_a_limb_is_off_as_likely_as_paths_have_it_elsewhere():
 def test_colors_count_less_against_a_limb_that_was_searched():
     odds = elsewhere_odds(np.array([SELDOM_NATS] * 2), [False, True])
     assert probabilities(odds[:, 0]) == pytest.approx([0.5, 1 / (1 + np.exp(CLEAR_NATS))])
+
+
+def test_a_limb_that_one_view_shows_is_off_as_likely_as_not():
+    odds = unshown_odds(np.array([True, False]))
+    assert probabilities(odds[:, 0]).tolist() == [0.0, 0.5]
+    assert [classify_limbs(odds[i : i + 1]) for i in range(2)] == ["good", "doubtful"]

@@ -7,12 +7,14 @@ import numpy as np
 
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.appearance.region_residuals import region_residuals
+from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.threads import kernel_pool
+from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import ResidualBlock, with_locked_dofs
-from tracker.fitting.keypoints import keypoint_blocks
+from tracker.fitting.keypoints import keypoint_blocks, keypoints_of
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.tracking.estimation.assessment import part_costs_px
+from tracker.tracking.confidence import views_of_limbs
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
 from tracker.tracking.estimation.limb_repair import FrameEvidence, RegionScorer, with_regions
 from tracker.tracking.estimation.pose_score import PoseScorer, without_prediction
@@ -109,10 +111,17 @@ class FrameHypotheses:
         """Return the cost of a pose, (n_values,), on the evidence of the hypotheses."""
         return float(self._scored(pose[None], ("",)).costs()[0])
 
-    def part_costs_px(self, pose: Array) -> Array:
-        """Return the mean distance of each part's contour to the edges, (n_parts,), px of the footage; NaN where
-        hidden."""
-        return part_costs_px(self.evidence.views, self._scorer.residuals.part_costs(pose))
+    def part_costs(self, pose: Array) -> PartCosts:
+        """Return how the contours of the parts fit in a pose, (n_values,)."""
+        return self._scorer.residuals.part_costs(pose)
+
+    def views_of_limbs(self, pose: Array, costs: PartCosts) -> Mask:
+        """Return whether contours or key points show each limb in each view in a pose, (n_values,): (V, n_limbs)."""
+        shown = views_of_limbs(PosedBody(self.model, pose), costs, self.evidence.views)
+        for of_view, view in zip(shown, self.evidence.views, strict=True):
+            if (points := keypoints_of(view, self.person)) is not None:
+                of_view |= [np.isin(limb.parts, points.parts).any() for limb in limbs(self.model)]
+        return shown
 
     def blocks(self, pose: Array) -> list[ResidualBlock]:
         """Return the residual blocks of the frame near a pose, (n_values,)."""

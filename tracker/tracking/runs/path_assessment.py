@@ -16,6 +16,7 @@ from tracker.body.searches import Search
 from tracker.fitting.hypothesis import SAME_POSE_M, Hypothesis, distance_m, distinct, limbs_elsewhere
 from tracker.geometry.arrays import Array, Mask
 from tracker.tracking.confidence import OFF_ODDS, probabilities
+from tracker.tracking.estimation.assessment import part_costs_px
 from tracker.tracking.runs.frame_hypotheses import FrameHypotheses
 from tracker.tracking.runs.path_search import PathSearch
 from tracker.trajectory.hypotheses import HypothesisSet, Paths, all_together, cheapest, through
@@ -42,6 +43,8 @@ class RunPose(NamedTuple):
     """How much likelier each limb is elsewhere by the colours of the run, (n_limbs,), nats; see `elsewhere_nats`."""
     against: tuple[str, ...]
     """For each limb, the part and the view that speak most against it, for people to read."""
+    is_shown: Mask
+    """Whether two views or more show each limb, (n_limbs,): one shows no depth. All of them where one camera films."""
     is_searched: bool
     """Whether limbs were searched on the frame."""
     others: tuple[Hypothesis, ...]
@@ -84,9 +87,10 @@ def assessed_path(
         off = model.points_world(solved.poses[t]) - model.points_world(pose)
         errors = np.einsum("pia,ab,pjb->pij", J, solved.covariances[t], J) + off[:, :, None] * off[:, None]
         against = tuple(f"{names[p]} elsewhere in {cameras[v]}" for p, v in zip(parts[t], views[t], strict=True))
-        known = by_colors[t], against, t in search.searched, others[t]
-        entry = _entry(frame, first[t], pose)
-        out.append(RunPose(pose, entry, frame.part_costs_px(pose), errors, masses[t], *known))
+        costs, entry = frame.part_costs(pose), _entry(frame, first[t], pose)
+        is_shown = frame.views_of_limbs(pose, costs).sum(axis=0) >= min(2, len(cameras))
+        known = by_colors[t], against, is_shown, t in search.searched, others[t]
+        out.append(RunPose(pose, entry, part_costs_px(frame.evidence.views, costs), errors, masses[t], *known))
     return out
 
 

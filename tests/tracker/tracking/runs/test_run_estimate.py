@@ -1,11 +1,18 @@
 """The estimate of all frames of a run, on a simulated recording whose poses are known."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from filmed_run import FilmedRun, estimated, moving
+from staging import cameras_around, own_evidence, posed
 
 from tracker.body.limbs import limbs
+from tracker.body.model import PosedBody
 from tracker.compute.progress import mapped, result_of
+from tracker.evidence.keypoints import ViewKeypoints
+from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.tracking.runs.frame_hypotheses import FrameHypotheses, Proposal
 from tracker.tracking.runs.run_estimate import estimate_run
 from tracker.trajectory import solve
@@ -68,6 +75,7 @@ def test_few_frames_and_cameras(gavrila, n_frames, n_cameras):
         np.testing.assert_array_equal(gavrila.clip(pose.pose), pose.pose)
         assert np.isfinite(pose.errors_m2).all()
         assert np.isfinite(pose.elsewhere).all()
+        assert pose.is_shown.all()
     if n_cameras == 2:
         assert film.errors_m(found).max() < NEAR_M
         assert max(pose.elsewhere.max() for pose in found.values()) < 0.05
@@ -97,6 +105,37 @@ def test_poses_that_stay_are_assessed(film, gavrila, arm):
     assert sigmas[WRONG][wrist] == pytest.approx(film.errors_m(found)[WRONG], rel=0.2)
     assert max(s.max() for k, s in enumerate(sigmas) if k != WRONG) < NEAR_M
     assert found[WRONG].cost_px > found[WRONG - 1].cost_px
+
+
+@pytest.mark.parametrize(("n_shown", "is_shown"), [(1, False), (2, True)])
+def test_a_limb_is_shown_by_two_views_or_more(film, gavrila, arm, monkeypatch, n_shown, is_shown):
+    views_of_limbs = FrameHypotheses.views_of_limbs
+
+    def hidden(*at):
+        shown = views_of_limbs(*at)
+        shown[n_shown:, arm] = False
+        return shown
+
+    monkeypatch.setattr(FrameHypotheses, "views_of_limbs", hidden)
+    found = estimated(film.asked(film.true[0], stays=True))
+    for pose in found.values():
+        assert pose.is_shown.tolist() == [is_shown or i != arm for i in range(len(limbs(gavrila)))]
+
+
+def test_key_points_show_a_limb_too(gavrila):
+    """Of one view, beside contours."""
+    frame = FrameHypotheses.__new__(FrameHypotheses)
+    body, cameras = PosedBody(gavrila, posed(gavrila, 1)), cameras_around()
+    views = own_evidence([body], cameras)
+    costs = ContourResiduals(views, [body]).part_costs(body.values)
+    costs = costs._replace(length_px=np.zeros_like(costs.length_px))
+    wrist = ViewKeypoints(
+        np.array([gavrila.part_index["left_forearm"]]), np.zeros((1, 3)), np.zeros((1, 2)), np.ones(1)
+    )
+    frame.person, frame.model = 0, gavrila
+    frame.evidence = SimpleNamespace(views=[replace(views[0], keypoints=(wrist,)), *views[1:]])
+    shown = frame.views_of_limbs(body.values, costs)
+    assert np.argwhere(shown).tolist() == [[0, [x.name for x in limbs(gavrila)].index("left_forearm")]]
 
 
 def test_locked_degrees_of_freedom_stay_in_every_proposal(film, gavrila, monkeypatch):
