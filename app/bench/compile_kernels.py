@@ -198,11 +198,13 @@ def _estimate(
     cameras: Sequence[CameraSource], settings: "TrackSettings", fps: float, models: Sequence[BodyModel],
     poses: Sequence[Array],
 ) -> None:  # fmt: skip
-    """Estimate the poses of a few frames together, and search a limb with the colours of one."""
+    """Estimate the poses of a few frames together, and search a limb on one."""
     from tracker.appearance.region_learning import LearningFrame, learn_regions
     from tracker.body.limbs import limbs
-    from tracker.tracking.estimation.limb_repair import FrameEvidence, better_limbs
+    from tracker.tracking.estimation.limb_recovery import search_limbs
     from tracker.tracking.estimation.pose_score import common_evidence
+    from tracker.tracking.estimation.region_scorer import FrameEvidence
+    from tracker.tracking.runs.frame_hypotheses import FrameHypotheses
     from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
     from tracker.tracking.subjects import Subjects
 
@@ -213,7 +215,9 @@ def _estimate(
         known = learn_regions([LearningFrame(views, bodies)], observer.working_cameras, observer.empty_scenes())
         frame = known.frame(views, bodies)
         known.score(frame, bodies)
-        better_limbs(FrameEvidence(views, known, frame), bodies, 0, settings, limbs(models[0])[-1:])
+        at = FrameHypotheses(FrameEvidence(views, known, frame), bodies, 0, settings)
+        scorer = at.limb_scorer(poses[0], at.part_colors(poses[0]))
+        search_limbs(models[0], limbs(models[0])[-1:], scorer.fitted(models[0], poses[0]), (), scorer)
         known_poses = dict.fromkeys(range(_FRAME, _FRAME + _FRAMES), poses)
         result_of(estimate_run(RunFrames(observer, Subjects.of(models), settings, fps, known_poses)))
 

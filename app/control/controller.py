@@ -22,7 +22,6 @@ from app.control.posing.pinning import Pinning
 from app.control.posing.pose_edits import PoseEdits
 from app.control.search.cost_landscape import CostLandscapes
 from app.control.search.cost_map import CostMaps
-from app.control.search.reasons import Reasons
 from app.control.search.replay import Replay
 from app.control.search.search_runs import SearchRuns
 from app.control.search.searching import SearchRunner
@@ -45,6 +44,7 @@ from app.control.tracking.inconsistent_frames import InconsistentFrames
 from app.control.tracking.observing import Observing
 from app.control.tracking.pose_checks import PoseChecks
 from app.control.tracking.ranges import Ranges
+from app.control.tracking.reasons import Reasons
 from app.control.tracking.tracking import Tracking
 from app.control.view.floor import FloorEditing
 from app.control.view.view_3d import View3dSettings

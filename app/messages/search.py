@@ -358,10 +358,8 @@ class ReasonMessage(Message, frozen=True, tag="reason"):
     """By part of the person; empty without a table."""
     notes: tuple[str, ...]
     """Sentences on what views cannot show."""
-    searched: tuple[str, ...]
-    """Limbs that were searched for alternatives, for display."""
     alternatives: tuple[GhostPose, ...]
-    """Poses within 6 nats of the best, cheapest first. The overlay draws them in this order."""
+    """Poses by which a limb is doubtful, cheapest first. The overlay draws them in this order."""
     tried: tuple[TriedSearch, ...] | None
     """The searches of the tracker on the frame in their order, from the store; null where they are not known."""
 

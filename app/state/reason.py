@@ -1,4 +1,4 @@
-"""Why a pose is in doubt: what each view shows of each part, and poses that are about as good."""
+"""Why a pose is in doubt: what each view shows of each part, and poses that may be as likely."""
 
 from dataclasses import dataclass
 
@@ -29,10 +29,8 @@ class Reason:
     table: PartTable
     contradiction: Contradiction | None
     """The worst cell; None where no view clearly contradicts the pose."""
-    searched: tuple[str, ...] = ()
-    """Limbs that were searched for alternatives, as text for the user."""
     alternatives: tuple[RankedPose, ...] | None = None
-    """Cheapest first, all within 6 nats of the best pose; None before they are known."""
+    """Those by which a limb is doubtful, cheapest first; None before they are known."""
 
 
 @dataclass(frozen=True)

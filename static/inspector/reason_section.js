@@ -84,7 +84,7 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
       listed = JSON.stringify(ranked);
       others.replaceChildren(...ranked.map((other, rank) => alternativeRow(other, rank, () => posing.takeAlternative(rank))));
     }
-    notes.textContent = isKnown ? [searchedText(reason), ...reason.notes].filter(Boolean).join(" ") : "";
+    notes.textContent = isKnown ? reason.notes.join(" ") : "";
     notes.hidden = !notes.textContent;
     tried.show(state?.source ? (reason?.tried ?? null) : undefined);
     table.element.classList.toggle("is-former", !isKnown);
@@ -117,16 +117,6 @@ function alternativeRow({ nats, limbs }, rank, take) {
   const title = `Take this pose, drawn blue with the number ${rank + 1} (Alt+${rank + 1}). Can be undone`;
   row.append(textButton(`Take ${rank + 1}`, title, take), Object.assign(document.createElement("span"), { textContent: `${where}: ${cost}` }));
   return row;
-}
-
-/**
- * Names the limbs that were searched for alternatives, and says that nothing else was found.
- *
- * @param {import("../model/protocol.js").ReasonMessage} reason
- */
-function searchedText({ searched, alternatives }) {
-  if (searched.length === 0) return "";
-  return `Searched the ${searched.join(" and the ")}${alternatives.length ? "" : ": no other pose within 6 nats"}.`;
 }
 
 /** @param {string} status */

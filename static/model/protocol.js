@@ -236,7 +236,7 @@
  * @typedef {{what: string, before_nats: number, after_nats: number | null, taken: boolean}} TriedSearch
  * @typedef {{type: "reason", frame: number, person: number, running: boolean, stage: string, share: number, message:
  *   string, sentence: string, part: number | null, camera: number | null, limbs: LimbReason[], parts: PartReason[],
- *   notes: string[], searched: string[], alternatives: GhostPose[], tried: TriedSearch[] | null}} ReasonMessage
+ *   notes: string[], alternatives: GhostPose[], tried: TriedSearch[] | null}} ReasonMessage
  * @typedef {{type: "cost_map", person: number, dofs: [number, number], current: [number, number], across: number[], up:
  *   number[], nats: number[][]}} CostMapMessage
  * @typedef {{person: number, frame: number, annotator: string, state: TaskState, comment: string, by: string,

@@ -22,6 +22,11 @@ def run_pose(model, pose, **known):
     return sure._replace(**known)
 
 
+def doubted(*frames):
+    """What is known of some frames: another path was taken, and half of the paths have the left arm elsewhere still."""
+    return {frame: {"entry": MOVED, "elsewhere": np.array([0.5, 0.0, 0.0, 0.0])} for frame in frames}
+
+
 class Estimate:
     """Stands for `estimate_run`: each first guess moves along y, keyframes stay."""
 
@@ -40,8 +45,10 @@ class Estimate:
         for done, (frame, poses) in enumerate(sorted(run.poses.items()), start=1):
             yield Progress(done, len(run.poses))
             for i, own in found.items():
-                pose = np.array(poses[i])
-                if not run.stays and i not in run.subjects.keyframes_at(frame):
+                pose, known = np.array(poses[i]), dict(self.known.get(frame, {}))
+                if run.stays or i in run.subjects.keyframes_at(frame):
+                    known.pop("entry", None)
+                else:
                     pose[1] += self.step_m
-                own[frame] = run_pose(run.subjects.models[i], pose, **self.known.get(frame, {}))
+                own[frame] = run_pose(run.subjects.models[i], pose, **known)
         return found

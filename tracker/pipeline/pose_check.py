@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.body.model import BodyModel
 from tracker.compute.progress import Report, mapped, result_of, unreported
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
@@ -16,22 +17,24 @@ from tracker.session.session import Session
 from tracker.store.records import PoseRecord
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import HISTORY_FRAMES
+from tracker.tracking.runs.frame_hypotheses import Proposal
+from tracker.tracking.runs.path_assessment import RunPose
 from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
 from tracker.tracking.subjects import Subjects
 
 
 @dataclass(frozen=True, eq=False)
 class PoseInRun:
-    """A stored pose of one person, and the poses around it."""
+    """A pose of one person, and the poses around it."""
 
     frame: int
     person: int
     """Index of the person."""
-    record: PoseRecord
-    """The pose."""
     known: Mapping[int, Sequence[Array]]
     """Poses of all people in their present bodies, (n_values,) each, by frame: on this frame, and on those of
     `frames_around`."""
+    alternatives: Sequence[Array] = ()
+    """Stored alternatives of the pose, (n_values,) each. They are proposed, too."""
     active_dofs: NDArray[np.bool_] | None = None
     """Degrees of freedom of the person that may move, (n_dofs,); None: all."""
 
@@ -54,12 +57,10 @@ def frames_around(frame: int, posed: Sequence[int]) -> list[int]:
     return sorted(found)
 
 
-def checked_pose(
+def compared_pose(
     session: Session, observer: Observer, settings: EstimationSettings, pose: PoseInRun, report: Report = unreported
-) -> PoseRecord:
-    """Return a pose with its errors, status and reason, by the frames around.
-
-    A run assesses its poses likewise (`tracker.tracking.runs`). One that was set by hand is compared as any other.
+) -> RunPose:
+    """Return what the frames around say about a pose, which stays. It is compared as any other, also if set by hand.
 
     Args:
         session: the session.
@@ -81,7 +82,12 @@ def checked_pose(
     active = [pose.active_dofs if i == pose.person else None for i in range(len(models))]
     subjects = Subjects.of(models, (pose.person,), active)
     known = {k: pose.known[k] for k in frames}
-    steps = estimate_run(RunFrames(observer, subjects, settings, session.fps, known, stays=True))
+    others = {(pose.frame, pose.person): [Proposal(values, "alternative") for values in pose.alternatives]}
+    steps = estimate_run(RunFrames(observer, subjects, settings, session.fps, known, others, stays=True))
     found = result_of(mapped(steps, lambda step: report("comparing poses", step.done / step.total)))
-    record = replace(pose.record, remark="")
-    return assessed_by_run(models[pose.person], record, found[pose.person][pose.frame])
+    return found[pose.person][pose.frame]
+
+
+def checked_pose(model: BodyModel, record: PoseRecord, found: RunPose) -> PoseRecord:
+    """Return a stored pose with its errors, status and reason, by what the frames around say; see `compared_pose`."""
+    return assessed_by_run(model, replace(record, remark=""), found)

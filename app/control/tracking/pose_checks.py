@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
+from app.control.tracking.poses_around import pose_in_run
 from app.remedies import page_text
 from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.errors import TrackerError
-from tracker.geometry.arrays import Array
-from tracker.pipeline.pose_check import PoseInRun, checked_pose, frames_around
+from tracker.pipeline.pose_check import checked_pose, compared_pose
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 
 _LOG = logging.getLogger(__name__)
@@ -69,11 +69,12 @@ class PoseChecks:
         try:
             state = session_state.state
             settings = track_settings.of_estimates(state.settings, state.run_choices)
-            pose = self._in_run(person, change)
-            if pose is not None:
-                observer = session_state.frames.observer.in_time()
-                found = checked_pose(session_state.session, observer, settings, pose, self._report)
-                self._store(person, stored, found)
+            record = change.pose
+            if record is not None and record.model_revision == session_state.saver.revisions.current(person):
+                session, observer = session_state.session, session_state.frames.observer.in_time()
+                pose = pose_in_run(session_state, person, change.frame)
+                found = compared_pose(session, observer, settings, pose, self._report)
+                self._store(person, stored, checked_pose(session.people[person].model, record, found))
         except _StoppedError:
             return
         except TrackerError as error:
@@ -88,26 +89,6 @@ class PoseChecks:
             time.sleep(_GIVE_WAY_S)
         if self._closed:
             raise _StoppedError
-
-    def _in_run(self, person: int, change: PoseChange) -> PoseInRun | None:
-        """Return a pose with those of all people around; None where it was made with other sizes than the present."""
-        session_state, record = self._session_state, change.pose
-        saver, people = session_state.saver, range(len(session_state.session.people))
-        with session_state.lock:
-            if record is None or record.model_revision != saver.revisions.current(person):
-                return None
-            posed = sorted(set.intersection(*(set(saver.index.frames(i)) for i in people)) | {change.frame})
-            frames = frames_around(change.frame, posed)
-            known = {k: self._poses(k) for k in frames}
-            active = session_state.active_dofs(person)
-        return PoseInRun(change.frame, person, record, {k: p for k, p in known.items() if p is not None}, active)
-
-    def _poses(self, frame: int) -> list[Array] | None:
-        """Return the poses of all people, (n_values,) each; None where somebody has none that fits the present body."""
-        saver = self._session_state.saver
-        poses = [saver.pose_now(i, frame) for i in range(len(self._session_state.session.people))]
-        known = [p for p in poses if p is not None]
-        return known if len(known) == len(poses) else None
 
     def _store(self, person: int, stored: _Stored, found: PoseRecord) -> None:
         """Store an assessment, unless the pose has changed meanwhile."""

@@ -349,7 +349,6 @@ def reason(state: State, cameras: Sequence[str]) -> ReasonMessage:
         state.frame, state.person, work.running, work.stage, work.share, work.message,
         "" if worst is None else worst.sentence, None if worst is None else worst.part,
         None if worst is None else worst.view, limbs_of, parts, notes,
-        () if found is None else found.searched,
         () if found is None else tuple(GhostPose(round(o.nats, 1), o.limbs) for o in found.alternatives or ()),
         tried(state.people[state.person].trace),
     )  # fmt: skip

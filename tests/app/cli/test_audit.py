@@ -7,7 +7,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
-from fake_estimate import FakeEstimate
+from run_poses import Estimate, doubted
 
 from tracker.pipeline import audit
 from tracker.store.annotation_store import AnnotationStore
@@ -19,7 +19,7 @@ FRAMES, APART, STEP_M = range(20, 26), 23, 0.02
 @pytest.fixture
 def estimate(monkeypatch):
     """The likeliest poses are a step aside, and on one frame the left arm is elsewhere on half of the paths."""
-    found = FakeEstimate(STEP_M, doubted=(APART,))
+    found = Estimate(STEP_M, doubted(APART))
     monkeypatch.setattr(audit, "estimate_run", found)
     return found
 

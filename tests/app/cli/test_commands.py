@@ -11,8 +11,8 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 from command_line import SAMPLE, WITH_POSE, assert_refused, stored
-from fake_estimate import FakeEstimate
 from gestures import wait_for
+from run_poses import Estimate, doubted
 
 from app.cli.track import TrackArguments, settings_of
 from app.server import address
@@ -242,7 +242,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
 @pytest.mark.slow
 def test_an_estimate_that_is_interrupted_leaves_the_first_pass_and_goes_on(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    tracked, original, estimate = [], ChamferTracker.estimates, FakeEstimate(0.01, doubted=(3,))
+    tracked, original, estimate = [], ChamferTracker.estimates, Estimate(0.01, doubted(3))
 
     def noted(*arguments):
         for found in original(*arguments):

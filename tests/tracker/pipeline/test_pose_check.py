@@ -14,7 +14,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.pipeline import pose_check
-from tracker.pipeline.pose_check import PoseInRun, checked_pose, frames_around
+from tracker.pipeline.pose_check import PoseInRun, checked_pose, compared_pose, frames_around
 from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.chamfer.settings import TrackSettings
 
@@ -48,7 +48,8 @@ def assessed(run, values):
     session, poses, observer = run
     record = replace(poses[WRONG_FRAME].record, values=values, status="", limbs_lost=(), keyframe=True)
     known = {k: [p.body.values] for k, p in poses.items()} | {WRONG_FRAME: [values]}
-    return checked_pose(session, observer, TrackSettings(), PoseInRun(WRONG_FRAME, 0, record, known))
+    found = compared_pose(session, observer, TrackSettings(), PoseInRun(WRONG_FRAME, 0, known))
+    return checked_pose(session.people[0].model, record, found)
 
 
 @pytest.mark.slow
@@ -69,10 +70,10 @@ def test_a_right_pose_is_good_and_a_wrong_one_says_where(run):
 def test_one_camera_or_one_frame_assesses_nothing(run, n_views, around):
     session, poses, observer = run
     known = {k: [poses[k].body.values] for k in range(WRONG_FRAME - around, WRONG_FRAME + 1)}
-    pose = PoseInRun(WRONG_FRAME, 0, poses[WRONG_FRAME].record, known)
+    pose = PoseInRun(WRONG_FRAME, 0, known)
     found = f"found {n_views} cameras and poses on {around} frames around; it stays without a status"
     with pytest.raises(TrackerError, match=found):
-        checked_pose(session, observer.with_cameras(range(n_views)), TrackSettings(), pose)
+        compared_pose(session, observer.with_cameras(range(n_views)), TrackSettings(), pose)
 
 
 def test_the_poses_around_are_compared_and_stay(run, monkeypatch):
@@ -83,11 +84,16 @@ def test_the_poses_around_are_compared_and_stay(run, monkeypatch):
     known = {k: [p.body.values] for k, p in poses.items()}
     record = replace(poses[WRONG_FRAME].record, remark="by hand", keyframe=True)
     shown = []
-    found = checked_pose(
-        session, observer, TrackSettings(), PoseInRun(WRONG_FRAME, 0, record, known, active),
+    other = poses[WRONG_FRAME + 1].body.values
+    compared = compared_pose(
+        session, observer, TrackSettings(), PoseInRun(WRONG_FRAME, 0, known, [other], active),
         lambda stage, share, text="": shown.append((stage, share)),
     )  # fmt: skip
+    found = checked_pose(model, record, compared)
     (asked,) = estimate.asked
+    assert {at: [p.pose.tobytes() for p in own] for at, own in asked.proposals.items()} == {
+        (WRONG_FRAME, 0): [other.tobytes()]
+    }
     assert sorted(asked.poses) == list(range(WRONG_FRAME - 8, WRONG_FRAME + 9))
     assert (asked.stays, asked.subjects.tracked, dict(asked.subjects.keyframes)) == (True, (0,), {})
     np.testing.assert_array_equal(asked.subjects.active_dofs[0], active)

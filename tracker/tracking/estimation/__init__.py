@@ -6,17 +6,16 @@ Trackers share it: a method brings settings that extend `settings.EstimationSett
 """
 
 __all__ = [
-    "alternative_poses",
     "assessment",
     "forward_pass",
     "frame_estimator",
     "frame_problem",
     "incremental_fit",
     "limb_recovery",
-    "limb_repair",
     "options",
     "part_evidence",
     "pose_score",
+    "region_scorer",
     "settings",
     "start_pose",
 ]

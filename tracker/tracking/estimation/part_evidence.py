@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from tracker.appearance.part_drawing import draw_bodies
 from tracker.appearance.region_cells import cells_of
-from tracker.appearance.region_deficit import elsewhere_nats
 from tracker.appearance.region_learning import LearningFrame, learn_regions
 from tracker.appearance.region_model import RegionModel, RegionScore
 from tracker.body.limbs import display_name
@@ -23,10 +22,13 @@ from tracker.compute.progress import Report, unreported
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, with_colors_only
 from tracker.fitting.clocked_residuals import person_residuals
+from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies
-from tracker.tracking.estimation.limb_repair import MIN_GAIN_NATS
 from tracker.tracking.view_regions import read_views
+
+_CONTRADICTING_NATS = 2 * CLEAR_NATS
+"""Evidence below the usual from which a part in a view contradicts a pose, nats: 400 to 1."""
 
 
 class SeenFrame(NamedTuple):
@@ -50,8 +52,6 @@ class PartTable(NamedTuple):
     """Evidence of the colours below the usual of as many samples, (V, n_parts), nats; negative where it is above."""
     below_in_all: Array
     """Evidence of the colours in all views below the usual, (n_parts,), nats. A part that is hidden lacks it, too."""
-    elsewhere: Array
-    """How much likelier each part is elsewhere, (n_parts,), nats; see `region_deficit.elsewhere_nats`."""
     outside: Array
     """Share of the part outside the silhouette, (V, n_parts)."""
     usual_outside: Array
@@ -97,9 +97,8 @@ class UsualEvidence:
             for cells in (self.rates * score.samples - score.nats, seen.outside, seen.contour_px)
         )
         parts, total = parts_of(self.known.models, person), score.nats.sum(axis=0)
-        elsewhere = elsewhere_nats(np.vstack([self.nats, total]), self.known.models)[-1]
         return PartTable(
-            below[:, parts], (np.median(self.nats, axis=0) - total)[parts], elsewhere[parts], outside[:, parts],
+            below[:, parts], (np.median(self.nats, axis=0) - total)[parts], outside[:, parts],
             self.outside[:, parts], contour_px[:, parts], self.contour_px[:, parts],
         )  # fmt: skip
 
@@ -152,11 +151,11 @@ def contradiction(model: BodyModel, table: PartTable, thetas_px: Array, views: S
         views: names of the views.
     """
     names, below = [display_name(p.name) for p in model.parts], np.nan_to_num(table.below)
-    if below.max() > MIN_GAIN_NATS:
+    if below.max() > _CONTRADICTING_NATS:
         view, part = _largest(below)
         return Contradiction(part, view, f"{names[part]}: {_off(table, view, part)} in {views[view]}")
     hidden = np.where(np.isnan(table.below).all(axis=0), table.below_in_all, 0.0)
-    if hidden.max() > MIN_GAIN_NATS:
+    if hidden.max() > _CONTRADICTING_NATS:
         part = int(hidden.argmax())
         return Contradiction(part, None, f"{names[part]}: hidden in all views, which usually show it")
     excess = np.nan_to_num(table.contour_px - table.usual_contour_px)

@@ -144,24 +144,12 @@ def common_evidence(
 
 
 def scorer_without_prediction(
-    views: Sequence[ViewEvidence], bodies: Bodies, person: int, settings: EstimationSettings,
-    part_colors: PartColors | None = None, active_dofs: NDArray[np.bool_] | None = None,
-) -> PoseScorer:  # fmt: skip
-    """Return a scorer of the poses of one person on common evidence, whose priors are those of every frame.
-
-    Args:
-        views: the evidence.
-        bodies: all people; the others stay.
-        person: index of the person.
-        settings: of the tracker.
-        part_colors: colours of the parts; None where they are unknown.
-        active_dofs: degrees of freedom that may move, (n_dofs,); None: all.
-    """
+    views: Sequence[ViewEvidence], bodies: Bodies, person: int, settings: EstimationSettings
+) -> PoseScorer:
+    """Return a scorer of the poses of one person on common evidence, whose priors are those of every frame."""
     residuals, priors, keypoints = without_prediction(views, bodies, person, settings)
-    known = None if settings.recover is None else part_colors
-    recover = settings.recover or RecoverSettings()
-    all_priors = [*priors, *keypoints]
-    return PoseScorer.of(residuals, all_priors, Colors(views, bodies, person), known, recover, active_dofs)
+    colors, recover = Colors(views, bodies, person), settings.recover or RecoverSettings()
+    return PoseScorer.of(residuals, [*priors, *keypoints], colors, None, recover)
 
 
 class FrameBlocks(NamedTuple):

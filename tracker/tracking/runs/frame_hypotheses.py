@@ -16,8 +16,8 @@ from tracker.fitting.keypoints import keypoint_blocks, keypoints_of
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.tracking.confidence import views_of_limbs
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
-from tracker.tracking.estimation.limb_repair import FrameEvidence, RegionScorer, with_regions
 from tracker.tracking.estimation.pose_score import PoseScorer, without_prediction
+from tracker.tracking.estimation.region_scorer import FrameEvidence, RegionScorer, with_regions
 from tracker.tracking.estimation.settings import OWN_TRUST, EstimationSettings, RecoverSettings, trust
 from tracker.trajectory.hypotheses import DISTINCT_M, HypothesisSet
 from tracker.trajectory.motion_model import motion_points

@@ -5,6 +5,7 @@ Ann. Math. Stat. 29:614). The hypotheses are those of all views, scored again wi
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from tracker.tracking.confidence import OFF_ODDS, probabilities
 from tracker.tracking.estimation.assessment import part_costs_px
 from tracker.tracking.runs.frame_hypotheses import FrameHypotheses
 from tracker.tracking.runs.path_search import PathSearch
-from tracker.trajectory.hypotheses import HypothesisSet, Paths, all_together, cheapest, through
+from tracker.trajectory.hypotheses import HypothesisSet, Paths, all_together, through
 from tracker.trajectory.solve import SolvedPath
 
 DOUBTFUL_MASS = float(probabilities(np.array(OFF_ODDS)))
@@ -48,8 +49,8 @@ class RunPose(NamedTuple):
     is_searched: bool
     """Whether limbs were searched on the frame."""
     others: tuple[Hypothesis, ...]
-    """Poses with a limb elsewhere on paths of more than `DOUBTFUL_MASS`, cheapest first. Their costs are relative to
-    that of the likeliest path, nats."""
+    """Poses with a limb elsewhere on paths of more than `DOUBTFUL_MASS`, cheapest first. Their costs are those of the
+    frame relative to that of the pose, nats."""
     cost_px: float = np.nan
     """Cost of the poses of all people on the frame, px of the footage."""
     view_costs_px: tuple[float, ...] = ()
@@ -89,7 +90,9 @@ def assessed_path(
         against = tuple(f"{names[p]} elsewhere in {cameras[v]}" for p, v in zip(parts[t], views[t], strict=True))
         costs, entry = frame.part_costs(pose), _entry(frame, first[t], pose)
         is_shown = frame.views_of_limbs(pose, costs).sum(axis=0) >= min(2, len(cameras))
-        known = by_colors[t], against, is_shown, t in search.searched, others[t]
+        own = frame.nats(pose) if others[t] else 0.0
+        ranked = tuple(replace(h, cost=h.cost - own) for h in others[t])
+        known = by_colors[t], against, is_shown, t in search.searched, ranked
         out.append(RunPose(pose, entry, part_costs_px(frame.evidence.views, costs), errors, masses[t], *known))
     return out
 
@@ -104,14 +107,13 @@ def compared(
     model: BodyModel, paths: Paths, sets: Sequence[HypothesisSet], poses: Array
 ) -> tuple[Array, list[tuple[Hypothesis, ...]]]:
     """Return the mass of the paths on which a point of each limb is more than `SAME_POSE_M` elsewhere than in poses,
-    (T, n_values): (T, n_limbs). Return also the hypotheses of each frame by which a limb is doubtful."""
+    (T, n_values): (T, n_limbs). Return also the hypotheses by which a limb is doubtful, by frame, cheapest first."""
     motion = paths.motion_nats(sets)
     masses, elsewhere, others = _path_masses(motion, sets), list[Array](), list[tuple[Hypothesis, ...]]()
-    of_frames = through([s.costs() for s in sets], motion, cheapest)
-    for own, mass, costs, pose in zip(sets, masses, of_frames, poses, strict=True):
+    for own, mass, pose in zip(sets, masses, poses, strict=True):
         elsewhere.append(mass @ _apart(model, own.poses, pose))
-        here, likely = PosedBody(model, pose), np.flatnonzero(mass > DOUBTFUL_MASS)
-        found = [Hypothesis(PosedBody(model, own.poses[i]), own.sources[i], costs[i] - costs.min()) for i in likely]
+        here, costs, likely = PosedBody(model, pose), own.costs(), np.flatnonzero(mass > DOUBTFUL_MASS)
+        found = [Hypothesis(PosedBody(model, own.poses[i]), own.sources[i], float(costs[i])) for i in likely]
         others.append(tuple(h for h in distinct(found) if distance_m(h.body, here) > SAME_POSE_M))
     return np.array(elsewhere), others
 

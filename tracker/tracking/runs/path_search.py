@@ -14,11 +14,11 @@ import numpy as np
 
 from tracker.appearance.part_colors import PartColors
 from tracker.appearance.region_deficit import elsewhere_nats, worst_parts
-from tracker.body.limbs import Limb
-from tracker.fitting.hypothesis import BEAM_NATS
+from tracker.body.limbs import Limb, limbs
+from tracker.body.model import BodyModel
+from tracker.fitting.hypothesis import BEAM_NATS, CLEAR_NATS
 from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.estimation.limb_recovery import search_limbs
-from tracker.tracking.estimation.limb_repair import limbs_to_search
 from tracker.tracking.runs.frame_hypotheses import FrameHypotheses, Proposal
 from tracker.tracking.runs.proposals import combined, continued
 from tracker.trajectory.hypotheses import DISTINCT_M, HypothesisSet, Paths, motion_nats
@@ -157,7 +157,7 @@ class PathSearch:
         """Yield the frames on which limbs are to be searched: once, and again where the pose is another one."""
         elsewhere, *_ = self.elsewhere(self.poses)
         for t in self._free():
-            lost = limbs_to_search(self.model, elsewhere[t])
+            lost = _limbs_to_search(self.model, elsewhere[t])
             points, before = self.model.points_world(self.poses[t]), self._searched.get(t)
             is_new = before is None or np.linalg.norm(points - before, axis=1).max() >= DISTINCT_M
             if lost and is_new:
@@ -173,3 +173,10 @@ class PathSearch:
         start = scorer.fitted(self.model, self.poses[t])
         found = search_limbs(self.model, lost, start, [self.poses[k] for k in self._beside(t)], scorer)
         frame.add([Proposal(h.pose, "limbs") for h in found])
+
+
+def _limbs_to_search(model: BodyModel, elsewhere: Array) -> list[Limb]:
+    """Return the limbs of several parts that are clearly likelier elsewhere, (n_limbs,), nats, the likeliest first; see
+    `region_deficit.elsewhere_nats`."""
+    of_body = limbs(model)
+    return [of_body[i] for i in np.argsort(-elsewhere) if elsewhere[i] > CLEAR_NATS and len(of_body[i].parts) > 1]

@@ -22,8 +22,8 @@ from tracker.evidence.view_evidence import ViewEvidence, with_colors_only
 from tracker.geometry.arrays import Array
 from tracker.motion.velocity import velocity
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
-from tracker.tracking.estimation.limb_repair import FrameEvidence
 from tracker.tracking.estimation.pose_score import common_evidence
+from tracker.tracking.estimation.region_scorer import FrameEvidence
 from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
 from tracker.tracking.runs.frame_hypotheses import FrameHypotheses, Proposal
 from tracker.tracking.runs.path_assessment import RunPose, assessed_path

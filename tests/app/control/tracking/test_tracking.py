@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_estimate import FakeEstimate
 from fake_tracker import STEP_M
 from gestures import FRONT, PAGE, drag, wait_for
+from run_poses import Estimate, doubted
 
 from app.state.run_choices import RunChoices
 from tracker.errors import SessionError, TrackerError
@@ -374,7 +374,7 @@ def test_a_run_survives_a_restart(placed, tracker, opened):
 @pytest.fixture
 def estimate(tracker, monkeypatch):
     """Runs end with the estimate of all frames together, which finds everybody a step aside."""
-    tracker.whole_runs, found = True, FakeEstimate(STEP_M, doubted=(7,))
+    tracker.whole_runs, found = True, Estimate(STEP_M, doubted(7))
     monkeypatch.setattr(track_session, "estimate_run", found)
     return found
 

@@ -82,5 +82,5 @@ def test_poses_that_the_evidence_without_a_view_prefers_are_kept(gavrila, raised
     sets = [frame(gavrila, [here, other, near], nats), frame(gavrila, [here, other], [[0.0] * 3, [20.0] * 3])]
     paths = Paths(acceleration(np.arange(2) / 25.0), motion_points(gavrila).groups)
     _, (first, second) = compared(gavrila, paths, sets, np.array([here, here]))
-    assert [(h.pose.tobytes(), h.cost) for h in first] == [(other.tobytes(), 32.0)]
+    assert [(h.pose.tobytes(), h.cost) for h in first] == [(other.tobytes(), 50.0)]
     assert second == ()

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.control.session.session_state import SessionState
+from app.control.tracking import track_settings
+from app.control.tracking.poses_around import pose_in_run
 from app.remedies import page_text
 from app.runtime.jobs import LatestWinsWorker
 from app.state.identity import Identity
@@ -16,21 +18,19 @@ from app.state.reason import RankedPose, Reason
 from app.state.state import State
 from tracker.appearance.background_density import MIN_SEEN
 from tracker.appearance.region_learning import learning_frames
-from tracker.body.limbs import limb_display_name, movable
+from tracker.body.limbs import limb_display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
-from tracker.tracking.estimation.alternative_poses import Tried, alternative_poses, limbs_in_doubt
+from tracker.pipeline.pose_check import compared_pose
 from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.part_evidence import UsualEvidence, contradiction, learn_run, read_frame
 
 _LOG = logging.getLogger(__name__)
 _REST_S = 0.1
 """Minimum time between two reasons; the pose may change faster."""
-_AROUND = (-3, -1, 1, 3)
-"""Frames around whose limbs are tried as they are."""
 _GIVE_WAY_S = 0.05
 """Time between two looks at whether a drag has ended, which goes first."""
 
@@ -113,7 +113,7 @@ class Reasons:
             run = self._run(people)
             found = self._explained(state, run, people)
             self._set(found=found, message="")
-            self._set(found=self._with_alternatives(state, run, people, found))
+            self._set(found=self._with_alternatives(state, found))
         except _StoppedError:
             if self._stopping.is_set():
                 self._computed = ()
@@ -166,34 +166,25 @@ class Reasons:
         worst = contradiction(state.models[person], table, seen.thetas_px, session_state.session.camera_names)
         return Reason(state.frame, person, state.people[person].values, table, worst)
 
-    def _with_alternatives(self, state: State, run: UsualEvidence, people: tuple[int, ...], found: Reason) -> Reason:
-        """Return a reason with the stored alternatives of its pose, and those that a search of limbs in doubt finds."""
-        shown, model = state.people[found.person], state.models[found.person]
-        active = self._session_state.active_dofs(found.person)
-        searched = [] if shown.status == "good" else movable(limbs_in_doubt(model, found.table), active)
-        if not shown.alternatives and not searched:
+    def _with_alternatives(self, state: State, found: Reason) -> Reason:
+        """Return a reason with the other poses that may be as likely, by the frames around."""
+        session_state, person = self._session_state, found.person
+        observer = session_state.frames.observer.in_time()
+        pose = pose_in_run(session_state, person, found.frame, state.people[person].alternatives)
+        is_comparable = len(observer.cameras) > 1 and len(pose.known) > 1 and found.frame in pose.known
+        if not is_comparable or state.revisions[person] != state.present[person]:
             return replace(found, alternatives=())
-        names = tuple(limb_display_name(x.name) for x in searched)
-        self._report(f"searching the {' and the '.join(names)}" if names else "comparing alternatives", 0.0)
-        others = alternative_poses(
-            run.known, self._session_state.frames.observer, state.frame, _bodies(state, people),
-            people.index(found.person), state.settings,
-            Tried(shown.alternatives, searched, self._around(state), active),
-        )  # fmt: skip
-        present = PosedBody(model, found.values)
+        here = [*pose.known[found.frame]]
+        here[person] = found.values
+        settings = track_settings.of_estimates(state.settings, state.run_choices)
+        pose = replace(pose, known={**pose.known, found.frame: here})
+        run = compared_pose(session_state.session, observer, settings, pose, self._report)
+        present = PosedBody(state.models[person], found.values)
         ranked = tuple(
-            RankedPose(o.pose, o.cost, tuple(map(limb_display_name, limbs_elsewhere(present, o.body)))) for o in others
+            RankedPose(o.pose, o.cost, tuple(map(limb_display_name, limbs_elsewhere(present, o.body))))
+            for o in run.others
         )
-        return replace(found, searched=names, alternatives=ranked)
-
-    def _around(self, state: State) -> list[Array]:
-        """Return the poses of the selected person on frames around, (n_values,) each, if they are of the same body."""
-        session_state, person = self._session_state, state.person
-        if state.revisions[person] != state.present[person]:
-            return []
-        with session_state.lock:
-            found = [session_state.saver.pose_now(person, state.frame + step) for step in _AROUND]
-        return [values for values in found if values is not None]
+        return replace(found, alternatives=ranked)
 
     def _run(self, people: tuple[int, ...]) -> UsualEvidence:
         """Return what is usual in the run, learnt if that is to do."""
