@@ -318,12 +318,10 @@ def track_between(session: "Session", plan: "TrackPlan", progress: Reporter) -> 
     from app.cli.track_report import ChainProgress, summarize
     from tracker.pipeline.chain import open_stored_session
     from tracker.pipeline.keyframe_stretches import frames_of
-    from tracker.tracking.estimation.settings import EstimationSettings
 
-    if not (plan.settings.whole_run and isinstance(plan.settings, EstimationSettings)):
+    if not plan.settings.whole_run:
         raise TrackerError(
-            "expected a backward pass with --between-keyframes, found a run without one; leave out --no-whole-run, or "
-            "choose another --method"
+            "expected a backward pass with --between-keyframes, found a run without one; leave out --no-whole-run"
         )
     names = [p.name for p in session.people]
     out: dict[str, Any] = {"stretches": [], "runs": []}

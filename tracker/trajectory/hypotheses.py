@@ -134,13 +134,14 @@ class Paths:
 
     def likeliest(self, sets: Sequence[HypothesisSet]) -> tuple[IntArray, list[Array]]:
         """Return the hypothesis of each frame on the likeliest path, (T,), and the cost of the cheapest path through
-        each hypothesis, (K,) each. The motion is learnt from the path first."""
-        for _ in range(3):
+        each hypothesis, (K,) each. The motion is learnt from the path, until the path stays."""
+        path, found = np.full(len(sets), -1), list[Array]()
+        for _ in range(LEARNING_ROUNDS):
             found = through([s.costs() for s in sets], self.motion_nats(sets), cheapest)
-            path = np.array([int(f.argmin()) for f in found])
-            before, self.motion = self.motion, self._learned([s.places[i] for s, i in zip(sets, path, strict=True)])
-            if before is None and self.motion is None:
+            before, path = path, np.array([int(f.argmin()) for f in found])
+            if np.array_equal(path, before):
                 break
+            self.motion = self._learned([s.places[i] for s, i in zip(sets, path, strict=True)])
         return path, found
 
     def _learned(self, places: Sequence[Array]) -> MotionModel | None:
