@@ -133,11 +133,12 @@ class Case:
         self.rng = np.random.default_rng((seed, 3))
         self.stated_m = self.height_m * float(np.exp(0.05 * self.rng.normal()))
 
-    def found(self, points, skeleton=None, axes="x,y,z", in_space=True):
+    def found(self, points, skeleton=None, axes="x,y,z", in_space=True, known_people=None, is_everybody=True):
         """Reasons against points that are read as a skeleton, by default their own."""
         given = Reading(skeleton or self.skeleton, axes)
         same_size = [m for m in SKELETONS.values() if len(m.points) == len(given.joint_map.points)]
         maps = [given.joint_map, *(m for m in same_size if m.name != given.joint_map.name)]
         frames = np.arange(len(points))
-        read = ReadPoints((), points[:, None], frames, (self.stated_m,), UP, FPS, self.film)
+        people = known_people or self.film
+        read = ReadPoints((), points[:, None], frames, (self.stated_m,), UP, FPS, people, is_everybody)
         return contradictions(read, given, maps, 0, in_space)

@@ -132,7 +132,8 @@ def _with_film(
     session: Session, frames: IntArray, names: tuple[str, ...], points: Array, statures: tuple[float, ...]
 ) -> ReadPoints:
     up = floor_plane(session.up, session.floor).normal
-    return ReadPoints(names, points, frames, statures, up, session.fps, film_people(session, frames))
+    is_everybody = len(statures) == len(session.people)
+    return ReadPoints(names, points, frames, statures, up, session.fps, film_people(session, frames), is_everybody)
 
 
 def _window(points: Array, fps: float) -> IntArray:

@@ -107,6 +107,8 @@ class ReadPoints:
     """Frames of the session per second."""
     known_people: KnownPeople | None
     """The people of the recording on these frames; None for the body alone."""
+    is_everybody: bool = True
+    """Whether the recording has nobody else."""
 
     @property
     def step(self) -> int:
@@ -213,8 +215,13 @@ class ReadPoints:
         return combined_lag([find_lag(e, most * self.step, n_rows) for e in errors])
 
     def _place_nats(self, reading: Reading) -> float:
-        """Return the log likelihood of a reading by where people are, up to a constant; at most 0."""
-        return self._weight * float(np.nan_to_num(self.misplaced(reading)))
+        """Return the log likelihood of a reading by where people are, up to a constant; at most 0.
+
+        Beside other people, a place counts only where it is refuted: those who are nearer to another one's place are
+        no reason to put them there.
+        """
+        off = float(np.nan_to_num(self.misplaced(reading)))
+        return self._weight * (off if self.is_everybody else max(off, PRIORS.most_off))
 
     @property
     def _weight(self) -> float:

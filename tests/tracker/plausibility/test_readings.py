@@ -41,6 +41,32 @@ def test_other_axes_are_named(case):
         assert found == [] or (is_mirrored(words) and found[0].remedy.code == "turn_axis")
 
 
+class BesideAnother:
+    """Silhouettes in which a person fits the place of another one better than their own, by mean truncated squares."""
+
+    n_views, knows_frames = 4, False
+
+    def __init__(self, own):
+        self.own, self.certain = own, self
+
+    def costs(self, places):
+        (points,) = list(places.values())[:1]
+        return np.where(points[:, 0] > 0, self.own, 0.0)
+
+    def lag_errors_m(self, places, most):
+        return []
+
+
+@pytest.mark.parametrize(
+    ("own", "is_everybody", "is_asked"), [(0.4, True, True), (0.4, False, False), (0.6, False, True)]
+)
+def test_another_ones_place_is_no_reason_to_turn_a_person_round(own, is_everybody, is_asked):
+    case = Case(0)
+    points = np.add(case.points, (5.0, 0.0, 0.0))
+    found = case.found(points, known_people=BesideAnother(own), is_everybody=is_everybody)
+    assert fields(found, "axes") == ["-x,-y,z"] * is_asked
+
+
 @pytest.mark.parametrize("factor", [1000.0, 100.0, 1 / 0.0254, 1 / 0.3048, 0.3048, 0.0254])
 def test_other_units_are_named(case, factor):
     found = case.found(factor * case.points)
