@@ -138,14 +138,21 @@ def assessed(folder: Path, person: int, reference: Path) -> Assessed:
     )
 
 
-def measured(folder: Path, references: Sequence[Path]) -> Iterator[Compared]:
-    """Track copies of a session by the first pass and by the whole run; yield the comparison of each person."""
+def measured(folder: Path, references: Sequence[Path], n_cameras: int | None = None) -> Iterator[Compared]:
+    """Track copies of a session by the first pass and by the whole run; yield the comparison of each person.
+
+    Args:
+        folder: of the session.
+        references: the known joints of each person.
+        n_cameras: how many cameras are used, the first ones; None for all.
+    """
     runs, seconds = [], []
+    used = ("--cameras", *load_session(folder).camera_names[:n_cameras]) if n_cameras else ()
     for options in (("--no-whole-run",), ()):
         with tempfile.TemporaryDirectory() as scratch:
             at = Path(shutil.copytree(folder, Path(scratch) / "session"))
             before = processor_s()
-            quadrille("track", at, *options)
+            quadrille("track", at, *options, *used)
             seconds.append(processor_s() - before)
             runs.append([assessed(at, i, path) for i, path in enumerate(references)])
     for reference, first, whole in zip(references, *runs, strict=True):
