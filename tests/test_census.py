@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 from architecture import FILES, nodes, trees
 
-MAX_CONSTANTS, MAX_UNDOCUMENTED = 581, 0
+MAX_CONSTANTS, MAX_UNDOCUMENTED = 578, 0
 """Present numbers; calibration added 80, imported observations 30. Each constant has its unit, and its source or the
 benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
 MAX_HIDDEN_SUBJECTS = 25

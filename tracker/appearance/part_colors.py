@@ -51,8 +51,6 @@ class PartColors(NamedTuple):
 
     log_ratios: Array
     """Log of how much likelier each colour is on the part than elsewhere, (n_parts, BINS^3), nats."""
-    usual: Array
-    """Mean log ratio under each part where it was first learnt, (n_parts,), nats."""
     shares: Array
     """Share of each colour under each part, (n_parts, BINS^3)."""
     around: Array
@@ -68,8 +66,6 @@ class ColorScore(NamedTuple):
     """Mean log ratio under each part, (n_parts,), nats; 0 if it is not visible."""
     samples: Array
     """Visible samples of each part, (n_parts,)."""
-    views: Array
-    """Mean log ratio under each part in each view, (V, n_parts), nats; NaN where little of it is visible."""
 
 
 class _Samples(NamedTuple):
@@ -129,19 +125,17 @@ class Colors:
                 part may be elsewhere.
         """
         model = self._bodies[self._person].model
-        parts, colors, _ = self._samples(self._bodies[self._person].values)
+        parts, colors = self._samples(self._bodies[self._person].values)
         twins = counterparts([model])
         seen = np.zeros((len(model.parts), BINS**3))
         np.add.at(seen, (parts, colors), 1.0)
         seen = np.array([_share(s) for s in seen])
         around = _share(np.sum([v.color_counts for v in self._shown], axis=0) + np.zeros(BINS**3))
-        usual = None
         if before is not None:
             now, samples = _mean_by_part(before.log_ratios[parts, colors], parts, len(model.parts))
             trusted = (samples > 0) & (now > 0)
             seen = before.shares + share * trusted[:, None] * (seen - before.shares)
             around = before.around + share * (around - before.around)
-            usual = before.usual
         # Half of the alternative to a part's colours is the rest of the body, however small it is in the image.
         other = 0.5 * smoothed(around) + 0.5 * _share(smoothed(seen.sum(axis=0)))
         blank = seen.sum(axis=1, keepdims=True) == 0
@@ -150,19 +144,15 @@ class Colors:
         ratios = np.log(((1 - DOUBT) * own + DOUBT * other + 1e-7) / (other + 1e-7))
         ratios[own.sum(axis=1) == 0] = 0.0
         ratios = np.clip(ratios, -MAX_NATS, MAX_NATS)
-        if usual is None:
-            usual = _mean_by_part(ratios[parts, colors], parts, len(model.parts))[0]
-        return PartColors(ratios, usual, seen, around)
+        return PartColors(ratios, seen, around)
 
     def score(self, pose: Array, known: PartColors) -> ColorScore:
         """Return how well the colours under the person in a pose, (n_values,), match the learnt colours of its
         parts."""
         n_parts = known.log_ratios.shape[0]
-        parts, colors, views = self._samples(pose)
+        parts, colors = self._samples(pose)
         nats = known.log_ratios[parts, colors]
-        means, samples = _mean_by_part(nats, views * n_parts + parts, len(self._views) * n_parts)
-        by_view = np.where(samples < MIN_SAMPLES, np.nan, means).reshape(-1, n_parts)
-        return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, n_parts), by_view)
+        return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, n_parts))
 
     def nats(self, poses: Array, known: PartColors) -> Array:
         """Return `score(...).nats` of many poses, (C, n_values), (C,)."""
@@ -218,8 +208,8 @@ class Colors:
             out.append(_Moment(time, np.flatnonzero(times == time), part_poses(ahead(self._bodies, time))))
         return out
 
-    def _samples(self, pose: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-        """Return part, colour and view of each visible sample, (n,) each; the views are in their order."""
+    def _samples(self, pose: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return part and colour of each visible sample, (n,) each, view by view."""
         body = self._bodies[self._person]
         samples, n = self._buffers(self._max_samples * len(self._views)), 0
         first, last, Ts = self._own.start, self._own.stop, [np.empty(0)] * len(self._views)
@@ -228,10 +218,8 @@ class Colors:
             for i in moment.views:
                 Ts[i] = placed
         for i, view in enumerate(self._views):
-            end = n + _list_samples(view, Ts[i], self._shapes, first, last, samples._replace(found=samples.found[n:]))
-            samples.found[n:end, 2] = i
-            n = end
-        return samples.found[:n, 0], samples.found[:n, 1], samples.found[:n, 2]
+            n += _list_samples(view, Ts[i], self._shapes, first, last, samples._replace(found=samples.found[n:]))
+        return samples.found[:n, 0], samples.found[:n, 1]
 
     @property
     def _max_samples(self) -> int:
@@ -242,7 +230,7 @@ class Colors:
         """Return buffers for a number of samples."""
         n = len(self._shapes)
         return _Samples(
-            np.empty((n_samples, 3), np.int64), np.empty((n, 13)), np.empty((n, 4)), np.empty(n, np.int64),
+            np.empty((n_samples, 2), np.int64), np.empty((n, 13)), np.empty((n, 4)), np.empty(n, np.int64),
             np.empty((4, 3)),
         )  # fmt: skip
 

@@ -91,18 +91,13 @@ class Sums(NamedTuple):
     """Gradient by each part's twist, (P, 6)."""
     parts: Array
     """Per view and part: visible length, its summed cut-off distance, and explained points, (V, P, 3)."""
-    silhouette: Array
-    """Explained silhouette points of each view, (V,)."""
     costs: Array
     """Cost of each view, (V,)."""
 
 
 def sums_buffer(n_parts: int, n_views: int) -> Sums:
     """Return uninitialized sums."""
-    return Sums(
-        np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((n_views, n_parts, 3)), np.empty(n_views),
-        np.empty(n_views),
-    )  # fmt: skip
+    return Sums(np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((n_views, n_parts, 3)), np.empty(n_views))
 
 
 class ContourTerm(NamedTuple):

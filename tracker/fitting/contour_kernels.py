@@ -75,29 +75,21 @@ def _image_to_model(
     s2, limit, cost = np.float32((scale * theta) ** 2), np.float32(theta * theta), 0.0
     start, stop = views.firsts[view], views.firsts[view + 1]
     us, vs, q, of = views.points[0][start:stop], views.points[1][start:stop], scratch.segments, scratch.of_segment
-    weights, counts, of_silhouette = (
-        views.points[4][start:stop],
-        views.points[5][start:stop],
-        views.points[6][start:stop],
-    )
+    weights, counts = views.points[4][start:stop], views.points[5][start:stop]
     best, nearest, pulls = scratch.best, scratch.nearest, scratch.pulls
     match_points(view, n_segments, views, turn, static, scratch)
-    n, pull, explained = np.uint64(stop - start), scratch.pull, 0.0
+    n, pull = np.uint64(stop - start), scratch.pull
     for j in range(n):
         squared = min(best[j], limit)
         f = s2 / (s2 + squared)
         cost += weights[j] * (f * squared)
         pull[j] = weight * weights[j] * (f * f)
     for j in range(n):
-        if best[j] >= limit:
-            continue
-        if not with_jacobian:  # part costs count explained points
-            explained += of_silhouette[j]
-        if nearest[j] < 0:
+        if best[j] >= limit or nearest[j] < 0:
             continue
         k = np.uint64(nearest[j])
         part = of[2, k]
-        if not with_jacobian:
+        if not with_jacobian:  # part costs count explained points
             sums.parts[view, part, 2] += counts[j]
             continue
         if not static.moves[part]:
@@ -121,7 +113,6 @@ def _image_to_model(
         pulls[4, i] += w * gv * gv
         pulls[5, i] += w * d * gu
         pulls[6, i] += w * d * gv
-    sums.silhouette[view] = explained
     return 0.5 * float(weight) * cost
 
 
@@ -140,7 +131,6 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
     sums.M[:] = 0.0
     sums.b[:] = 0.0
     sums.parts[:] = 0.0
-    sums.silhouette[:] = 0.0
     sums.costs[:] = 0.0
     pixel, cost, caches = np.int64(0), 0.0, static.best.shape[0] > 0  # a literal 0 has a type of its own
     stale = caches and not is_static_unchanged(Ts, static.moves, static.Ts)

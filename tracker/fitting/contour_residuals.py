@@ -95,8 +95,6 @@ class PartCosts(NamedTuple):
     visible."""
     points: Array
     """Number of points of edges and silhouette that the part explains, (V, n_parts)."""
-    silhouette: Array
-    """Share of the silhouette's contour that some part explains, (V,); NaN in views without a silhouette."""
 
 
 class PieceSums(NamedTuple):
@@ -164,9 +162,6 @@ class ContourResiduals:
             for v, contour, theta in zip(views, near, thetas, strict=True)
         ]
         sorted_points = [sort_points(p, v.camera.size) for p, v in zip(points, views, strict=True)]
-        self._n_silhouette_points = np.array(
-            [0 if v.silhouette is None else len(v.silhouette.points_px) for v in views]
-        )
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         arrays = ViewArrays(
             np.stack([v.camera.projection for v in views]),
@@ -288,9 +283,7 @@ class ContourResiduals:
         sums = self._term.sums
         length, distance, points = np.moveaxis(sums.parts[:, self._own], -1, 0).copy()
         forward = np.divide(distance, length, out=np.full_like(length, np.nan), where=length > 0)
-        total = self._n_silhouette_points
-        silhouette = np.divide(sums.silhouette, total, out=np.full(len(total), np.nan), where=total > 0)
-        return PartCosts(length, forward, points, silhouette)
+        return PartCosts(length, forward, points)
 
     def _accumulate(self, kinematics: Kinematics, with_jacobian: bool = True) -> float:
         self._term.Ts[self._own] = kinematics.Ts_world_part

@@ -14,9 +14,8 @@ from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.images.silhouette_contour import SAME_PX
 
-N_COLUMNS = 7
-"""Columns of a point: u, v, the normal's u and v, the weight, the number of points it stands for, and the number of
-those on the silhouette."""
+N_COLUMNS = 6
+"""Columns of a point: u, v, the normal's u and v, the weight, and the number of points it stands for."""
 _AREA_PX = 8
 """Size of the areas that are classified as near a contour or not, px. It only saves work, so coarse areas suffice."""
 _SAME_COS = 0.9
@@ -40,11 +39,11 @@ def points_to_match(
     weight = 0.0 if shown is None else silhouette * shown.trust
     n_silhouette = len(shown.points_px) if shown is not None and weight > 0 else 0
     points = np.empty((n_edges + n_silhouette, N_COLUMNS), np.float32)
-    points[:n_edges, :2], points[:n_edges, 2:4], points[:n_edges, 4:] = view.points_px, view.normals, (edges, 1.0, 0.0)
+    points[:n_edges, :2], points[:n_edges, 2:4], points[:n_edges, 4:] = view.points_px, view.normals, (edges, 1.0)
     n = n_edges
     if shown is not None and n_silhouette:
         own = points[n_edges:]
-        own[:, :2], own[:, 2:4], own[:, 4:] = shown.points_px, shown.normals, (weight, 1.0, 1.0)
+        own[:, :2], own[:, 2:4], own[:, 4:] = shown.points_px, shown.normals, (weight, 1.0)
         cells = (view.camera.height // SCENE_SPACING_PX + 1, view.camera.width // SCENE_SPACING_PX + 1)
         n = _merge(points, n_edges, np.full(cells, -1, np.int64))
     if contour is None:

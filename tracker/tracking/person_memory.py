@@ -15,11 +15,8 @@ from tracker.tracking.confidence import PoseQuality, Status
 
 _MAX_BACKOFF_FRAMES = 8
 """Longest back-off of a limb that seems lost."""
-_CALM_BACKOFF_FRAMES = 31
-"""Back-off of a limb that does not seem lost itself, where there are several people: the unexplained part of the
-silhouette may be anybody's."""
 _WORSE_NATS = 2.0
-"""The back-off of a limb ends where its search odds are higher by this than before the search that failed, nats. That
+"""The back-off of a limb ends where its odds are higher by this than before the search that failed, nats. That
 search has not seen what now contradicts the limb."""
 _LEARN_FRAMES = 3
 """The colours of the parts are updated every so many frames."""
@@ -63,7 +60,7 @@ class PersonMemory:
         unknown, or known otherwise than from the last pose."""
         self._n_frames = 0
         self._backoffs: dict[str, tuple[int, int]] = {}  # by limb: frame of the last search, back-off
-        self._odds_searched: dict[str, float] = {}  # by limb: search odds before the last search
+        self._odds_searched: dict[str, float] = {}  # by limb: odds before the last search
 
     def predict(self, settings: PredictSettings) -> Array:
         """Return the predicted pose of the next frame, (n_values,)."""
@@ -82,33 +79,26 @@ class PersonMemory:
 
     def search_candidates(self, quality: PoseQuality) -> list[Limb]:
         """Return the limbs worth a search that may move, most likely lost first."""
-        return [x for name in quality.search_candidates(self.alone) for x in self.limbs if x.name == name]
+        return [x for name in quality.limbs_to_search for x in self.limbs if x.name == name]
 
     def limbs_to_search(self, quality: PoseQuality) -> list[Limb]:
         """Return the limbs to search now. After each failed search a limb's back-off doubles.
 
-        A single person's limb that is lost, or more likely elsewhere than not, does not back off. A fast limb is
+        A single person's limb that is more likely off than not does not back off. A fast limb is
         elsewhere in each frame, and predictions from a wrong pose get worse. A limb does not wait
         either if the frame contradicts it much more than that of the last search.
-
-        With several people, an unexplained part of the silhouette alone makes no limb due while another limb of the
-        person seems lost.
 
         Args:
             quality: of the refined pose.
         """
-        candidates, alone = self.search_candidates(quality), self.alone
-        doubtful = [] if alone else [x for x in candidates if x.name in quality.doubtful_limbs(alone)]
-        longest = _MAX_BACKOFF_FRAMES if alone or doubtful else _CALM_BACKOFF_FRAMES
-        urgent = {*quality.missing_limbs, *quality.lost_limbs}
 
         def cooled_down(limb: Limb) -> bool:
-            if alone and (limb.name in urgent or self._is_worse(limb, quality)):
+            if self.alone and (limb.name in quality.missing_limbs or self._is_worse(limb, quality)):
                 return True
             last, backoff = self._backoffs.get(limb.name, (-1, 0))
-            return self._n_frames > last + min(backoff, longest)
+            return self._n_frames > last + backoff
 
-        return [x for x in doubtful or candidates if cooled_down(x)]
+        return [x for x in self.search_candidates(quality) if cooled_down(x)]
 
     def record_search(self, limb: Limb, before: PoseQuality, found: bool) -> None:
         """Record the outcome of a limb search.
@@ -118,14 +108,13 @@ class PersonMemory:
             before: quality of the pose before the search.
             found: whether the limb moved.
         """
-        calm = not (self.alone or limb.name in before.doubtful_limbs(self.alone))
-        longer = max(_CALM_BACKOFF_FRAMES if calm else 1, 2 * self._backoffs.get(limb.name, (0, 0))[1] + 1)
-        self._backoffs[limb.name] = (self._n_frames, 0 if found else min(_CALM_BACKOFF_FRAMES, longer))
-        self._odds_searched[limb.name] = before.search_odds_of(limb.name)
+        longer = min(_MAX_BACKOFF_FRAMES, 2 * self._backoffs.get(limb.name, (0, 0))[1] + 1)
+        self._backoffs[limb.name] = (self._n_frames, 0 if found else longer)
+        self._odds_searched[limb.name] = before.off_odds_of(limb.name)
 
     def _is_worse(self, limb: Limb, quality: PoseQuality) -> bool:
         """Return whether a limb is much more likely lost than before its last search."""
-        return quality.search_odds_of(limb.name) > self._odds_searched.get(limb.name, np.inf) + _WORSE_NATS
+        return quality.off_odds_of(limb.name) > self._odds_searched.get(limb.name, np.inf) + _WORSE_NATS
 
     def update(self, pose: Array, colors: Colors, status: Status, keyframe: bool) -> None:
         """Take in the result of a frame.

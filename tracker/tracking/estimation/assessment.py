@@ -82,12 +82,11 @@ def estimate_at(
 
 def assess(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFit) -> Assessment:
     """Compute the features of a fit from which its status follows."""
-    known, colors = problem.people[person].colors, None
-    if known is not None:
-        colors = problem.colors(person, bodies).score(found.fit.pose, known), known
+    known = problem.people[person].colors
+    colors = None if known is None else problem.colors(person, bodies).score(found.fit.pose, known)
     costs = found.residuals.part_costs(found.fit.pose)
-    predicted, fits = problem.people[person].predicted, (found.fit, problem.freed(person, found))
-    quality = confidence.quality(found.body, fits, costs, problem.views, problem.thetas_px, predicted, colors)
+    predicted, freed = problem.people[person].predicted, problem.freed(person, found)
+    quality = confidence.quality(found.body, freed, costs, problem.views, problem.thetas_px, predicted, colors)
     return Assessment(quality, costs)
 
 

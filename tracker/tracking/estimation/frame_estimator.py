@@ -126,7 +126,7 @@ class FrameEstimator:
         People are searched in parallel, each with the others as they were refined, so that the result does not depend
         on the order.
         """
-        problem, alone = self.problem, len(self.bodies) == 1
+        problem = self.problem
         assessments = map_parallel(lambda p: assess(problem, p, self.bodies, fits[p]), [*fits])
         fits.update({p: fits[p]._replace(assessment=a) for p, a in zip(list(fits), assessments, strict=True)})
         has_edges = any(len(v.points_px) for v in problem.views)
@@ -135,8 +135,7 @@ class FrameEstimator:
         limbs_of = dict[int, list[Limb]]()
         for person, (quality, _) in zip(fits, assessments, strict=True):
             limbs = self._memories[person].limbs_to_search(quality)[:_MAX_LIMBS]
-            candidates = quality.search_candidates(alone) if alone else quality.doubtful_limbs(alone)
-            if limbs or candidates or quality.is_body_lost:
+            if limbs or quality.limbs_to_search or quality.is_body_lost:
                 limbs_of[person] = limbs
         if not limbs_of:
             return

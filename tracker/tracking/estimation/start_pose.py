@@ -108,7 +108,7 @@ def _contradiction(estimate: PersonEstimate) -> int:
     assert quality is not None
     if quality.missing_limbs or quality.is_body_lost:
         return 2
-    return 1 if quality.search_candidates(alone=True) else 0
+    return 1 if quality.limbs_to_search else 0
 
 
 def roughly_known(settings: EstimationSettings) -> EstimationSettings:

@@ -102,7 +102,7 @@ def test_who_was_tracked_before_or_may_not_be_searched_stays(gavrila, truth, vie
 
 
 NOTHING, SUSPECT, MISSING = (
-    SimpleNamespace(missing_limbs=missing, is_body_lost=False, search_candidates=lambda alone, found=found: found)
+    SimpleNamespace(missing_limbs=missing, is_body_lost=False, limbs_to_search=found)
     for missing, found in (((), ()), ((), ("head",)), (("head",), ("head",)))
 )
 
