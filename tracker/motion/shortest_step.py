@@ -54,22 +54,6 @@ def shortest_step(model: BodyModel, to: Array, start: Array) -> Array:
     return _step_and_flips(model, to, start)[0]
 
 
-def unwrapped_path(model: BodyModel, poses: Array) -> tuple[Array, Array]:
-    """Return consecutive poses, (T, n_values), as a path without jumps.
-
-    Returns:
-        The degrees of freedom, (T, n_dofs), which begin at 0. Each step is the shortest.
-        Signs, (T, n_dofs): -1 where a degree of freedom of the path goes the other way than that of the pose.
-    """
-    here, path, signs = poses[0], np.zeros((len(poses), model.n_dofs)), np.ones((len(poses), model.n_dofs))
-    for t in range(1, len(poses)):
-        step, flipped = _step_and_flips(model, poses[t], here)
-        here = model.retract(here, step)
-        path[t] = path[t - 1] + step
-        signs[t, flipped] = -1.0
-    return path, signs
-
-
 def nearest_equivalent(
     model: BodyModel, poses: Array, reference: Array, active_dofs: NDArray[np.bool_] | None = None
 ) -> Array:

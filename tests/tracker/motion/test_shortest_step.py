@@ -7,7 +7,7 @@ from bodies import MODELS
 from tracker.formats.model_toml import load_model
 from tracker.motion.interpolation import interpolate_pose
 from tracker.motion.prediction import PredictSettings, predict
-from tracker.motion.shortest_step import nearest_equivalent, shortest_step, unwrapped_path
+from tracker.motion.shortest_step import nearest_equivalent, shortest_step
 
 BODY = load_model("gavrila38")
 SHOULDER = [BODY.dof_names.index(f"right_shoulder.{name}") for name in ("abduction", "elevation", "twist")]
@@ -60,14 +60,6 @@ def test_only_angles_that_may_wind_are_unwrapped():
         step = shortest_step(BODY, b, a)
         np.testing.assert_allclose(step[winds], way * (4.0 - 2 * np.pi))
         assert step[limited] == pytest.approx(way * 4.0)
-
-
-def test_a_path_has_no_flip():
-    way = [posed(LOWERED + share * (RAISED - LOWERED)) for share in np.linspace(0, 1, 5)]
-    flipped = [*way[:2], posed(other(way[2][SHOULDER])), posed(other(way[3][SHOULDER])), way[4]]
-    path, signs = unwrapped_path(BODY, np.array(flipped))
-    np.testing.assert_allclose(path, unwrapped_path(BODY, np.array(way))[0], atol=1e-12)
-    assert np.argwhere(signs < 0).tolist() == [[2, SHOULDER[1]], [3, SHOULDER[1]]]
 
 
 def test_the_nearest_numbers_within_the_limits():
