@@ -93,9 +93,7 @@ SPARSE_CONDITIONS = CONDITIONS._replace(
     footage=CONDITIONS.footage.replace("25 or 15 frames/s", f"{SPARSE_FPS:.0f} frames/s"),
 )
 FEW_CONDITIONS = CONDITIONS._replace(
-    footage=CONDITIONS.footage.replace(
-        "at 25 or 15 frames/s, four cameras", "at the rates and with the cameras stated"
-    ),
+    footage=CONDITIONS.footage.replace(" at 25 or 15 frames/s, four cameras", ", rates and cameras as stated,"),
 )
 
 
