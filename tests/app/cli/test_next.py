@@ -64,7 +64,6 @@ def test_what_next_and_between_keyframes_refuse(run, session):
     assert_refused(run(*words), ["expected two keyframes with other frames between them in frames 0 to 49, found none"])
     assert_refused(run(*words, "--backward"), ["expected --between-keyframes without --init"])
     assert_refused(run(*words, "--no-whole-run"), ["expected a backward pass with --between-keyframes"])
-    assert_refused(run(*words, "--method", "voxel"), ["found a run without one"])
 
 
 @pytest.mark.slow
@@ -91,3 +90,15 @@ def test_only_stretches_whose_keyframes_changed_are_tracked_again(run, session):
     seams = {e["frame"]: e["seam_mm"] for e in per_frame}
     assert [k for k, seam in seams.items() if seam is None] == [20, 23, 26, 28]
     assert all(0 <= seam < 60 for seam in seams.values() if seam is not None)
+
+
+@pytest.mark.slow
+def test_the_voxel_tracker_runs_between_keyframes(run, session):
+    for k in (20, 24):
+        assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", k)[0] == 0
+    status, out, _ = run("track", session, "--between-keyframes", "--method", "voxel", "--json")
+    assert status == 0
+    assert [(s["first"], s["last"]) for s in json.loads(out)["stretches"]] == [(20, 24)]
+    result = json.loads(run("evaluate", session, "--reference", SAMPLE / "truth.trc", "--json")[1])
+    assert [e["frame"] for e in result["per_frame"]] == [20, 21, 22, 23, 24]
+    assert result["lost_frames"] == 0
