@@ -30,7 +30,7 @@ class Reason:
     contradiction: Contradiction | None
     """The worst cell; None where no view clearly contradicts the pose."""
     alternatives: tuple[RankedPose, ...] | None = None
-    """Those by which a limb is doubtful, cheapest first; None before they are known."""
+    """Poses by which a limb is doubtful, cheapest first; None before they are known."""
 
 
 @dataclass(frozen=True)

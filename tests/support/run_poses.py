@@ -23,7 +23,7 @@ def run_pose(model, pose, **known):
 
 
 def doubted(*frames):
-    """What is known of some frames: another path was taken, and half of the paths have the left arm elsewhere still."""
+    """Facts of some frames: another path was taken, and half of the paths have the left arm elsewhere still."""
     return {frame: {"entry": MOVED, "elsewhere": np.array([0.5, 0.0, 0.0, 0.0])} for frame in frames}
 
 

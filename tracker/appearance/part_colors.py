@@ -72,7 +72,7 @@ class _Samples(NamedTuple):
     """Buffers for the visible samples of one view."""
 
     found: IntArray
-    """Part, colour and view of each sample, (room, 3)."""
+    """Part and colour of each sample, (room, 2)."""
     rays: Array
     """See `ray_transform`, (P, 13)."""
     cones: Array

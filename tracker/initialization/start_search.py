@@ -31,12 +31,12 @@ def search_around(
         settings: of the tracker.
     """
     body, *others = bodies
-    alone, wide = not others, roughly_known(settings)
+    wide = roughly_known(settings)
     for _ in range(MAX_ROUNDS):
         everybody = (body, *others)
         priors = [PersonPrior(b.model, b.values) for b in everybody]
         problem = FrameProblem(read_views(observer, frame, everybody), priors, wide)
-        memory = PersonMemory(body.model, body.values, alone=alone)
+        memory = PersonMemory(body.model, body.values)
         before, (body, _) = body, search_start(problem, 0, everybody, memory, _N_DRAWS)
         if distance_m(before, body) < SAME_POSE_M:
             break

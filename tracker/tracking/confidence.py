@@ -52,6 +52,8 @@ class StatusModel(NamedTuple):
 
 STATUS_MODEL = StatusModel(np.array([2.893, 4.401, -2.282, -2.963, 3.508, 0.282, 13.031, -1.814]), 1.042, -0.973)
 """Log odds by `features`, fitted by `tests/benchmarks/calibrate_status.py`."""
+LOST_NATS = STATUS_MODEL.off - STATUS_MODEL.lost
+"""How much less likely a limb is lost than off, nats."""
 
 
 def _odds(probability: float) -> float:
@@ -62,16 +64,12 @@ def _odds(probability: float) -> float:
 OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.25)
 """A limb is doubtful above these log odds that a joint is off by more than 100 mm, and lost above these that one is by
 more than 150 mm. To call a wrong pose good is the worse error."""
-
-
-_LOST_FORWARD = 0.6
-"""Mean distance of the contour to the edges above which the whole body is lost, in outlier distances."""
-
-
 SEARCH_ODDS = _odds(0.02)
 """A limb is searched above these log odds that it is off: before it is doubtful, because a wrong limb misleads the
 frames after it. With 5%, 41 poses of nine simulated scenes with few pictures are off, with 2% 29; `fast_arms` ends at
 19.7 mm with either."""
+_LOST_FORWARD = 0.6
+"""Mean distance of the contour to the edges above which the whole body is lost, in outlier distances."""
 
 
 class LimbFeatures(NamedTuple):
@@ -127,7 +125,7 @@ class PoseQuality(NamedTuple):
     @property
     def off_odds(self) -> Array:
         """Log odds that a joint of each limb is off by more than 100 mm, (n_limbs,). Limbs are searched by them."""
-        return _log_odds(self) + STATUS_MODEL.off - STATUS_MODEL.lost
+        return _log_odds(self) + LOST_NATS
 
     def off_odds_of(self, limb: str) -> float:
         """Return the log odds by which the limb of a name is searched."""
@@ -219,7 +217,7 @@ def quality(
         color = np.where(colors.samples >= MIN_SAMPLES, colors.parts, np.inf)
     free_spreads = scale * _end_spreads(body, freed, layout.ends)
     innovations = np.linalg.norm(model.points_world(predicted) - body.points_world, axis=1) / model.height_m
-    contours = _Contours(costs, far, beside_px, n_views)
+    contours = _Contours(costs, far, beside_px)
     forward, explained = contours.forward(slice(None)), contours.explained(slice(None))
     return PoseQuality(
         forward,
@@ -294,8 +292,6 @@ class _Contours(NamedTuple):
     """Summed distance to the edges, (V, n_parts), px times outlier distances."""
     beside_px: Array
     """Length seen from the side in one view, (n_parts,), px."""
-    n_views: int
-    """Number of views that see the body."""
 
     def forward(self, parts: IntArray | slice) -> float:
         """Return the feature `forward` of some parts."""
@@ -315,7 +311,7 @@ class _Contours(NamedTuple):
 
 def classify(found: PoseQuality) -> Status:
     """Return the status of a pose."""
-    odds = found.log_odds[:, None] + (STATUS_MODEL.off - STATUS_MODEL.lost, 0.0)
+    odds = found.log_odds[:, None] + (LOST_NATS, 0.0)
     return "lost" if found.is_unseen else classify_limbs(odds)
 
 

@@ -84,9 +84,9 @@ class PersonMemory:
     def limbs_to_search(self, quality: PoseQuality) -> list[Limb]:
         """Return the limbs to search now. After each failed search a limb's back-off doubles.
 
-        A single person's limb that is more likely off than not does not back off. A fast limb is
-        elsewhere in each frame, and predictions from a wrong pose get worse. A limb does not wait
-        either if the frame contradicts it much more than that of the last search.
+        A single person's limb that is more likely off than not does not back off. A fast limb is elsewhere in each
+        frame, and predictions from a wrong pose get worse. A limb does not wait either if the frame contradicts it
+        much more than that of the last search.
 
         Args:
             quality: of the refined pose.

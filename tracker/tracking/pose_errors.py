@@ -13,7 +13,7 @@ from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import OTHER_BODY_M
 from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M
 from tracker.geometry.arrays import Array, Mask
-from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, STATUS_MODEL, probabilities
+from tracker.tracking.confidence import LOST_NATS, LOST_ODDS, OFF_ODDS, probabilities
 
 SHARED_M = 0.006
 """Standard deviation along each axis with which sizes acquired from known joints determine the joints, metres. Of those
@@ -25,8 +25,6 @@ limbs of twelve simulated people in their place, 0.2% had more; of 83 that were 
 (`tests/benchmarks/region_evidence.py --displaced`)."""
 OFF_M = SAME_POSE_M
 """A limb is off where one of its joints is farther from its true place, metres: in another pose."""
-LOST_NATS = STATUS_MODEL.off - STATUS_MODEL.lost
-"""How much less likely a limb is lost than off, nats, as on single frames."""
 DOUBTFUL_FROM, LOST_FROM = probabilities(np.array([OFF_ODDS - LOST_NATS, LOST_ODDS])).tolist()
 """Probabilities of a lost limb above which it is doubtful, and lost."""
 

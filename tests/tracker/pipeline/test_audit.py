@@ -124,7 +124,7 @@ def test_a_pose_that_is_estimated_again_was_reviewed_or_interpolated_no_more(ses
 
 
 def test_poses_of_an_earlier_body_are_compared_in_the_present_one(session, store, estimate):
-    """Those that stay keep their body; the estimate belongs to the present one. A keyframe keeps its joints."""
+    """Poses that stay keep their body; the estimate belongs to the present one. A keyframe keeps its joints."""
     (person,) = session.people
     before, former = store.poses("person", FRAMES), person.model
     longer = former.with_height(1.1 * former.height_m)

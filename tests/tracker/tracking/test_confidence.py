@@ -200,7 +200,7 @@ def test_contours_view_by_view():
     length = np.array([[40.0, 10.0], [40.0, 10.0], [40.0, 10.0], [2.0, 1.0]])
     far = length * np.array([[0.1], [0.4], [0.2], [1.0]])
     costs = PartCosts(length, np.zeros((4, 2)), length / 5)
-    contours, both = _Contours(costs, far, np.array([50.0, 15.0]), 4), np.array([0, 1])
+    contours, both = _Contours(costs, far, np.array([50.0, 15.0])), np.array([0, 1])
     assert contours.second_forward(both, 0.7) == pytest.approx(0.2)
     assert contours._replace(beside_px=np.array([500.0, 50.0])).second_forward(both, 0.7) == 0.7
     one = contours._replace(costs=costs._replace(length_px=length * [[0], [1], [0], [0]]))

@@ -18,7 +18,7 @@ class NoColors:
 
 
 def seen(memory, others=CLEAR, astray=()):
-    """What the evidence says where some limbs are astray, and of the others."""
+    """Evidence of a pose where some limbs are astray, and of the others."""
     limbs = [(ASTRAY if x.name in astray else others)._replace(name=x.name) for x in memory.limbs]
     return PoseQuality(0.05, 4, 0.05, tuple(limbs))
 

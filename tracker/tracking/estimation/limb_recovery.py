@@ -31,9 +31,8 @@ T = TypeVar("T")
 
 
 def search_limbs(
-    model: BodyModel, limbs: Sequence[Limb], initial: Hypothesis, others: Sequence[Array], scorer: PoseScorer,
-    unproposed: Sequence[Limb] = (),
-) -> list[Hypothesis]:  # fmt: skip
+    model: BodyModel, limbs: Sequence[Limb], initial: Hypothesis, others: Sequence[Array], scorer: PoseScorer
+) -> list[Hypothesis]:
     """Search limbs that seem lost, one after the other, by beam search.
 
     A limb may be where another belongs, and each alone fits best as it is. Therefore the best poses of each limb, worse
@@ -45,7 +44,6 @@ def search_limbs(
         initial: the refined pose, scored.
         others: poses whose limbs are tried as they are, such as that of the frame before, (n_values,) each.
         scorer: compares poses.
-        unproposed: limbs that are only tried where the other poses have them, after the search.
 
     Returns:
         The best pose, which is the initial one unless another is clearly better. Then those that are about as good,
@@ -53,10 +51,9 @@ def search_limbs(
     """
     settings, start = scorer.settings, initial
     beam = [start]
-    for limb in (*limbs, *unproposed):
+    for limb in limbs:
         beam = [x for x in beam if x.cost < beam[0].cost + BEAM_NATS]
-        is_proposed = any(limb is x for x in limbs)
-        away = [p for x in limbs if x is not limb for p in x.parts] if is_proposed else None
+        away = [p for x in limbs if x is not limb for p in x.parts]
         found = _search_limb(model, limb, away, beam, others, scorer)
         beam = distinct([*beam, *found], settings.beam_width)
     best = beam[0] if beam[0].cost < start.cost - CLEAR_NATS else start
@@ -80,7 +77,7 @@ def search_entry(kind: SearchKind, searched: Sequence[Limb], start: Hypothesis, 
 
 
 def _search_limb(
-    model: BodyModel, limb: Limb, away: list[int] | None, beam: Sequence[Hypothesis], others: Sequence[Array],
+    model: BodyModel, limb: Limb, away: list[int], beam: Sequence[Hypothesis], others: Sequence[Array],
     scorer: PoseScorer,
 ) -> list[Hypothesis]:  # fmt: skip
     """Return the best poses of one limb, refined with the whole body.
@@ -88,8 +85,7 @@ def _search_limb(
     Args:
         model: the body.
         limb: the limb to search.
-        away: indices of parts that occlude nothing while poses are ranked: those of other lost limbs; None to propose
-            nothing.
+        away: indices of parts that occlude nothing while poses are ranked: those of other lost limbs.
         beam: poses of the body, which differ in parts that are away. Places of the limb are ranked around the first,
             and then scored with each.
         others: poses whose limb is tried as it is.
@@ -103,11 +99,7 @@ def _search_limb(
         return scorer.fitted(model, pose)
 
     of_limb = scorer.restricted_to(limb)
-    if away is None:
-        poses = np.array([with_limb(model, beam[0].pose, other, limb) for other in others])
-        poses = _best_apart(model, limb, poses, -of_limb.costs(poses), scorer.settings.n_limb_refined)
-    else:
-        poses = _candidates(model, limb, away, beam[0].pose, others, of_limb)
+    poses = _candidates(model, limb, away, beam[0].pose, others, of_limb)
     if len(beam) > 1:
         poses = np.array([*poses, *(with_limb(model, k.pose, pose, limb) for k in beam[1:] for pose in poses)])
         poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: scorer.settings.n_limb_refined]]
