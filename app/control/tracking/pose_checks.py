@@ -70,9 +70,11 @@ class PoseChecks:
             state = session_state.state
             settings = track_settings.of_estimates(state.settings, state.run_choices)
             record = change.pose
-            if record is not None and record.model_revision == session_state.saver.revisions.current(person):
-                session, observer = session_state.session, session_state.frames.observer.in_time()
+            with session_state.lock:
+                present = session_state.saver.revisions.current(person)
                 pose = pose_in_run(session_state, person, change.frame)
+            if record is not None and record.model_revision == present:
+                session, observer = session_state.session, session_state.frames.observer.in_time()
                 found = compared_pose(session, observer, settings, pose, self._report)
                 self._store(person, stored, checked_pose(session.people[person].model, record, found))
         except _StoppedError:
