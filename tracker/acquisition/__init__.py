@@ -5,6 +5,7 @@ May import the rooms below it, up to `tracking.voxel`. Callers use `from_joints`
 """
 
 __all__ = [
+    "body_points",
     "from_contours",
     "from_joints",
     "from_keypoints",

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.acquisition.body_points import BodyPoints
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.evidence.keypoints import PersonKeypoints
@@ -27,7 +28,6 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.triangulation import sigma_px
-from tracker.observations.body_points import BodyPoints
 
 _LEAST = 1e-3
 """Smallest confidence that counts."""

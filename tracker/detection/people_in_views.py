@@ -18,9 +18,9 @@ from tracker.detection.detector import ADULT, DetectedPerson, Detector, PictureS
 from tracker.footage.mask_image import ANYONE, UNKNOWN
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
+from tracker.geometry.robust_triangulation import INLIER_M, Views
 from tracker.observations.identities import SAME_PERSON_M, PersonTrack, follow_people, track_distance
 from tracker.observations.observed import ObservationSet
-from tracker.observations.triangulation import INLIER_M, Views
 
 _TORSO = ("left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))

@@ -1,7 +1,7 @@
 """Space without people: rotations and rigid motions, cameras, planes, solid primitives, distances, sizes.
 
 Imports `compute`. Callers use the modules: `arrays`, `rigid`, `cameras`, `ground_plane`, `shapes`, `segment_distance`,
-`triangulation`, `lengths`.
+`triangulation`, `robust_triangulation`, `lengths`.
 """
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "lens_tables",
     "lenses",
     "rigid",
+    "robust_triangulation",
     "segment_distance",
     "shapes",
     "triangulation",

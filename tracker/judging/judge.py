@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.acquisition.body_points import BodyPoints
 from tracker.body.model import BodyModel
 from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
@@ -17,7 +18,6 @@ from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.judging import reasons
 from tracker.judging.best_motion import best_motion
 from tracker.judging.verdicts import LIMBS, probability_beyond, with_doubt
-from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.chain import Sink
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.plausibility.examine import contradictions

@@ -22,5 +22,4 @@ __all__ = [
     "stored",
     "stored_files",
     "stored_masks",
-    "triangulation",
 ]

@@ -10,9 +10,9 @@ from tracker.errors import FormatError, Remedy
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.geometry.cameras import Camera
+from tracker.geometry.robust_triangulation import INLIER_M, Views
 from tracker.observations.observed import ObservedPoints
 from tracker.observations.shifts import SAMPLES, evenly, point_rays, view_shifts
-from tracker.observations.triangulation import INLIER_M, Views
 
 _SIZES = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0)
 """Ratios of usual sizes of pictures, such as 1920, 1280 and 640 px of width."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.robust_triangulation import INLIER_M, Views, triangulate_points
 from tracker.motion.continuation import Bones, PersonPath, who_is_who
-from tracker.observations.triangulation import INLIER_M, Views, triangulate_points
 
 SAME_PERSON_M = 0.4
 """Largest median distance, metres, of a detection's points from a person's a frame before: a person is as wide."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
+from tracker.geometry.robust_triangulation import Views, triangulate_points
 from tracker.observations.identities import gather, match_people
 from tracker.observations.observed import ObservationSet, ObservedJoints
 from tracker.observations.sides import exchanged_sides, with_sides_exchanged
-from tracker.observations.triangulation import Views, triangulate_points
 
 _GROUPS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "heel", "toe"))
 """Joints whose sides a detector exchanges together: those of the arms, and those of the legs."""

@@ -13,8 +13,8 @@ import numpy as np
 from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
+from tracker.geometry.robust_triangulation import INLIER_M, Views
 from tracker.observations.observed import ObservedPoints
-from tracker.observations.triangulation import INLIER_M, Views
 
 SAMPLES = 60
 """Largest number of frames that are compared in a stretch, for a median of some thousand distances."""

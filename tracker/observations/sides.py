@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.observations.triangulation import INLIER_M, Views, cheapest_path, leaps, pair_hypotheses, usual_step
+from tracker.geometry.robust_triangulation import INLIER_M, Views, cheapest_path, leaps, pair_hypotheses, usual_step
 
 _EXCHANGE = 0.5
 """Price of an exchanged view, in confidences of disagreeing points: half a point that disagrees everywhere. Without it,

@@ -9,6 +9,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
+from tracker.acquisition.body_points import BodyPoints
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, part_of
@@ -18,7 +19,6 @@ from tracker.fitting.gauss_newton import PointTargets
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.initialization.first_pose import FirstPoses
-from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
 from tracker.pipeline.calibration_revisions import follow_history, outdated_sizes
 from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tracker.acquisition.body_points import BodyPoints
 from tracker.acquisition.from_joints import place_joints
 from tracker.acquisition.from_keypoints import SeenBody, fit_to_keypoints, learn_seen_body
 from tracker.acquisition.segment_lengths import segment_lengths
@@ -23,7 +24,7 @@ from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model, has_preset_sizes
 from tracker.initialization.first_pose import FirstPose, FirstPoses
 from tracker.observations.assignment import people_by_poses
-from tracker.observations.body_points import BodyPoints, body_points
+from tracker.observations.body_points import body_points
 from tracker.observations.observed import ObservationSet
 from tracker.observations.stored import load_observations
 from tracker.session.session import Session

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tracker.acquisition.body_points import BodyPoints
 from tracker.acquisition.from_keypoints import fit_to_keypoints, learn_seen_body
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, part_of, result_of, unreported
@@ -14,7 +15,6 @@ from tracker.fitting.interpenetration import SelfPenetration
 from tracker.fitting.keypoints import KeypointBlock
 from tracker.formats.model_toml import format_model
 from tracker.geometry.cameras import Camera
-from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore

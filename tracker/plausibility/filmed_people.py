@@ -13,7 +13,7 @@ from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
-from tracker.observations.triangulation import INLIER_M
+from tracker.geometry.robust_triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import Places
 from tracker.plausibility.filmed_motion import FilmedMotion, MotionFinder
 from tracker.session.session import Session

@@ -9,7 +9,7 @@ import numpy as np
 from tracker.compute.quantiles import known_median
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
-from tracker.observations.triangulation import INLIER_M
+from tracker.geometry.robust_triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import Places, bones
 from tracker.plausibility.readings import ReadPoints
 

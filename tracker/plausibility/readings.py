@@ -14,8 +14,8 @@ from tracker.formats.file_axes import axes_matrix, axis_conventions
 from tracker.formats.joint_maps import JointMap
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.lengths import METRES_BY_WORD, USUAL_SIZES
+from tracker.geometry.robust_triangulation import INLIER_M
 from tracker.observations.shifts import SAMPLES
-from tracker.observations.triangulation import INLIER_M
 from tracker.plausibility.body_likelihood import (
     PRIORS,
     Bones,

@@ -12,8 +12,8 @@ from tracker.errors import CalibrationError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import IntArray
 from tracker.geometry.cameras import Camera
+from tracker.geometry.robust_triangulation import Views
 from tracker.observations.observed import ObservationSet
-from tracker.observations.triangulation import Views
 from tracker.self_calibration.camera_chain import chain_cameras
 from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses
 from tracker.self_calibration.named_people import NamedPeople, people_by_name

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.robust_triangulation import INLIER_M, Views, triangulate_points
 from tracker.observations.joints import side_pairs
 from tracker.observations.observed import ObservationSet
 from tracker.observations.shifts import point_rays
-from tracker.observations.triangulation import INLIER_M, Views, triangulate_points
 from tracker.self_calibration.seen_joints import points_of_person
 
 

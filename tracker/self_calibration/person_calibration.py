@@ -19,7 +19,7 @@ from tracker.fitting.bundle import solve_bundle
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
-from tracker.observations.triangulation import INLIER_M
+from tracker.geometry.robust_triangulation import INLIER_M
 from tracker.self_calibration.joint_adjustment import (
     AdjustedJoints,
     Gauge,

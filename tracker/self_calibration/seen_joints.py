@@ -8,10 +8,10 @@ import numpy as np
 from tracker.calibration.reprojection import Observations
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
+from tracker.geometry.robust_triangulation import Views
 from tracker.observations.joints import side_pairs
 from tracker.observations.observed import ObservationSet
 from tracker.observations.sides import exchanged_sides, with_sides_exchanged
-from tracker.observations.triangulation import Views
 
 
 @dataclass(frozen=True, eq=False)

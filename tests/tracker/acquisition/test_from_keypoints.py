@@ -5,11 +5,11 @@ import pytest
 from rigs import cameras, ring
 from staging import posed
 
+from tracker.acquisition.body_points import BodyPoints
 from tracker.acquisition.from_keypoints import fit_to_keypoints, learn_seen_body
 from tracker.body.model import PosedBody
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
-from tracker.observations.body_points import BodyPoints
 
 CAMERAS, N, FEW, SIGMA = cameras(ring(4)), 30, 8, 0.004
 MODEL, OTHER = load_model("gavrila38", 1.7), load_model("gavrila38", 1.78)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from stored_motions import random_poses
 
+from tracker.acquisition.body_points import BodyPoints
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.formats.model_toml import load_model
 from tracker.judging.judge import judge_person
 from tracker.judging.verdicts import LIMBS
-from tracker.observations.body_points import BodyPoints
 from tracker.store.records import PoseRecord
 from tracker.store.stored_poses import StoredPose
 

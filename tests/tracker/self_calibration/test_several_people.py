@@ -9,7 +9,7 @@ from filmed_people import FOCAL_PX, STATURE_M, aligned, blanks, dancing, observe
 from observed_people import BODY_25
 
 from tracker.errors import CalibrationError
-from tracker.observations.triangulation import Views
+from tracker.geometry.robust_triangulation import Views
 from tracker.self_calibration.keypoint_calibration import calibrate_by_person
 from tracker.self_calibration.named_people import people_by_name
 from tracker.self_calibration.people_matching import match_across_cameras

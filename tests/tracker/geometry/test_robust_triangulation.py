@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from observed_people import BODY_25, make_session, seen, walking
 
+from tracker.geometry.robust_triangulation import Views, triangulate_points
 from tracker.observations.identities import match_people
 from tracker.observations.sides import exchanged_sides, with_sides_exchanged
-from tracker.observations.triangulation import Views, triangulate_points
 
 LEGS = [(BODY_25.points.index(f"L{j}"), BODY_25.points.index(f"R{j}")) for j in ("Hip", "Knee", "Ankle", "Heel")]
 
