@@ -15,7 +15,7 @@ HIDDEN_SUBJECT = re.compile(r"(?:^|(?<=[.!?:])\s+)(?:What|Where|Who|Whose|Those|
 COMMENT = re.compile(r"(?:^|[ \t])#.*", re.MULTILINE)
 """A comment, or what looks like one within a string: the tokenizer takes as long as all other checks together."""
 NAME = re.compile(r"_?[A-Z][A-Z0-9_]*")
-OF_EXPERIMENTS = ("tracker.simulate", "tracker.experiments")
+OF_EXPERIMENTS = ("tracker.simulate", "tracker.simulate.experiments")
 LIBRARY = sorted(name for name in FILES if name.split(".")[0] == "tracker")
 
 

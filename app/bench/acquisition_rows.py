@@ -7,9 +7,9 @@ from scipy.optimize import least_squares
 
 from app.bench.rows import CORES, Row, Yardstick, edge_distances, in_yardsticks
 from app.bench.sample_frames import FRAME, BenchFrame, pose_at
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
-from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import PosedBody
+from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
+from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS

@@ -21,22 +21,22 @@ from app.session.samples import bundled
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.kernel_cache import compiled_mark, record_compiled, record_stage
 from tracker.compute.progress import result_of
-from tracker.contours import occluding_contours
-from tracker.contours.part_edges import points_occluded
 from tracker.errors import SessionError
+from tracker.estimation.posing.default_pose import default_pose
+from tracker.estimation.posing.drag import drag
+from tracker.estimation.posing.grab import grab
+from tracker.estimation.search.chamfer_cost import ChamferCost, measure_nothing
+from tracker.evidence.contours import occluding_contours
+from tracker.evidence.contours.part_edges import points_occluded
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
-from tracker.posing.default_pose import default_pose
-from tracker.posing.drag import drag
-from tracker.posing.grab import grab
-from tracker.search.chamfer_cost import ChamferCost, measure_nothing
 from tracker.session.lock import SessionLock
 from tracker.session.session import Session, load_session
 
 if TYPE_CHECKING:
-    from tracker.tracking.chamfer.settings import TrackSettings
+    from tracker.estimation.chamfer.settings import TrackSettings
 
 _FRAME = 25
 _FRAMES = 3
@@ -128,7 +128,7 @@ def _call_tracking(session: Session) -> None:
     """Search and track on a few frames: two people, one as in GD96, one without a background."""
     # Imported here: most of the program, which the page's first kernels do not wait for.
     from app.bench.sample_frames import read_crowd
-    from tracker.tracking.chamfer.settings import TrackSettings
+    from tracker.estimation.chamfer.settings import TrackSettings
 
     crowd, cameras, settings = read_crowd(session.folder, _FRAME), session.cameras, TrackSettings()
     _track(cameras, settings, crowd.models, crowd.values)
@@ -143,22 +143,22 @@ def _call_others(session: Session) -> None:
     They label parts in an image, carve and label voxels, compare bodies with silhouettes, film simulated people, learn
     what is usual in a run, and check its cameras.
     """
-    from tracker.calibration.rig_problem import sums_of_pieces
-    from tracker.contours.label_image import part_labels
+    from tracker.calibration.check.rig_problem import sums_of_pieces
+    from tracker.estimation.by_frame.part_evidence import learn_run
+    from tracker.estimation.fitting.contour_residuals import ContourResiduals
+    from tracker.estimation.initialization.generators.silhouette_overlap import SilhouetteOverlap
+    from tracker.estimation.voxel.body_pose import state_of
+    from tracker.estimation.voxel.labels import label_voxels
+    from tracker.estimation.voxel.settings import VoxelSettings
+    from tracker.evidence.contours.label_image import part_labels
     from tracker.evidence.silhouettes import SilhouetteFinder
-    from tracker.fitting.contour_residuals import ContourResiduals
+    from tracker.evidence.voxels.carving import Carver
+    from tracker.evidence.voxels.voxel_grid import VoxelGrid
     from tracker.geometry.cameras import viewed_point
-    from tracker.initialization.generators.silhouette_overlap import SilhouetteOverlap
     from tracker.simulate.people.model_figure import ModelFigure
     from tracker.simulate.stage.camera_rig import make_cameras
     from tracker.simulate.stage.film import film, freeze
     from tracker.simulate.stage.room import see_room
-    from tracker.tracking.estimation.part_evidence import learn_run
-    from tracker.tracking.voxel.body_pose import state_of
-    from tracker.tracking.voxel.labels import label_voxels
-    from tracker.tracking.voxel.settings import VoxelSettings
-    from tracker.voxels.carving import Carver
-    from tracker.voxels.voxel_grid import VoxelGrid
 
     model, sources = session.people[0].model, session.cameras[:2]  # each more view would take half a second
     cameras = [c.camera for c in sources]
@@ -183,9 +183,9 @@ def _call_others(session: Session) -> None:
 def _track(
     cameras: Sequence[CameraSource], settings: "TrackSettings", models: Sequence[BodyModel], start: Sequence[Array]
 ) -> None:
-    from tracker.tracking.chamfer.tracker import ChamferTracker
-    from tracker.tracking.subjects import Subjects
-    from tracker.tracking.tracker import TrackingRun
+    from tracker.estimation.chamfer.tracker import ChamferTracker
+    from tracker.estimation.tracking.subjects import Subjects
+    from tracker.estimation.tracking.tracker import TrackingRun
 
     with Recording(cameras) as recording:
         frames = range(_FRAME, _FRAME + _FRAMES)
@@ -199,14 +199,14 @@ def _estimate(
     poses: Sequence[Array],
 ) -> None:  # fmt: skip
     """Estimate the poses of a few frames together, and search a limb on one."""
-    from tracker.appearance.region_learning import LearningFrame, learn_regions
     from tracker.body.limbs import limbs
-    from tracker.tracking.estimation.limb_recovery import search_limbs
-    from tracker.tracking.estimation.pose_score import common_evidence
-    from tracker.tracking.estimation.region_scorer import FrameEvidence
-    from tracker.tracking.runs.frame_hypotheses import FrameHypotheses
-    from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
-    from tracker.tracking.subjects import Subjects
+    from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions
+    from tracker.estimation.by_frame.limb_recovery import search_limbs
+    from tracker.estimation.by_frame.pose_score import common_evidence
+    from tracker.estimation.by_frame.region_scorer import FrameEvidence
+    from tracker.estimation.runs.frame_hypotheses import FrameHypotheses
+    from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
+    from tracker.estimation.tracking.subjects import Subjects
 
     bodies = tuple(PosedBody(m, pose) for m, pose in zip(models, poses, strict=True))
     with Recording(cameras) as recording:

@@ -10,14 +10,14 @@ from scipy.spatial import cKDTree
 from app.bench.rows import Row, Timed, Yardstick, descended, tracked_pipeline
 from app.bench.sample_frames import BenchFrame
 from tracker.body.model import PosedBody
-from tracker.contours import occluding_contours
-from tracker.fitting.contour_residuals import ContourResiduals
-from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.estimation.by_frame.settings import TOLERANCE
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.contour.settings import ContourSettings
+from tracker.estimation.fitting.contour_residuals import ContourResiduals
+from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled
+from tracker.evidence.contours import occluding_contours
 from tracker.geometry.arrays import Array
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.contour.settings import ContourSettings
-from tracker.tracking.estimation.settings import TOLERANCE
 
 _MUST, _AIM = 3.0, 4.0
 """Iterations in the time of a yardstick."""

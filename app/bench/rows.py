@@ -13,21 +13,21 @@ from scipy.optimize import least_squares
 from app.bench.opencv_oracle import PaintedCost
 from app.bench.sample_frames import BenchCrowd, BenchFrame, pose_at
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours import occluding_contours
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.fitting.contour_residuals import ContourResiduals
+from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, damped_step
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled
+from tracker.estimation.search.best_first import COARSE_SEARCH, SearchSettings, search
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
+from tracker.evidence.contours import occluding_contours
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import ContourResiduals
-from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, damped_step
-from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.pipeline.methods import make_tracker
-from tracker.search.best_first import COARSE_SEARCH, SearchSettings, search
 from tracker.session.session import Session
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
 _CANDIDATES = 100
 _PIPELINE_FRAMES = range(5, 45)
@@ -192,7 +192,7 @@ def _searched_and_refined(frame: BenchFrame, start: Array) -> Fit:
 
 
 def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
-    """Refine as the tracker does; see `tracker.tracking.estimation.frame_estimator`."""
+    """Refine as the tracker does; see `tracker.estimation.by_frame.frame_estimator`."""
     model = frame.model
     match = ContourResiduals(frame.views, [PosedBody(model, start)])
     sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)

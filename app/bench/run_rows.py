@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import BenchFrame, pose_at
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import Leg, TrackSession
 from tracker.pipeline.tracked_changes import RunChange, StoredPerson
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
 
 _FRAMES = range(5, 45)
 _MUST = 6.0

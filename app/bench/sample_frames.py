@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
+from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.estimation.search.chamfer_cost import ChamferCost
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
-from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session, load_session
 
 FRAME = 25

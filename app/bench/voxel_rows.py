@@ -6,13 +6,13 @@ import numpy as np
 
 from app.bench.rows import Row, Yardstick, in_yardsticks
 from app.bench.sample_frames import FRAME, BenchFrame, pose_at
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.voxel.frame_estimator import VoxelEstimator
+from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.recording import Recording
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
-from tracker.tracking.voxel.frame_estimator import VoxelEstimator
-from tracker.tracking.voxel.settings import VoxelSettings
 
 _VOXEL_M = 0.05
 _FRAMES = range(FRAME, FRAME + 8)

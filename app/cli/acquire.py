@@ -13,8 +13,8 @@ from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.acquisition.from_contours import AcquisitionSettings
-    from tracker.acquisition.two_views import TwoViewSettings
+    from tracker.estimation.acquisition.from_contours import AcquisitionSettings
+    from tracker.estimation.acquisition.two_views import TwoViewSettings
 
 _SHOWN = 12
 """Number of sizes that are listed."""
@@ -79,10 +79,10 @@ def _settings(arguments: AcquireArguments, cameras: list[str]) -> "AcquisitionSe
     Raises:
         TrackerError: the views are not two cameras of the session, or are given without --paper.
     """
-    from tracker.acquisition.from_contours import AcquisitionSettings
-    from tracker.acquisition.from_voxels import VoxelSizeSettings
-    from tracker.acquisition.size_fit import SizeFitSettings
-    from tracker.acquisition.two_views import TwoViewSettings
+    from tracker.estimation.acquisition.from_contours import AcquisitionSettings
+    from tracker.estimation.acquisition.from_voxels import VoxelSizeSettings
+    from tracker.estimation.acquisition.size_fit import SizeFitSettings
+    from tracker.estimation.acquisition.two_views import TwoViewSettings
 
     views, coupled = arguments.views, not arguments.uncoupled
     if views and not arguments.paper:
@@ -128,14 +128,19 @@ def acquire(
     """
     import numpy as np
 
-    from tracker.acquisition.size_report import acquired_segments, joint_swings, size_changes, unobservable_joints
+    from tracker.estimation.acquisition.size_report import (
+        acquired_segments,
+        joint_swings,
+        size_changes,
+        unobservable_joints,
+    )
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
     from tracker.formats.model_toml import format_model
     from tracker.pipeline.body_acquisition import acquire_body, store_body
     from tracker.session.lock import SessionLock
     from tracker.session.relink import require_files
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
     session, (person,) = at
     require_files(session)

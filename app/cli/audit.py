@@ -58,15 +58,15 @@ def audit(at: Target, frames: range, replaces: bool, progress: Reporter) -> dict
     import numpy as np
 
     from tracker.compute.progress import mapped, result_of
+    from tracker.estimation.chamfer.settings import TrackSettings
+    from tracker.estimation.tracking.pose_errors import probability_off
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
     from tracker.pipeline.audit import AuditPlan, PoseAudit
     from tracker.session.lock import SessionLock
     from tracker.session.relink import require_files
-    from tracker.store.annotation_store import AnnotationStore
-    from tracker.store.records import PoseChange
-    from tracker.tracking.chamfer.settings import TrackSettings
-    from tracker.tracking.pose_errors import probability_off
+    from tracker.session.store.annotation_store import AnnotationStore
+    from tracker.session.store.records import PoseChange
 
     session, people = at
     require_files(session)

@@ -49,7 +49,7 @@ def move_to(at: Target, to: str) -> dict[str, Any]:
     """
     from tracker.pipeline.body_change import change_body
     from tracker.session.lock import SessionLock
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
     session, (person,) = at
     with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:

@@ -160,11 +160,11 @@ def _extras() -> list[Finding]:
 
 
 def _extensions() -> list[Finding]:
-    from tracker.calibrations.calibration_layout import CalibrationLayout
     from tracker.compute.extensions import GROUPS, extensions, unread_packages
-    from tracker.detection.detector import DetectorKind
     from tracker.evaluation.metric import Metric
-    from tracker.exports.export_format import ExportFormat
+    from tracker.formats.calibrations.calibration_layout import CalibrationLayout
+    from tracker.interchange.detection.detector import DetectorKind
+    from tracker.interchange.exports.export_format import ExportFormat
 
     kinds = (ExportFormat, Metric, CalibrationLayout, DetectorKind, None)
     found = []

@@ -10,7 +10,7 @@ from app.runtime.progress import Reporter
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tracker.tracking.tracker import TrackerSettings
+    from tracker.estimation.tracking.tracker import TrackerSettings
 
 
 def command(
@@ -34,8 +34,8 @@ def command(
         noise: noise of the contours across themselves, px.
         seed: of motion, cameras and noise.
     """
-    from tracker.experiments.contour_experiment import ContourExperiment, count_runs, run_contour_experiment
-    from tracker.experiments.contour_report import write_contour_report
+    from tracker.simulate.experiments.contour_experiment import ContourExperiment, count_runs, run_contour_experiment
+    from tracker.simulate.experiments.contour_report import write_contour_report
 
     experiment = ContourExperiment(frames, cameras, camera_counts, noise, seed)
     experiment.check()
@@ -47,7 +47,7 @@ def command(
 
 def _methods() -> "Mapping[str, TrackerSettings]":
     """Return the settings that are compared, by their name in the report."""
-    from tracker.tracking.chamfer.settings import TrackSettings
-    from tracker.tracking.contour.settings import ContourSettings
+    from tracker.estimation.chamfer.settings import TrackSettings
+    from tracker.estimation.contour.settings import ContourSettings
 
     return {"chamfer": TrackSettings(whole_run=False), "contour": ContourSettings(whole_run=False)}

@@ -13,12 +13,12 @@ from app.cli.target import Target, load_target
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
-from tracker.exports.export_format import ExportFormat
-from tracker.exports.formats import FORMATS, OPTIONS, find_format
+from tracker.interchange.exports.export_format import ExportFormat
+from tracker.interchange.exports.formats import FORMATS, OPTIONS, find_format
 
 if TYPE_CHECKING:
-    from tracker.exports.dataset_card import RecordingSummary
-    from tracker.exports.motion import Checked, ExportedMotion
+    from tracker.interchange.exports.dataset_card import RecordingSummary
+    from tracker.interchange.exports.motion import Checked, ExportedMotion
 
 _FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.own.values())
 
@@ -100,8 +100,8 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
     _refuse_without_like(arguments)
     if len(arguments.sessions) > 1 or arguments.split or arguments.distinct_people:
         return _export_dataset(arguments)
-    from tracker.exports.export_files import check_options, export, for_format, n_ticks
-    from tracker.exports.motion import read_motion
+    from tracker.interchange.exports.export_files import check_options, export, for_format, n_ticks
+    from tracker.interchange.exports.motion import read_motion
     from tracker.session.frame_list import parse_frame_list
 
     at = load_target(arguments.sessions[0], arguments.person, several=True)
@@ -126,11 +126,11 @@ def _only(arguments: ExportArguments) -> "Checked | None":
 
 def _export_dataset(arguments: ExportArguments) -> None:
     """Write a dataset of several sessions, or of one with a split."""
-    from tracker.exports.dataset import export_dataset, plan_dataset
-    from tracker.exports.dataset_labels import DatasetRecording
-    from tracker.exports.dataset_splits import parse_splits, recording_names
-    from tracker.exports.export_files import check_options
-    from tracker.exports.motion import read_motion
+    from tracker.interchange.exports.dataset import export_dataset, plan_dataset
+    from tracker.interchange.exports.dataset_labels import DatasetRecording
+    from tracker.interchange.exports.dataset_splits import parse_splits, recording_names
+    from tracker.interchange.exports.export_files import check_options
+    from tracker.interchange.exports.motion import read_motion
     from tracker.session.frame_list import parse_frame_list
 
     sessions = arguments.sessions
@@ -163,7 +163,7 @@ def _export_dataset(arguments: ExportArguments) -> None:
 def _dataset_summary(
     out: Path, sessions: Sequence[Path], summaries: "Sequence[RecordingSummary]", splits: Mapping[str, Sequence[str]]
 ) -> dict[str, Any]:
-    from tracker.exports.dataset_card import shared_people
+    from tracker.interchange.exports.dataset_card import shared_people
 
     split_of = {name: split for split, names in splits.items() for name in names}
     return {
@@ -212,8 +212,8 @@ def _refuse_without_like(arguments: ExportArguments) -> None:
 
 def _send_back(arguments: ExportArguments) -> None:
     """Write the files of observations, with the points of mended poses replaced."""
-    from tracker.exports.like.sending import export_like
-    from tracker.observations.stored import load_observations
+    from tracker.interchange.exports.like.sending import export_like
+    from tracker.interchange.observations.stored import load_observations
     from tracker.session.session import load_session
 
     others = (
@@ -275,7 +275,7 @@ def _file(out: Path, chosen: ExportFormat, name: str) -> Path:
     Raises:
         TrackerError: its suffix is of another format, or its folder is missing.
     """
-    from tracker.exports.export_files import is_export_folder
+    from tracker.interchange.exports.export_files import is_export_folder
 
     if out.is_dir() and not (chosen.is_folder and is_export_folder(out)):
         out = out / f"{name}{chosen.suffixes[0]}"
@@ -290,7 +290,7 @@ def _file(out: Path, chosen: ExportFormat, name: str) -> Path:
 
 
 def _summary(motion: "ExportedMotion", chosen: ExportFormat, paths: list[Path], skip_lost: bool) -> dict[str, Any]:
-    from tracker.exports.provenance import SIDE_FILE
+    from tracker.interchange.exports.provenance import SIDE_FILE
 
     return {
         "format": chosen.name,

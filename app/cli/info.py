@@ -11,7 +11,7 @@ from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from tracker.session.session import Session
-    from tracker.store.records import FrameRow
+    from tracker.session.store.records import FrameRow
 
 
 def command(session: SessionArg, /, check: bool = True, json: bool = False) -> None:
@@ -43,11 +43,11 @@ def summarize(
         clocks: of the footage, by camera.
         notes: sentences on them.
     """
-    from tracker.observations.stored import list_observations
-    from tracker.observations.stored_masks import list_masks
+    from tracker.interchange.observations.stored import list_observations
+    from tracker.interchange.observations.stored_masks import list_masks
     from tracker.session.missing_files import missing_files
-    from tracker.store.annotation_store import AnnotationStore
-    from tracker.store.calibration_log import read_posed_revisions
+    from tracker.session.store.annotation_store import AnnotationStore
+    from tracker.session.store.calibration_log import read_posed_revisions
 
     missing = missing_files(session)
     poses: dict[str, list[FrameRow]] = {p.name: [] for p in session.people}
@@ -113,7 +113,7 @@ def _observations(session: "Session", name: str) -> dict[str, Any]:
     """Summarize imported observations; those that cannot be read are listed with the reason."""
     import numpy as np
 
-    from tracker.observations.stored import load_observations
+    from tracker.interchange.observations.stored import load_observations
 
     try:
         found = load_observations(session, name)
@@ -137,7 +137,7 @@ def _observations(session: "Session", name: str) -> dict[str, Any]:
 
 def _masks(session: "Session", name: str) -> dict[str, Any]:
     """Summarize imported masks; those that cannot be read are listed with the reason."""
-    from tracker.observations.stored_masks import load_masks
+    from tracker.interchange.observations.stored_masks import load_masks
 
     try:
         found = load_masks(session, name)

@@ -17,7 +17,7 @@ from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.initialization.first_pose import FirstPoses
+    from tracker.estimation.initialization.first_pose import FirstPoses
     from tracker.pipeline.find_people import FindSettings
     from tracker.pipeline.given_pose import GivenPose
     from tracker.session.session import Session
@@ -156,8 +156,8 @@ def _print(arguments: InitArguments, given: "GivenPose", found: dict[str, Any], 
 
 
 def _init_from_silhouettes(at: Target, arguments: InitArguments) -> None:
+    from tracker.estimation.voxel.settings import check_voxel_size
     from tracker.pipeline.find_people import FindSettings
-    from tracker.tracking.voxel.settings import check_voxel_size
 
     check_voxel_size(arguments.voxel_size / 1000)
     progress = Reporter(silent=arguments.json or arguments.method != "auto")

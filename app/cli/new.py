@@ -20,8 +20,8 @@ from app.cli.arguments import (
     parse_common_or_pairs,
     parse_pairs,
 )
-from tracker.calibrations.convention_names import PoseConvention
 from tracker.errors import TrackerError
+from tracker.formats.calibrations.convention_names import PoseConvention
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from tracker.errors import SessionError, TrackerError
 
 if TYPE_CHECKING:
     from tracker.body.model import BodyModel, PosedBody
-    from tracker.fitting.observability import Observability
+    from tracker.estimation.fitting.observability import Observability
     from tracker.geometry.arrays import Array, IntArray
     from tracker.geometry.cameras import Camera
 
@@ -60,7 +60,7 @@ def observability(at: Target, frame: int | None, frames: str | None, another_cam
         SessionError: there is no stored pose.
         TrackerError: the frames are not within the session.
     """
-    from tracker.fitting.observability import observe_pose
+    from tracker.estimation.fitting.observability import observe_pose
     from tracker.geometry.ground_plane import up_rotation
 
     session, (index,) = at
@@ -86,7 +86,7 @@ def observability(at: Target, frame: int | None, frames: str | None, another_cam
 
 def _scenes(at: Target, wanted: range) -> "dict[int, list[PosedBody]]":
     """Return the bodies of some frames on which the person has a pose, the person first."""
-    from tracker.store.stored_poses import read_stored_poses
+    from tracker.session.store.stored_poses import read_stored_poses
 
     session, (index,) = at
     people = [session.people[index], *(p for i, p in enumerate(session.people) if i != index)]
@@ -97,7 +97,7 @@ def _scenes(at: Target, wanted: range) -> "dict[int, list[PosedBody]]":
 
 
 def _working_cameras(at: Target) -> "list[Camera]":
-    from tracker.images.working_view import working_scale
+    from tracker.evidence.images.working_view import working_scale
 
     return [s.camera.pinhole.scaled(working_scale(s.camera)) for s in at.session.cameras]
 
@@ -107,7 +107,7 @@ def _summary(
 ) -> dict[str, Any]:
     import numpy as np
 
-    from tracker.fitting.observability_reasons import describe_all
+    from tracker.estimation.fitting.observability_reasons import describe_all
 
     first = next(iter(found))
     model = scenes[first][0].model
@@ -139,7 +139,7 @@ def _summary(
 def _another_camera(frames: "list[list[PosedBody]]", cameras: "list[Camera]", up: "Array") -> list[dict[str, Any]]:
     import numpy as np
 
-    from tracker.fitting.added_camera import rank_added_cameras
+    from tracker.estimation.fitting.added_camera import rank_added_cameras
 
     model: BodyModel = frames[0][0].model
     alike = [f for f in frames if f[0].model.dof_names == model.dof_names]

@@ -11,7 +11,7 @@ from app.runtime.json_output import format_json
 from tracker.errors import DamagedStoreError, SessionError
 
 if TYPE_CHECKING:
-    from tracker.store.backups import Restored
+    from tracker.session.store.backups import Restored
 
 
 def command(
@@ -55,7 +55,7 @@ def restore(folder: Path, backup: str | None, rescue: Path | None = None) -> dic
     from tracker.session.folder import SESSION_FILE
     from tracker.session.lock import SessionLock
     from tracker.session.session import ANNOTATIONS_FILE
-    from tracker.store import backups
+    from tracker.session.store import backups
 
     folder = Path(os.path.abspath(folder))
     if not (folder / SESSION_FILE).is_file():
@@ -87,7 +87,7 @@ def _replayed(folder: Path, path: Path, chosen: Path | None) -> tuple[int, list[
         The number of edits, and what is offered of other folders.
     """
     from app.storage import rescue
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
     with closing(AnnotationStore(path, read_only=True)) as store:
         files = rescue.find(folder, store.id)
@@ -101,7 +101,7 @@ def _replayed(folder: Path, path: Path, chosen: Path | None) -> tuple[int, list[
 
 def _damage(path: Path) -> str | None:
     """Return why a store cannot be opened because of damage; None if it can, or is missing."""
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
     if not path.exists():
         return f"{path} is missing"

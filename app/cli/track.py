@@ -12,14 +12,14 @@ from app.cli.target import Target, check_stride, load_target, parse_frames
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
+from tracker.estimation.tracking.method import OptionValue, PaperMode
 from tracker.pipeline.methods import METHODS, all_options
-from tracker.tracking.method import OptionValue, PaperMode
 
 if TYPE_CHECKING:
+    from tracker.estimation.tracking.tracker import TrackerSettings
     from tracker.pipeline.chain import ChainPlan
     from tracker.pipeline.stored_run import TrackPlan
     from tracker.session.session import Session
-    from tracker.tracking.tracker import TrackerSettings
 
 
 @dataclass(frozen=True)
@@ -160,10 +160,10 @@ def _with_detection(arguments: TrackArguments, session: "Session") -> TrackArgum
 
 def _detected(name: str | None, session: "Session", frames: range, reporter: Reporter) -> str:
     """Detect people unless that was done; return the name of the observations."""
-    from tracker.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
-    from tracker.detection.detectors import load_detector
-    from tracker.detection.model_files import default_folder
     from tracker.footage.recording import Recording
+    from tracker.interchange.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
+    from tracker.interchange.detection.detectors import load_detector
+    from tracker.interchange.detection.model_files import default_folder
     from tracker.session.lock import SessionLock
 
     detector, text = load_detector("blazepose", None, default_folder())

@@ -9,11 +9,11 @@ from app.remedies import command_line_text
 from app.runtime.progress import Reporter
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import Remedy
+from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
 from tracker.pipeline.track_session import EstimateStep
-from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 if TYPE_CHECKING:
-    from tracker.initialization.first_pose import FirstPoses
+    from tracker.estimation.initialization.first_pose import FirstPoses
     from tracker.pipeline.stored_run import TrackPlan
     from tracker.pipeline.track_session import Step, TrackSession
     from tracker.session.session import Session

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.state.people import BodyOutlines, Line, SideOutlines
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours import occluding_contours
+from tracker.evidence.contours import occluding_contours
 from tracker.geometry.cameras import Camera
 
 _SIZE_PX = (240, 480)

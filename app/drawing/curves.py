@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.store.records import FramePose
+from tracker.session.store.records import FramePose
 
 CurveGroup = Literal["arms", "torso", "legs", "cost"]
 GROUPS: tuple[CurveGroup, ...] = get_args(CurveGroup)

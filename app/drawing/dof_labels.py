@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import limb_display_name
 from tracker.body.model import BodyModel
+from tracker.estimation.posing.edits import joint_of, limb_of
 from tracker.geometry.arrays import Array
-from tracker.posing.edits import joint_of, limb_of
 
 
 def factors(model: BodyModel) -> Array:

@@ -9,8 +9,8 @@ from app.state.page_view import View
 from app.state.state import State
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.model import BodyModel, PosedBody
+from tracker.estimation.posing.edits import copy_dofs
 from tracker.geometry.arrays import IntArray
-from tracker.posing.edits import copy_dofs
 from tracker.session.session import Session
 
 

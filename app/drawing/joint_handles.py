@@ -10,7 +10,7 @@ from app.drawing.seen_bodies import at_one_time, bodies_in, picture_times
 from app.state.people import DragState
 from app.state.state import State
 from tracker.body.model import PosedBody, ahead
-from tracker.contours import part_edges
+from tracker.evidence.contours import part_edges
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.session.session import Session

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.residual_pieces import ResidualPieces
+from tracker.calibration.check.residual_pieces import ResidualPieces
 
 _CELLS = 12
 """Cells along the longer side of a picture: a person who fills it has some four across."""

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 
 from tracker.errors import TrackerError
+from tracker.evaluation.judging.judge import Judgement
+from tracker.evaluation.judging.verdicts import LIMBS
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
-from tracker.judging.judge import Judgement
-from tracker.judging.verdicts import LIMBS
-from tracker.observations.observed import ObservationSet
-from tracker.observations.plans import MaskPlan
+from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.plans import MaskPlan
 
 _CROSS = 0.004
 """Half the size of the cross of a point, as a share of the longer side of the picture."""

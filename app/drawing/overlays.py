@@ -16,18 +16,18 @@ from app.state.calibration import CorrectedFrame
 from app.state.page_view import View
 from app.state.state import State
 from tracker.body.model import BodyModel, PosedBody, ahead
-from tracker.contours import occluding_contours, part_edges
-from tracker.contours.occluding_contours import Contour
-from tracker.contours.pieces import PIECE_PX
-from tracker.contours.surfaces import surfaces_of
+from tracker.estimation.contour.fit_steps import residual_segments
+from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.evidence.contours import occluding_contours, part_edges
+from tracker.evidence.contours.occluding_contours import Contour
+from tracker.evidence.contours.pieces import PIECE_PX
+from tracker.evidence.contours.surfaces import surfaces_of
+from tracker.evidence.images.edge_segments import accept_segments
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
-from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array, FloatArray, IntArray, Mask
 from tracker.geometry.cameras import Camera, epipolar_segment
-from tracker.images.edge_segments import accept_segments
-from tracker.observations.plans import MaskPlan
+from tracker.interchange.observations.plans import MaskPlan
 from tracker.session.session import Person, Session
-from tracker.tracking.contour.fit_steps import residual_segments
 
 _PERSON_KINDS = (
     "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",

@@ -8,8 +8,8 @@ from app.drawing.seen_bodies import at_one_time, bodies_in, picture_times
 from app.state.page_view import View
 from app.state.state import State
 from tracker.body.model import ahead
+from tracker.estimation.posing import picking
 from tracker.geometry.arrays import FloatArray
-from tracker.posing import picking
 from tracker.session.session import Session
 
 

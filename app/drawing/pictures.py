@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from app.drawing import overlay_colors
 from tracker.body.model import PosedBody
-from tracker.contours.label_image import part_labels
+from tracker.evidence.contours.label_image import part_labels
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray, Image, Mask
 from tracker.geometry.cameras import Camera

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from tracker.body.model import BodyModel
+from tracker.body.motion.prediction import PredictSettings, predict
 from tracker.geometry.arrays import Array
-from tracker.motion.prediction import PredictSettings, predict
 
 
 class Prediction(NamedTuple):

@@ -11,7 +11,7 @@ from app.drawing import overlay_colors, pictures
 from app.drawing.pictures import draw_lines
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.contours import occluding_contours, part_edges
+from tracker.evidence.contours import occluding_contours, part_edges
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, Region
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from app.export.report_files import write_html
-from tracker.agreement.comparison import Agreement, JointAgreement
-from tracker.agreement.copies import Copies
-from tracker.agreement.statistics import Icc, Interval, Limits
+from tracker.evaluation.agreement.comparison import Agreement, JointAgreement
+from tracker.evaluation.agreement.copies import Copies
+from tracker.evaluation.agreement.statistics import Icc, Interval, Limits
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array
 

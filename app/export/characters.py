@@ -7,14 +7,14 @@ import numpy as np
 
 from app.drawing import overlay_colors
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours import occluding_contours
-from tracker.contours.label_image import part_labels
-from tracker.exports.motion import ExportedMotion
+from tracker.estimation.posing.character import drive_character
+from tracker.evidence.contours import occluding_contours
+from tracker.evidence.contours.label_image import part_labels
 from tracker.geometry.arrays import Image
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane, up_rotation
 from tracker.geometry.lens_tables import lens_of, undistortion_map
-from tracker.posing.character import drive_character
+from tracker.interchange.exports.motion import ExportedMotion
 
 _GROUND = (38, 40, 44)
 """Colour behind the characters, RGB."""

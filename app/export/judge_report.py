@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 
 from app.export.report_files import write_html
+from tracker.evaluation.judging.judge import Doubt, Judgement
+from tracker.evaluation.judging.verdicts import LIMBS
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
-from tracker.judging.judge import Doubt, Judgement
-from tracker.judging.verdicts import LIMBS
 from tracker.session.session import Session
 
 _SHOWN = 12

@@ -15,12 +15,12 @@ from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
-from tracker.exports.motion import ExportedMotion
-from tracker.exports.options import ExportOptions, load_character
 from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image
 from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.motion import ExportedMotion
+from tracker.interchange.exports.options import ExportOptions, load_character
 from tracker.session.session import Session
 
 _LAYERS = frozenset(("contours", "hidden"))

@@ -29,12 +29,12 @@ from app.state.role import Role
 from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
 from tracker.body.limbs import limb_display_name, limbs
+from tracker.estimation.posing.grab import heading_points, minor_points
+from tracker.estimation.tracking.pose_errors import DOUBTFUL_FROM, LOST_FROM
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
-from tracker.posing.grab import heading_points, minor_points
 from tracker.session.session import Person, Session
-from tracker.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
-from tracker.tracking.pose_errors import DOUBTFUL_FROM, LOST_FROM
+from tracker.session.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
 
 _FEW_CELLS = 2000
 """Largest number of timeline cells sent by name. More are sent as columns, which take a tenth of the bytes and time."""

@@ -10,8 +10,8 @@ from app.messages.base import Command, Index, Message, Name, Part
 from app.messages.search import OutlierMode
 from app.state.run_choices import MAX_STRIDE
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
-from tracker.acquisition.from_contours import SizeMethod
-from tracker.tracking.method import OptionKind
+from tracker.estimation.acquisition.from_contours import SizeMethod
+from tracker.estimation.tracking.method import OptionKind
 
 _Metres: TypeAlias = Annotated[float, Meta(gt=0, le=10)]
 

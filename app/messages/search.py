@@ -278,7 +278,7 @@ class KeyframeDoubt(Part, frozen=True):
 
 
 class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
-    """Frames whose pose does not agree with the motion around it (`tracker/motion/consistency.py`)."""
+    """Frames whose pose does not agree with the motion around it (`tracker/body/motion/consistency.py`)."""
 
     frames: tuple[int, ...]
     """All of them, ascending. A doubted keyframe stands for its neighbours."""

@@ -5,7 +5,7 @@ import unicodedata
 from functools import cache
 
 from tracker.errors import TrackerError
-from tracker.store.annotator import checked_annotator, one_form
+from tracker.session.store.annotator import checked_annotator, one_form
 from tracker.validation import quoted
 
 MAX_CHARACTERS = 60

@@ -14,11 +14,11 @@ from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.state import State
 from tracker.body.model import BodyModel
+from tracker.estimation.posing.character import drive_character
 from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.geometry.ground_plane import GroundPlane, up_rotation
-from tracker.posing.character import drive_character
 
 _BESIDE_M = 0.8
 """Distance between a person and the character, for each person of the session, metres."""

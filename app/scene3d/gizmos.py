@@ -10,9 +10,9 @@ from app.control.controller import Controller
 from app.runtime.jobs import LatestWinsWorker
 from app.scene3d.throttle import Throttle
 from app.state.state import State
+from tracker.estimation.posing.edits import joint_of
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.posing.edits import joint_of
 
 _ROOT_SCALE, _JOINT_SCALE = 0.3, 0.2
 _REST_S = 0.1

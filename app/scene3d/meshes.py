@@ -10,7 +10,7 @@ from app.drawing.joint_handles import Side, side_of
 from app.drawing.overlay_colors import rgb
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours.occluding_contours import part_poses
+from tracker.evidence.contours.occluding_contours import part_poses
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.session.session import Person

@@ -14,16 +14,16 @@ from app.state.identity import Identity
 from app.state.state import State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
+from tracker.estimation.voxel.body_pose import state_of
+from tracker.estimation.voxel.figure import N_PARTS, figure_of
+from tracker.estimation.voxel.labels import LabelRule, label_voxels
+from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.evidence.silhouettes import SilhouetteFinder
+from tracker.evidence.voxels.shadows import recover_from_shadows
+from tracker.evidence.voxels.visual_hull import carve_people
 from tracker.footage.camera_source import CameraSource
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.tracking.voxel.body_pose import state_of
-from tracker.tracking.voxel.figure import N_PARTS, figure_of
-from tracker.tracking.voxel.labels import LabelRule, label_voxels
-from tracker.tracking.voxel.settings import VoxelSettings
-from tracker.voxels.shadows import recover_from_shadows
-from tracker.voxels.visual_hull import carve_people
 
 _VOXEL_M = 0.03
 """Edge of the voxels, metres."""

@@ -21,11 +21,11 @@ from app.remedies import page_text
 from app.runtime.temporary_folder import TemporaryFolder
 from app.server import connections
 from tracker.errors import TrackerError
-from tracker.exports.export_format import ExportFormat
-from tracker.exports.formats import FORMATS, OPTIONS
+from tracker.interchange.exports.export_format import ExportFormat
+from tracker.interchange.exports.formats import FORMATS, OPTIONS
 
 if TYPE_CHECKING:
-    from tracker.exports.motion import Checked
+    from tracker.interchange.exports.motion import Checked
 
 _LOG = logging.getLogger(__name__)
 _CHUNK_BYTES = 1 << 18
@@ -75,7 +75,7 @@ class ExportRoutes:
 
     def _observations(self) -> list[dict[str, Any]]:
         """Return imported observations, as formats in which their files are sent back."""
-        from tracker.observations.stored import list_observations
+        from tracker.interchange.observations.stored import list_observations
         from tracker.session.session import load_session
 
         fields = {"options": ["poses"], "axes": "", "units": "", "holds_provenance": True, "numbering": ""}
@@ -123,10 +123,10 @@ class ExportRoutes:
             TrackerError: an option is wrong, or there is nothing to export.
             _StoppedError: nobody waits for it any more.
         """
-        from tracker.exports.export_files import check_options, export, n_ticks
-        from tracker.exports.motion import read_motion
         from tracker.formats.file_names import identifier
         from tracker.formats.model_toml import PRESETS
+        from tracker.interchange.exports.export_files import check_options, export, n_ticks
+        from tracker.interchange.exports.motion import read_motion
         from tracker.session.frame_list import parse_frame_list
         from tracker.session.session import load_session
 
@@ -159,8 +159,8 @@ class ExportRoutes:
         Raises:
             TrackerError: there are no such observations, or their points cannot be replaced.
         """
-        from tracker.exports.like.sending import export_like
-        from tracker.observations.stored import load_observations
+        from tracker.interchange.exports.like.sending import export_like
+        from tracker.interchange.observations.stored import load_observations
         from tracker.session.session import load_session
 
         if poses not in ("edited", "all"):

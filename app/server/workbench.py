@@ -42,7 +42,7 @@ from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.pipeline.calibration_revisions import follow_history
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 _ANSWER_S = 0.3
 """Time for the answer to a page that has chosen another session."""

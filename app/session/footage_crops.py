@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from tracker.evidence.images.working_view import WorkingView
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Image
 from tracker.geometry.cameras import Camera
-from tracker.images.working_view import WorkingView
 
 _CACHE_BYTES = 2**20
 """Hardly any: neighbouring thumbnails show other frames."""

@@ -14,12 +14,12 @@ from app.drawing import pictures
 from app.remedies import page_text
 from app.runtime.byte_bounded_cache import ByteBoundedCache
 from tracker.errors import RecordingError
+from tracker.evidence.images.working_view import WorkingView
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.proxy import Proxy
 from tracker.geometry.arrays import Image
-from tracker.images.working_view import WorkingView
 
 _LOG = logging.getLogger(__name__)
 _IMAGE_BYTES = 16 * 2**20

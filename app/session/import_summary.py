@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from tracker.errors import TrackerError
-from tracker.observations.plans import ImportPlan, MaskPlan
+from tracker.interchange.observations.plans import ImportPlan, MaskPlan
 from tracker.session.session import Session
 
 

@@ -9,8 +9,8 @@ from msgspec import Meta
 from app.remedies import page_text
 from app.session.camera_check import exchange_of
 from app.session.path_choice import TypedPath, TypedPaths, typed_path, typed_paths
-from tracker.calibrations.convention_names import PoseConvention
 from tracker.errors import SessionError, TrackerError
+from tracker.formats.calibrations.convention_names import PoseConvention
 from tracker.formats.camera_section import Units
 from tracker.session.assemble import DEFAULT_MODEL, NewSession, SessionParts, check_parts
 from tracker.session.footage_files import footage_in

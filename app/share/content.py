@@ -10,13 +10,13 @@ import numpy as np
 
 from app.drawing import curves
 from tracker.body.model import BodyModel
-from tracker.exports.motion import ExportedMotion, PersonMotion
-from tracker.exports.provenance import pose_provenance
+from tracker.evidence.images.working_view import WorkingView
 from tracker.geometry.cameras import Camera
-from tracker.images.working_view import WorkingView
+from tracker.interchange.exports.motion import ExportedMotion, PersonMotion
+from tracker.interchange.exports.provenance import pose_provenance
 from tracker.session.session import Session
-from tracker.store.edit_tree import program_version
-from tracker.store.records import FramePose
+from tracker.session.store.edit_tree import program_version
+from tracker.session.store.records import FramePose
 
 
 class SharedComment(NamedTuple):

@@ -11,9 +11,9 @@ from app.session.footage_indices import footage_indices
 from app.share.content import SharedComment, describe
 from app.share.overlay_lines import UNITS_PER_PX, compact, view_lines
 from app.share.pictures import GRADES, Encoder, choose_encoder
-from tracker.exports.export_files import moved_at_end, unwritable
-from tracker.exports.motion import ExportedMotion
 from tracker.footage.recording import Recording
+from tracker.interchange.exports.export_files import moved_at_end, unwritable
+from tracker.interchange.exports.motion import ExportedMotion
 
 _FILES = ("index.html", "page.js", "page.css", "data.js")
 """Files of a shared folder beside its pictures."""

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 
 from app.export.overlay_video import drawn_paths
-from tracker.exports.motion import ExportedMotion
+from tracker.evidence.images.working_view import WorkingView
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.images.working_view import WorkingView
+from tracker.interchange.exports.motion import ExportedMotion
 
 UNITS_PER_PX = 4
 """Positions are whole numbers of a quarter of a pixel of the picture, the accuracy of an antialiased line."""

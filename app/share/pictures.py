@@ -8,10 +8,10 @@ import numpy as np
 from app.drawing.pictures import placeholder
 from app.share.overlay_lines import compact, view_lines
 from tracker.errors import TrackerError
-from tracker.exports.motion import ExportedMotion
+from tracker.evidence.images.working_view import WorkingView
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Image
-from tracker.images.working_view import WorkingView
+from tracker.interchange.exports.motion import ExportedMotion
 from tracker.session.session import Session
 
 _SAMPLES = 3

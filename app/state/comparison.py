@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from app.state.people import ShownPose
+from tracker.estimation.posing.limb_moves import LimbMove
 from tracker.geometry.arrays import Array
-from tracker.posing.limb_moves import LimbMove
 
 ComparedWork = Literal["fit", "search"]
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from tracker.judging.judge import Judgement
-from tracker.observations.observed import ObservationSet
-from tracker.observations.plans import ImportPlan, MaskPlan
+from tracker.evaluation.judging.judge import Judgement
+from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.plans import ImportPlan, MaskPlan
 
 
 @dataclass(frozen=True)

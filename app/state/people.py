@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel
+from tracker.body.motion.keyframe_doubts import RaisedView
 from tracker.body.searches import Search
+from tracker.estimation.posing.placed_depth import UnseenDepth
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.motion.keyframe_doubts import RaisedView
-from tracker.posing.placed_depth import UnseenDepth
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class DragState:
     by_surface: bool = False
     """Whether the surface of the part is dragged, not a point."""
     mode: str = "move"
-    """`move`, `turn`, `push` or `bend`, see `tracker.posing.drag`."""
+    """`move`, `turn`, `push` or `bend`, see `tracker.estimation.posing.drag`."""
     short_m: float = 0.0
     """Distance between the dragged place and the line of sight that it should be on, metres."""
     wanted_px: tuple[float, float] | None = None

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from tracker.estimation.by_frame.part_evidence import Contradiction, PartTable
 from tracker.geometry.arrays import Array
-from tracker.tracking.estimation.part_evidence import Contradiction, PartTable
 
 
 @dataclass(frozen=True, eq=False)

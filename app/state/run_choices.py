@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from tracker.estimation.tracking.method import OptionValue
 from tracker.pipeline.methods import METHODS
-from tracker.tracking.method import OptionValue
 
 MAX_STRIDE = 100
 """Largest stride."""

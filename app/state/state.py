@@ -28,9 +28,9 @@ from app.state.search import CostLandscape, CostMap, SearchState, SearchView
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import STAGES
+from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.tracking.chamfer.settings import TrackSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class State:
     """Indices of the locked degrees of freedom of each person."""
     ranges: RangeState = field(default_factory=RangeState)
     inconsistent_frames: tuple[int, ...] = ()
-    """Frames whose poses disagree with their neighbours, ascending (see `tracker.motion.consistency`)."""
+    """Frames whose poses disagree with their neighbours, ascending (see `tracker.body.motion.consistency`)."""
     keyframe_doubts: tuple[KeyframeDoubt, ...] = ()
     """Keyframes that their neighbours or views contradict, by person and frame."""
     pins: tuple[tuple[PointObservation, ...], ...] = ()

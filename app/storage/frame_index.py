@@ -4,8 +4,8 @@ from bisect import bisect_left
 from collections.abc import Sequence
 
 from app.storage.timeline_cells import TimelineCells
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import FrameRow
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import FrameRow
 
 
 class FrameIndex:

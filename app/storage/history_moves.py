@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from app.storage.shared_storage import SharedStorage
 from tracker.errors import SessionError
 from tracker.session.session import Session
-from tracker.store.records import HistoryEntry
+from tracker.session.store.records import HistoryEntry
 
 _ALL = 1 << 30
 """More entries than any history has."""

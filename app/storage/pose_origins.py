@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tracker.body.model import BodyModel
-from tracker.exports.point_origins import PointOrigin, point_origins
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_log import present_revision, revisions_of_poses
-from tracker.store.records import PoseRecord
+from tracker.interchange.exports.point_origins import PointOrigin, point_origins
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.calibration_log import present_revision, revisions_of_poses
+from tracker.session.store.records import PoseRecord
 
 
 @dataclass(frozen=True, eq=False)

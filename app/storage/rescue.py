@@ -20,8 +20,8 @@ from app.remedies import page_text
 from app.storage.rescue_file import Model, Rescue, UnsavedEdit, read_rescue, write_rescue
 from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.session.folder import SESSION_FILE
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Change, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Change, PoseChange, PoseRecord
 
 
 class RescueFile(NamedTuple):

@@ -13,7 +13,7 @@ from tracker.body.model import BodyModel
 from tracker.errors import SessionError, TrackerError
 from tracker.files import read_regular, write_text_atomic
 from tracker.formats.model_toml import parse_model
-from tracker.store.records import (
+from tracker.session.store.records import (
     SOURCES,
     STATUSES,
     Alternative,

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from app.remedies import page_text
 from app.storage.rescue_file import UnsavedEdit
 from tracker.errors import OvertakenEditError, TrackerError
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Change, PinChange, PoseChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Change, PinChange, PoseChange
 
 
 @dataclass

@@ -1,11 +1,11 @@
 """Model revisions: the bodies that stored poses were made with, and the present bodies of the people."""
 
 from tracker.body.model import BodyModel
-from tracker.fitting.retarget import retarget_pose
+from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 class ModelRevisions:

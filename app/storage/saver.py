@@ -27,9 +27,9 @@ from tracker.pipeline.calibration_revisions import apply_check, follow_history, 
 from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_log import present_revision
-from tracker.store.records import (
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.calibration_log import present_revision
+from tracker.session.store.records import (
     SEEN,
     Alternative,
     Change,

@@ -9,7 +9,7 @@ from app.storage.revisions import ModelRevisions
 from app.storage.turns import Turns
 from tracker.errors import SessionError
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 _TOGETHER = "worked_together"
 """Setting of the session."""

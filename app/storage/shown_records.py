@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.state.people import ShownPose
-from tracker.store.records import SOURCES, PoseRecord
+from tracker.session.store.records import SOURCES, PoseRecord
 
 
 def sources_of(stored: PoseRecord | None, shown: ShownPose, source: str) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from itertools import takewhile
 
-from tracker.store.records import SOURCES, FrameRow
+from tracker.session.store.records import SOURCES, FrameRow
 
 _STATUS_RANKS = {status: i for i, status in enumerate(("lost", "doubtful", "good", ""))}
 """The worst status first."""

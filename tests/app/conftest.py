@@ -14,13 +14,13 @@ from app import __main__
 from app.control.controller import Controller
 from app.session.frame_cache import FrameCache
 from app.storage.saver import Saver
+from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evidence.observer import Observer
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.annotator import VARIABLE
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.annotator import VARIABLE
 
 _fits = {}
 """Poses that have been fitted to joints in this process."""

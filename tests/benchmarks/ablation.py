@@ -17,23 +17,23 @@ from doc_tables import Conditions, add_write_option, check_places, measured, sho
 from true_starts import read_simulated, start_of
 
 from tracker.body.model import BodyModel
+from tracker.body.motion.prediction import PredictSettings
+from tracker.estimation.chamfer.paper import PAPER_BODY, paper_settings
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.tracker import ChamferTracker
+from tracker.estimation.fitting.contour_residuals import MatchSettings
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.fitting.contour_residuals import MatchSettings
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
-from tracker.motion.prediction import PredictSettings
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
-from tracker.tracking.chamfer.paper import PAPER_BODY, paper_settings
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
 
 TABLES = ("ablation",)
 DEFAULT = TrackSettings()

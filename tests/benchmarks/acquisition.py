@@ -21,9 +21,9 @@ import numpy as np
 from doc_tables import Conditions, add_write_option, check_places, show, table
 
 from tracker.session.session import load_session
+from tracker.session.store.stored_poses import read_stored_poses
 from tracker.simulate import Simulation, simulate
 from tracker.simulate.people.population import individual
-from tracker.store.stored_poses import read_stored_poses
 
 PLAYED = {
     "child_3": ("elbow_rotation", 5),

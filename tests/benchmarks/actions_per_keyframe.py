@@ -25,7 +25,7 @@ from app.storage.saver import Saver
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.session.assemble import NewSession, assemble
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 VIEWS = (0, 1)
 EVERY = 10

@@ -22,12 +22,12 @@ from joint_errors import processor_s, references_of
 from scipy.stats import spearmanr
 
 from tracker.body.model import PosedBody
+from tracker.body.motion.interpolation import interpolate_pose
 from tracker.evaluation.references import read_joints
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.motion.interpolation import interpolate_pose
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.stored_poses import read_stored_poses
 
 EVERY = 15
 """Frames from a keyframe to the next."""

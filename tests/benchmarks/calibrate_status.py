@@ -1,4 +1,4 @@
-"""Fit the weights of `tracker/tracking/confidence.py` and measure what statuses are worth (docs/accuracy.md).
+"""Fit the weights of `estimation/tracking/confidence.py` and measure what statuses are worth (docs/accuracy.md).
 
 Statuses follow from these weights in first passes, and searches of limbs do.
 
@@ -26,13 +26,19 @@ from doc_tables import add_write_option, check_places
 from status_model import LimbRows, Run, load_rows, save_rows
 from status_tables import write_results
 
-from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
-from tracker.acquisition.from_joints import height_from_joints, place_joints
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
+from tracker.estimation.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
+from tracker.estimation.acquisition.from_joints import height_from_joints, place_joints
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.tracker import ChamferTracker
+from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.estimation.tracking import confidence
+from tracker.estimation.tracking.estimate import PoseEstimate
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
@@ -42,12 +48,6 @@ from tracker.geometry.arrays import Array
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
-from tracker.tracking import confidence
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.estimate import PoseEstimate
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
 
 TABLES = (
     "calibrate_status groups", "calibrate_status people", "calibrate_status reliability", "calibrate_status ranking",

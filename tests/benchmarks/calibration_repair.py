@@ -19,7 +19,7 @@ import numpy as np
 from acquisition import PLAYED, quadrille
 from doc_tables import Conditions, add_write_option, check_places, show, table
 
-from tracker.calibration.camera_correction import N_CORRECTIONS, corrected
+from tracker.calibration.check.camera_correction import N_CORRECTIONS, corrected
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.footage.video import open_footage

@@ -18,10 +18,10 @@ from acquisition import N_FRAMES, Recording, quadrille, recorded
 from calibration_repair import off
 from doc_tables import Conditions, add_write_option, check_places, show, table
 
-from tracker.acquisition.size_parameters import SizeParameters
-from tracker.calibration.camera_correction import N_CORRECTIONS, ROTATION
-from tracker.calibration.diagnosis import fit_fault
-from tracker.calibration.fault_search import Fault
+from tracker.calibration.check.camera_correction import N_CORRECTIONS, ROTATION
+from tracker.calibration.check.diagnosis import fit_fault
+from tracker.calibration.check.fault_search import Fault
+from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording as OpenRecording

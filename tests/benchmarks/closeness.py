@@ -18,6 +18,10 @@ from doc_tables import Conditions, add_write_option, check_places, measured, sho
 from true_starts import read_simulated
 
 from tracker.body.model import BodyModel
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.tracker import ChamferTracker
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -25,10 +29,6 @@ from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session
 from tracker.simulate import Simulation, simulate
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
 
 TABLES = ("closeness",)
 DEFAULT = TrackSettings()

@@ -19,17 +19,17 @@ import numpy as np
 from acquisition import RECORDED, new_session, recorded
 from doc_tables import Conditions, add_write_option, check_places, show, table
 
-from tracker.acquisition.body_points import BodyPoints
-from tracker.acquisition.from_keypoints import fit_to_keypoints, learn_offsets
 from tracker.body.model import PosedBody
-from tracker.detection.detect import DetectionPlan, detect_people
-from tracker.detection.detectors import load_detector
-from tracker.detection.model_files import default_folder
+from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import fit_to_keypoints, learn_offsets
 from tracker.evaluation.references import read_joints
 from tracker.footage.recording import Recording as Footage
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table
+from tracker.interchange.detection.detect import DetectionPlan, detect_people
+from tracker.interchange.detection.detectors import load_detector
+from tracker.interchange.detection.model_files import default_folder
 from tracker.pipeline.keypoint_evidence import at_observed_height, read_points
 from tracker.session.session import Session, load_session
 from tracker.simulate import Simulation, simulate

@@ -27,8 +27,8 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Image
 from tracker.session.session import load_session
+from tracker.session.store.stored_poses import read_stored_poses
 from tracker.simulate import Simulation, simulate
-from tracker.store.stored_poses import read_stored_poses
 
 CONTRAST, NOISE = 0.6, 3.0
 """What is left of the differences of a picture without contrast, and its noise, gray values."""

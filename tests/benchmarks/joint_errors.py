@@ -25,7 +25,7 @@ from tracker.evaluation.references import read_joints
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.stored_poses import read_stored_poses
 
 OFF_MM = 100.0
 GROUPS = (

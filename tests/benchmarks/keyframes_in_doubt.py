@@ -23,15 +23,15 @@ from unseen_people import CONDITIONS, SCENES, SPARSE, Scene, acquired
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
+from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.estimation.fitting.hypothesis import distance_m
 from tracker.evaluation.references import read_joints
-from tracker.fitting.gauss_newton import fit_to_points
-from tracker.fitting.hypothesis import distance_m
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.store.stored_poses import StoredPose, read_stored_poses
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
+from tracker.session.store.stored_poses import StoredPose, read_stored_poses
 
 TABLES = ("keyframes_in_doubt",)
 RIGHT_MM, OFF_MM = 50.0, 100.0

@@ -27,8 +27,8 @@ from app.state.state import State
 from app.storage.saver import Saver
 from tracker.formats.model_toml import format_model
 from tracker.session.session import Session, load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 LAYERS = frozenset(("image", "contours", "hidden", "joints"))

@@ -19,6 +19,7 @@ from app.cli.target import load_target
 from app.cli.track import track
 from app.runtime.malloc_trim import give_back_freed_memory
 from app.runtime.progress import Reporter
+from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.evaluation.references import read_joints
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
@@ -26,7 +27,6 @@ from tracker.footage.video_writer import VideoWriter
 from tracker.pipeline.given_pose import set_pose_at_joints
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import Session, load_session, save_session
-from tracker.tracking.chamfer.settings import TrackSettings
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
 EVERY = 100

@@ -25,17 +25,17 @@ from joint_errors import references_of
 from tracker.annotation.expected_error import contradicted_keyframes, joint_units
 from tracker.annotation.next_click import Proposals, propose
 from tracker.body.limbs import limb_display_name, limbs
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.posing.grab import Constraints
+from tracker.estimation.posing.pinned_fit import fit_frame
 from tracker.evaluation.references import read_joints
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.chain import open_stored_session
 from tracker.pipeline.stored_run import TrackPlan
-from tracker.posing.grab import Constraints
-from tracker.posing.pinned_fit import fit_frame
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange
-from tracker.store.stored_poses import StoredPose, read_stored_poses
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange
+from tracker.session.store.stored_poses import StoredPose, read_stored_poses
 
 NOISE_PX = 3.0
 MAX_ACTIONS = 16

@@ -19,17 +19,17 @@ from doc_tables import Conditions, add_write_option, check_places, show, table
 from scipy.stats import spearmanr
 
 from tracker.body.model import PosedBody
+from tracker.estimation.chamfer.tracker import ChamferTracker
+from tracker.estimation.fitting.observability import OBSERVABLE_M, OBSERVABLE_RAD, ContourNoise, observe_pose
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evidence.observer import Observer
-from tracker.experiments.line_chart import Line, line_chart
-from tracker.fitting.observability import OBSERVABLE_M, OBSERVABLE_RAD, ContourNoise, observe_pose
 from tracker.footage.recording import Recording
 from tracker.formats.pose_csv import read_pose_table
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
+from tracker.simulate.experiments.line_chart import Line, line_chart
 
 TABLES = ("observability", "observability reliability")
 LENGTHS_PX = (20, 40, 80, 120, 160, 240, 320)

@@ -17,17 +17,17 @@ from acquisition import new_session, quadrille, recorded
 from doc_tables import Conditions, add_write_option, check_places, show, table
 from scipy.stats import rankdata
 
-from tracker.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.pose_errors import OFF_M
+from tracker.evaluation.judging.judge import Judgement, judge, judge_person
+from tracker.evaluation.judging.verdicts import LIMBS
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording as Footage
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
-from tracker.judging.judge import Judgement, judge, judge_person
-from tracker.judging.verdicts import LIMBS
 from tracker.session.session import load_session
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.pose_errors import OFF_M
 
 NAMES = ("walk", "fast_arms", "balance_real")
 TABLES = ("observations tracked", "observations judged")

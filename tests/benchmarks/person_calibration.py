@@ -23,18 +23,18 @@ from detected_people import acted, detected, filmed_couple
 from doc_tables import Conditions, add_write_option, check_places, show, table
 from filmed_people import aligned, blanks, dancing, observed, rig
 
-from tracker.calibration.point_adjustment import triangulate_all
-from tracker.calibration.reprojection import Observations
-from tracker.calibrations.reading import read_cameras
+from tracker.calibration.check.point_adjustment import triangulate_all
+from tracker.calibration.check.reprojection import Observations
+from tracker.calibration.self_calibration.keypoint_calibration import calibrate_by_person
+from tracker.calibration.self_calibration.keypoint_files import KeyPoints, read_keypoints
+from tracker.calibration.self_calibration.person_calibration import PersonCalibration
 from tracker.errors import CalibrationError
+from tracker.formats.calibrations.reading import read_cameras
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
-from tracker.observations.joints import triangulate_observations
-from tracker.observations.observed import ObservationSet
-from tracker.self_calibration.keypoint_calibration import calibrate_by_person
-from tracker.self_calibration.keypoint_files import KeyPoints, read_keypoints
-from tracker.self_calibration.person_calibration import PersonCalibration
+from tracker.interchange.observations.joints import triangulate_observations
+from tracker.interchange.observations.observed import ObservationSet
 from tracker.simulate.stage.camera_rig import make_cameras
 
 KINDS = ("recordings", "simulated", "several", "alone")

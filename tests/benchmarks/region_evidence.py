@@ -24,11 +24,17 @@ from doc_tables import table
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
-from tracker.appearance.region_deficit import elsewhere_nats, worst_parts
-from tracker.appearance.region_learning import LearningFrame, learn_regions, learning_frames
-from tracker.appearance.region_model import RegionModel
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
+from tracker.estimation.appearance.region_deficit import elsewhere_nats, worst_parts
+from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions, learning_frames
+from tracker.estimation.appearance.region_model import RegionModel
+from tracker.estimation.by_frame.frame_problem import Bodies, with_body
+from tracker.estimation.by_frame.pose_score import common_evidence, scorer_without_prediction
+from tracker.estimation.by_frame.settings import trust
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.pose_errors import SELDOM_NATS
+from tracker.estimation.tracking.view_regions import regions
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import EdgeSettings
@@ -36,13 +42,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session, load_session
-from tracker.store.stored_poses import read_stored_poses
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.frame_problem import Bodies, with_body
-from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
-from tracker.tracking.estimation.settings import trust
-from tracker.tracking.pose_errors import SELDOM_NATS
-from tracker.tracking.view_regions import regions
+from tracker.session.store.stored_poses import read_stored_poses
 
 OFF_MM = 100.0
 DISPLACED_SHARE, SEED = 0.07, 5

@@ -32,8 +32,8 @@ from program import Program
 from app.drawing import pictures
 from app.runtime.progress import Reporter
 from app.session.proxies import index
+from tracker.evidence.images.working_view import WorkingView
 from tracker.footage.recording import Recording
-from tracker.images.working_view import WorkingView
 from tracker.session.session import load_session, save_session
 
 REDUCTION = 1.7

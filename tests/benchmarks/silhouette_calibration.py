@@ -20,10 +20,10 @@ from filmed_people import aligned, blanks
 from filmed_silhouettes import EXACT, FilmedSilhouettes, Segmentation, filmed
 from person_calibration import HEADS, HEIGHTS_M, LENS_NAMES, recording_row, reprojected
 
+from tracker.calibration.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
+from tracker.calibration.self_calibration.silhouette_calibration import calibrate_by_silhouettes
 from tracker.compute.progress import unreported
 from tracker.errors import CalibrationError
-from tracker.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
-from tracker.self_calibration.silhouette_calibration import calibrate_by_silhouettes
 from tracker.simulate.people.population import POPULATION
 
 TABLES = ("silhouette_calibration recordings", "silhouette_calibration simulated")

@@ -13,7 +13,7 @@ import numpy as np
 from acquisition import Recording, new_session, percent, quadrille, run
 from doc_tables import Conditions
 
-from tracker.acquisition.segment_lengths import SEGMENTS, segment_lengths
+from tracker.estimation.acquisition.segment_lengths import SEGMENTS, segment_lengths
 from tracker.evaluation.references import read_joints
 from tracker.session.session import load_session
 

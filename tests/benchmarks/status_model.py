@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from tracker.estimation.tracking.confidence import Status, classify_limbs, probabilities, worst
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import Status, classify_limbs, probabilities, worst
 
 OFF_MM, LOST_MM = 100.0, 150.0
 """A limb is off, and lost, where the error of a joint is larger."""

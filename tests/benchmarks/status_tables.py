@@ -25,8 +25,8 @@ from status_model import (
     summed,
 )
 
+from tracker.estimation.tracking.confidence import LOST_ODDS, OFF_ODDS
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS
 
 CONDITIONS = Conditions(
     footage="simulated people of ten builds, couples and a crowd, with clutter and noise, and the recordings; four "

@@ -19,11 +19,17 @@ from acquisition import quadrille, recorded
 from calibrate_status import SECOND, SECOND_SEED
 from doc_tables import Conditions, add_write_option, check_places, show, table
 
-from tracker.acquisition.from_joints import height_from_joints
 from tracker.body.model import BodyModel, PosedBody
+from tracker.estimation.acquisition.from_joints import height_from_joints
+from tracker.estimation.by_frame.pose_score import common_evidence, scorer_without_prediction
+from tracker.estimation.by_frame.settings import trust
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.tracker import ChamferTracker
+from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
@@ -32,12 +38,6 @@ from tracker.geometry.arrays import Array
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
-from tracker.tracking.estimation.settings import trust
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
 
 TABLES = ("true_pose_costs",)
 HEADS = (

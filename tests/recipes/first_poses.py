@@ -1,6 +1,6 @@
 """Make the hand-made poses of frame 0 of a sample's people: `python tests/recipes/first_poses.py SESSION`.
 
-A scripted user places each body as the page does (`tracker.posing.drag`): upright in the middle at first, by
+A scripted user places each body as the page does (`tracker.estimation.posing.drag`): upright in the middle at first, by
 moving the trunk, turning it by its slider, lifting the arms by theirs, and dragging joints in the two views that show
 each best. The user sees where the joints are, 3 px off, another 3 px each time, and knows nothing of the third
 dimension.
@@ -16,12 +16,12 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 from scripted_user import LIMBS, TRUNK, ScriptedUser
 
 from tracker.body.model import PosedBody
-from tracker.contours.part_edges import points_occluded
+from tracker.estimation.posing.default_pose import default_pose
+from tracker.estimation.posing.drag import drag
+from tracker.estimation.posing.grab import grab
+from tracker.evidence.contours.part_edges import points_occluded
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
-from tracker.posing.default_pose import default_pose
-from tracker.posing.drag import drag
-from tracker.posing.grab import grab
 from tracker.session.session import load_session
 
 FRAME = 0

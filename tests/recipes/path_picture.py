@@ -11,9 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.estimation.runs import run_estimate
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.trajectory.hypotheses import all_together, through
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.pipeline.methods import make_tracker
@@ -21,11 +26,6 @@ from tracker.pipeline.track_session import Leg, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.runs import run_estimate
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
-from tracker.trajectory.hypotheses import all_together, through
 
 SIMULATION = Simulation("reach_and_cross", 4, 40, 1907, fps=8.0, person="heavy_man")
 POINT, AXIS = "right_wrist", 2

@@ -24,14 +24,14 @@ from page_driver import handle_of, shows, to_client
 from playwright.async_api import Browser, Page, async_playwright
 from program import ROOT, Program
 
+from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import Session, load_session, save_session
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 from tracker.simulate.record import Simulation, simulate
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
 
 SAMPLES = ROOT / "sample_sessions"
 LAPTOP, LARGE = (1280, 720), (1920, 1080)

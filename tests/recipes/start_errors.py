@@ -11,20 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from tracker.errors import TrackerError
+from tracker.estimation.initialization.first_pose import VOXEL_M, find_first_poses
+from tracker.estimation.initialization.generators.body_axis import find_body_axes
+from tracker.estimation.initialization.generators.head_template import find_head
+from tracker.estimation.initialization.generators.silhouette_axis import major_axis
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder
+from tracker.evidence.voxels.paths import neighbor_graph
+from tracker.evidence.voxels.shadows import recover_from_shadows
+from tracker.evidence.voxels.visual_hull import carve_people
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.ground_plane import floor_plane
-from tracker.initialization.first_pose import VOXEL_M, find_first_poses
-from tracker.initialization.generators.body_axis import find_body_axes
-from tracker.initialization.generators.head_template import find_head
-from tracker.initialization.generators.silhouette_axis import major_axis
 from tracker.session.session import load_session
-from tracker.voxels.paths import neighbor_graph
-from tracker.voxels.shadows import recover_from_shadows
-from tracker.voxels.visual_hull import carve_people
 
 HEAD_CENTER, HEAD_M = 0.07, 0.10
 """Centre of a head below its top, as a fraction of the height, and the error of a head that counts as located, m."""

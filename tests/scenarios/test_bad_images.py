@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from tracking_runs import track
 
+from tracker.body.motion.prediction import predict
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.confidence import Status
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.pose_csv import read_pose_table
-from tracker.motion.prediction import predict
 from tracker.session.session import Session
 from tracker.simulate.record import Simulation, simulate
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.confidence import Status
 
 pytestmark = pytest.mark.slow
 

@@ -11,15 +11,15 @@ import pytest
 from observed_people import write_openpose
 
 from tracker.errors import TrackerError
+from tracker.estimation.initialization.first_pose import find_first_poses_anywhere
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
 from tracker.formats.joint_maps import LIMB_JOINTS, known_joint_maps
 from tracker.formats.model_toml import load_model
-from tracker.initialization.first_pose import find_first_poses_anywhere
-from tracker.observations.importing import plan_import, store_import
-from tracker.observations.request import ImportRequest
+from tracker.interchange.observations.importing import plan_import, store_import
+from tracker.interchange.observations.request import ImportRequest
 from tracker.pipeline.find_people import FindSettings, find_people
 from tracker.session.session import Person, create_session, load_session
 from tracker.simulate.record import Simulation, simulate

@@ -16,16 +16,16 @@ from app.control.tracking import track_settings
 from app.page.feeds.inspector import methods
 from app.state.run_choices import RunChoices
 from tracker.errors import TrackerError
+from tracker.estimation.by_frame.options import WHOLE_RUN
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.method import Method, Option, PaperMode
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain
 from tracker.pipeline.methods import METHODS, all_options
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.options import WHOLE_RUN
-from tracker.tracking.method import Method, Option, PaperMode
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 HERE = Path(__file__).with_name("session_before_rooms")
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"

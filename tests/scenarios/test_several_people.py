@@ -8,12 +8,12 @@ from staging import at, cameras_around, filmed, own_evidence, posed, solid
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
-from tracker.motion.prediction import PredictSettings
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.frame_estimator import FrameEstimator
-from tracker.tracking.estimation.frame_problem import FrameProblem
-from tracker.tracking.estimation.limb_recovery import search_limbs
-from tracker.tracking.person_memory import PersonMemory
+from tracker.body.motion.prediction import PredictSettings
+from tracker.estimation.by_frame.frame_estimator import FrameEstimator
+from tracker.estimation.by_frame.frame_problem import FrameProblem
+from tracker.estimation.by_frame.limb_recovery import search_limbs
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.person_memory import PersonMemory
 
 N_FRAMES = 3
 APART_M = 1.0
@@ -88,10 +88,10 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
         return np.array([*(b.values for b in estimator.bodies), *(found[p].covariance.sum(axis=1) for p in (0, 1))])
 
     monkeypatch.setattr(
-        "tracker.tracking.estimation.frame_estimator.search_limbs", lambda *a: searched.append(a) or search_limbs(*a)
+        "tracker.estimation.by_frame.frame_estimator.search_limbs", lambda *a: searched.append(a) or search_limbs(*a)
     )
     usual = poses()
     assert len(searched) == 2
     one_by_one = lambda work, items: [work(x) for x in items[::-1]][::-1]  # noqa: E731
-    monkeypatch.setattr("tracker.tracking.estimation.frame_estimator.map_parallel", one_by_one)
+    monkeypatch.setattr("tracker.estimation.by_frame.frame_estimator.map_parallel", one_by_one)
     np.testing.assert_array_equal(poses(), usual)

@@ -8,16 +8,16 @@ import pytest
 from damage import damaged, shown, written_store
 
 from tracker.errors import TrackerError
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PinChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PinChange
 
 pytestmark = pytest.mark.slow
 
 
 def test_a_damaged_store_is_refused_or_shows_what_was_written(tmp_path, cases, report, monkeypatch):
     for name in ("edit_tree.now", "annotation_store.edit_tree.now"):
-        monkeypatch.setattr(f"tracker.store.{name}", lambda: "2026-03-01T10:00:00.000+00:00")
-    monkeypatch.setattr("tracker.store.annotation_store.secrets.token_hex", lambda n: "ab" * n)
+        monkeypatch.setattr(f"tracker.session.store.{name}", lambda: "2026-03-01T10:00:00.000+00:00")
+    monkeypatch.setattr("tracker.session.store.annotation_store.secrets.token_hex", lambda n: "ab" * n)
     path = tmp_path / "annotations.sqlite"
     written_store(path)
     older = path.read_bytes()

@@ -24,7 +24,7 @@ from program import ROOT, started, visited
 
 from app.state.page_view import LAYERS
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 HOUR_S = 3600.0

@@ -13,8 +13,8 @@ from annotated_copies import ACTIONS, FRAMES, act, add_tasks, new_store, pose, s
 from command_line import SAMPLE
 
 from tracker.annotation.merge_sessions import merge_sessions
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange
 
 pytestmark = pytest.mark.slow
 

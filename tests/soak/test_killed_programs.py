@@ -19,7 +19,7 @@ import pytest
 from page_driver import until
 from program import ROOT, Program
 
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 pytestmark = pytest.mark.slow
 
@@ -149,8 +149,8 @@ async def test_edits_on_a_full_disk_survive_the_end_of_the_program(tmp_path, cas
 WRITER = """
 import sys
 from dataclasses import replace
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange
 
 store = AnnotationStore(sys.argv[1])
 print("open", flush=True)

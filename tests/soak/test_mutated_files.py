@@ -20,11 +20,11 @@ from memory import memory_mb
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
 from rigs import cameras, looking
 
-from tracker.boards.board_description import read_board
-from tracker.boards.corner_detection import CornerDetector
-from tracker.calibrations.reading import read_cameras
+from tracker.calibration.boards.board_description import read_board
+from tracker.calibration.boards.corner_detection import CornerDetector
 from tracker.errors import TrackerError
 from tracker.formats.anipose import read_calibration
+from tracker.formats.calibrations.reading import read_cameras
 from tracker.formats.joint_maps import guess_joint_map, read_joint_map
 from tracker.formats.model_toml import format_model, load_model, parse_model
 from tracker.formats.pose_csv import read_pose_table

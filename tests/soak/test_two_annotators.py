@@ -14,7 +14,7 @@ import aiohttp
 import pytest
 from program import ROOT, Program
 
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 pytestmark = pytest.mark.slow
 

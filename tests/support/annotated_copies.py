@@ -11,8 +11,8 @@ from tracker.annotation.numbered_settings import renumbered
 from tracker.annotation.plan import add_tasks, decide, read_tasks
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model, load_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import AssessmentChange, MarkChange, PinChange, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import AssessmentChange, MarkChange, PinChange, PoseChange, PoseRecord
 
 FRAMES, ACTIONS = range(3), 8
 

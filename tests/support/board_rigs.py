@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import rigs
 
-from tracker.boards.board_calibration import calibrate_rig
-from tracker.boards.board_description import Board
-from tracker.boards.board_problem import SeenCorners
-from tracker.boards.expected_error import in_pictures
+from tracker.calibration.boards.board_calibration import calibrate_rig
+from tracker.calibration.boards.board_description import Board
+from tracker.calibration.boards.board_problem import SeenCorners
+from tracker.calibration.boards.expected_error import in_pictures
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 

@@ -9,8 +9,8 @@ import numpy as np
 import tomli_w
 from scipy.spatial.transform import Rotation
 
-from tracker.calibrations.writing import anipose_text, caliscope_text
 from tracker.formats.anipose import anipose_section
+from tracker.formats.calibrations.writing import anipose_text, caliscope_text
 from tracker.geometry import rigid
 
 

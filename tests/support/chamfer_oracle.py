@@ -1,8 +1,8 @@
 """The chamfer cost in the slow, obvious way, with numpy, OpenCV and SciPy: the oracle of the fast one.
 
-It shares only the shapes' surface and implicit function with `tracker.contours.occluding_contours` and
-`tracker.search.chamfer_cost`. A part is convex, so its outline is the convex hull of a dense mesh. Occlusion of a point
-by another part is found by walking along the line of sight.
+It shares only the shapes' surface and implicit function with `tracker.evidence.contours.occluding_contours` and
+`tracker.estimation.search.chamfer_cost`. A part is convex, so its outline is the convex hull of a dense mesh. Occlusion
+of a point by another part is found by walking along the line of sight.
 """
 
 from functools import lru_cache

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
 WITH_POSE = ("--method", "poses", "--poses", SAMPLE / "truth.csv")

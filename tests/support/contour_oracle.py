@@ -1,4 +1,4 @@
-"""Matching of contours and edges with plain numpy: the oracle of `tracker.fitting.contour_residuals`.
+"""Matching of contours and edges with plain numpy: the oracle of `tracker.estimation.fitting.contour_residuals`.
 
 Matches are made once, at one pose. At another pose the matched surface points have moved with their parts, and
 everything else is the same, so that the cost can be differentiated numerically. Only the pieces of contour come from
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.contours import occluding_contours
+from tracker.evidence.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
 
 

@@ -4,8 +4,8 @@ from contextlib import closing
 
 import numpy as np
 
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, MarkChange, PinChange, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Alternative, MarkChange, PinChange, PoseChange, PoseRecord
 
 N_FRAMES = 120
 

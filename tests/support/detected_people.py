@@ -7,7 +7,7 @@ from observed_people import BODY_25
 
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import read_trc
-from tracker.observations.observed import ObservationSet, ObservedPoints
+from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
 from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of
 

@@ -7,9 +7,9 @@ from fake_detector import FakeDetector
 from observed_people import seen, true_motion
 
 from app.__main__ import main
-from tracker.detection.detector import Detector, DetectorKind
-from tracker.detection.detectors import DETECTORS
 from tracker.footage.recording import Recording
+from tracker.interchange.detection.detector import Detector, DetectorKind
+from tracker.interchange.detection.detectors import DETECTORS
 from tracker.session.session import load_session
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tracker.detection.detector import DetectedPerson, PictureSquare
+from tracker.interchange.detection.detector import DetectedPerson, PictureSquare
 
 
 def box_of(px, shape):

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from tracker.estimation.chamfer.method import CHAMFER
+from tracker.estimation.tracking.estimate import PoseEstimate
 from tracker.pipeline.methods import METHODS
-from tracker.tracking.chamfer.method import CHAMFER
-from tracker.tracking.estimate import PoseEstimate
 
 STEP_M = 0.01
 N_PARTS, N_VIEWS = 10, 4

@@ -6,13 +6,13 @@ from types import MappingProxyType
 import numpy as np
 from staging import camera_at
 
+from tracker.estimation.initialization.generators.person_scene import PersonScene
+from tracker.estimation.initialization.generators.voxel_start import locate_parts, possible_heads
 from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.evidence.voxels.figure_masks import figure_masks, paint
+from tracker.evidence.voxels.paths import neighbor_graph
+from tracker.evidence.voxels.voxel_grid import VoxelGrid, Voxels
 from tracker.geometry.ground_plane import GroundPlane
-from tracker.initialization.generators.person_scene import PersonScene
-from tracker.initialization.generators.voxel_start import locate_parts, possible_heads
-from tracker.voxels.figure_masks import figure_masks, paint
-from tracker.voxels.paths import neighbor_graph
-from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
 UP = np.array([0.0, 0.0, 1.0])
 

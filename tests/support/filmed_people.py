@@ -4,10 +4,10 @@ import numpy as np
 import rigs
 from observed_people import BODY_25
 
-from tracker.boards.lens_fit import blank_camera
 from tracker.body.model import BodyModel
+from tracker.calibration.boards.lens_fit import blank_camera
 from tracker.formats.model_toml import load_model
-from tracker.observations.observed import ObservationSet, ObservedPoints
+from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
 
 FOCAL_PX, SIZE = 500.0, (640, 480)
 STATURE_M = 1.70

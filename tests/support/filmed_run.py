@@ -5,11 +5,11 @@ from staging import SUIT, Film, cameras_around, in_posture, painted
 
 from tracker.body.model import PosedBody
 from tracker.compute.progress import result_of
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
+from tracker.estimation.tracking.subjects import Subjects
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
-from tracker.tracking.subjects import Subjects
 
 FPS = 25.0
 SWINGS = {"left_shoulder.elevation": 0.5, "right_shoulder.elevation": 0.4, "left_elbow.extension": 0.3}

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from tracker.calibration.self_calibration.person_silhouettes import measure_silhouette
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
-from tracker.self_calibration.person_silhouettes import measure_silhouette
 from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.skeleton import altered_model

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from tracker.estimation.voxel.body_pose import state_of
+from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.formats.model_toml import load_model
-from tracker.tracking.voxel.body_pose import state_of
-from tracker.tracking.voxel.settings import VoxelSettings
 
 
 def some_state(seed=0, settings=None):

@@ -12,7 +12,7 @@ from tracker.errors import FormatError
 from tracker.evaluation.metrics import evaluate_joints
 from tracker.evaluation.references import read_joints, stored_motion
 from tracker.session.session import load_session
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.stored_poses import read_stored_poses
 
 SEED = 5
 LIMB_ENDS = {

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import NormalEquations
+from tracker.estimation.fitting.gauss_newton import NormalEquations
 from tracker.geometry.arrays import Array
 
 

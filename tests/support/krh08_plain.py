@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.contours import occluding_contours
-from tracker.fitting.sliding import SINGULAR
+from tracker.estimation.fitting.sliding import SINGULAR
+from tracker.evidence.contours import occluding_contours
 from tracker.geometry.shapes import EllipticalCone
 
 _ON_SIDE = 0.999

@@ -3,8 +3,8 @@
 import numpy as np
 from solids import cameras_around, ellipsoid, silhouettes_of
 
+from tracker.estimation.voxel.figure import FigureJoints, chain_centers, joint_points
 from tracker.geometry import rigid
-from tracker.tracking.voxel.figure import FigureJoints, chain_centers, joint_points
 
 SHARES = np.array(
     [[0, 0, 0], [0, 0, 1], [0, 1, 0.85], [0, -1, 0.85], [0, 0.6, -0.95], [0, -0.6, -0.95], *[[0, 0, -1]] * 4], float

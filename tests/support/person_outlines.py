@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from filmed_people import NAMES, dancing
 
-from tracker.self_calibration.person_silhouettes import PersonSilhouette
+from tracker.calibration.self_calibration.person_silhouettes import PersonSilhouette
 
 RADIUS_M = 0.08
 _FEET = [i for i, n in enumerate(NAMES) if n.endswith("Ankle")]

@@ -4,8 +4,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from tracker.tracking.voxel import labels
-from tracker.voxels import carving
+from tracker.estimation.voxel import labels
+from tracker.evidence.voxels import carving
 
 
 def carve_plainly(carver, grid, rule):

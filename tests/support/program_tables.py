@@ -1,8 +1,8 @@
 """The tables of programs in the documents, as the tables of the code have them."""
 
-from tracker.calibrations import layouts as calibrations
+from tracker.formats.calibrations import layouts as calibrations
 from tracker.formats.joint_tables import layouts as joints
-from tracker.observations import readers
+from tracker.interchange.observations import readers
 
 
 def calibration_table():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tracker.calibration.camera_correction import FOCAL, POSITION, ROTATION
+from tracker.calibration.check.camera_correction import FOCAL, POSITION, ROTATION
 from tracker.geometry.rigid import skew, so3_exp
 
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from staging import cameras_around, own_evidence, posed, shaken
 
-from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import PosedBody
-from tracker.calibration.camera_correction import N_CORRECTIONS, corrected, later_s
-from tracker.calibration.viewed_frames import ViewedFrame
+from tracker.body.motion.pose_path import PosePath
+from tracker.calibration.check.camera_correction import N_CORRECTIONS, corrected, later_s
+from tracker.calibration.check.viewed_frames import ViewedFrame
+from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.formats.model_toml import load_model
-from tracker.motion.pose_path import PosePath
 
 CAMERAS = cameras_around(4)
 NAMES = [c.name for c in CAMERAS]

@@ -4,8 +4,8 @@ import numpy as np
 
 from tracker.body.limbs import limbs
 from tracker.body.searches import Search
-from tracker.tracking.runs.path_assessment import RunPose
-from tracker.tracking.runs.run_estimate import Progress
+from tracker.estimation.runs.path_assessment import RunPose
+from tracker.estimation.runs.run_estimate import Progress
 
 N_VIEWS = 4
 MOVED = Search("path", ("left_forearm",), 9.0, 2.0, True)

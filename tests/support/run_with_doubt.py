@@ -7,8 +7,8 @@ from tracker.body.searches import Search
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Alternative, PoseChange, PoseRecord
 
 WRONG_FRAME = 20
 DOUBTED = "left_forearm"

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
-from tracker.fitting.gauss_newton import fit_to_points
 
 NOISE_PX = 3.0
 LIMBS = [

@@ -7,14 +7,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tracker.body.model import PosedBody
-from tracker.contours import occluding_contours
+from tracker.evidence.contours import occluding_contours
+from tracker.evidence.images.edge_segments import link_edges
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import RegionFeatures, select_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
-from tracker.images.edge_segments import link_edges
 
 SIZE = (640, 480)
 

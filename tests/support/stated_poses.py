@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tracker.calibrations.convention_names import CONVENTIONS as CONVENTIONS
-from tracker.calibrations.pose_conventions import read_pose
+from tracker.formats.calibrations.convention_names import CONVENTIONS as CONVENTIONS
+from tracker.formats.calibrations.pose_conventions import read_pose
 from tracker.geometry import rigid
 
 _OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -12,8 +12,8 @@ from tracker.body.model import PosedBody
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model
 from tracker.session.session import Person, create_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 K1 = -0.3
 FPS = 25.0

@@ -1,9 +1,9 @@
 """Run trackers on staged evidence, the chamfer tracker by default."""
 
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.pipeline.methods import make_tracker
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
 
 
 def track(observer, models, start, frames, settings=None, **subjects):

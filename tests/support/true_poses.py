@@ -8,8 +8,8 @@ from command_line import SAMPLE
 from tracker.formats.model_toml import format_model, load_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 
 def sample_with_poses(folder, n):

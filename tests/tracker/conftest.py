@@ -6,10 +6,10 @@ from typing import NamedTuple
 import pytest
 
 from tracker.body.model import BodyModel
+from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session

@@ -1,6 +1,6 @@
 """Annotation for datasets: the plan of frames, the next best click, comments, blind copies, and joining two copies.
 
-Imports `pipeline` and below. Callers use `plan`, `frame_choice`, `comments`, `next_click`, `expected_error`,
+Imports `pipeline` and `evaluation`. Callers use `plan`, `frame_choice`, `comments`, `next_click`, `expected_error`,
 `blind_copy`, `merge_sessions` and `session_copy.require_free`.
 """
 

@@ -7,8 +7,8 @@ from tracker.annotation.numbered_settings import numbered_settings, plain_settin
 from tracker.annotation.plan import Task
 from tracker.annotation.session_copy import write_session_copy
 from tracker.session.session import Session
-from tracker.store.edit_log import EditLog, LoggedEdit, Pair
-from tracker.store.identities import derived_uid
+from tracker.session.store.edit_log import EditLog, LoggedEdit, Pair
+from tracker.session.store.identities import derived_uid
 
 
 def write_blind_copy(folder: Path, session: Session, log: EditLog, tasks: Sequence[Task], annotator: str) -> int:

@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 from tracker.errors import TrackerError
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.annotator import annotator
-from tracker.store.edit_tree import now
-from tracker.store.identities import new_uid
-from tracker.store.task_log import CommentRow
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.annotator import annotator
+from tracker.session.store.edit_tree import now
+from tracker.session.store.identities import new_uid
+from tracker.session.store.task_log import CommentRow
 
 
 class Comment(NamedTuple):

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
-from tracker.store.edit_log import EditLog, LoggedEdit, Move
+from tracker.session.store.edit_log import EditLog, LoggedEdit, Move
 
 T = TypeVar("T", bound=Hashable)
 

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.model import BodyModel
+from tracker.estimation.tracking.pose_errors import LOST_FROM, point_covariances
 from tracker.evaluation.metrics import LOST_M
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array, IntArray
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.stored_poses import StoredPose
-from tracker.tracking.pose_errors import LOST_FROM, point_covariances
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.stored_poses import StoredPose
 
 TRUNK = "trunk"
 """Name of the unit of the joints that belong to no limb: shoulders and hips."""

@@ -9,7 +9,7 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, IntArray
 from tracker.session.frame_list import parse_frames_and_ranges
 from tracker.session.session import Person, Session
-from tracker.store.stored_poses import StoredPose, read_stored_poses
+from tracker.session.store.stored_poses import StoredPose, read_stored_poses
 
 
 class FrameChoice(NamedTuple):

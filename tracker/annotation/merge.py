@@ -18,11 +18,11 @@ from tracker.annotation.three_way import Conflict, Shown, join_pins, join_poses,
 from tracker.body.model import BodyModel
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.arrays import Array
-from tracker.store.edit_log import COLUMNS, NUMBERS, EditLog, LoggedEdit, PoseRow
-from tracker.store.edit_tree import program_version
-from tracker.store.identities import derived_uid
-from tracker.store.records import ModelRevision
-from tracker.store.task_log import CommentRow, Rows, StateRow, TaskRow
+from tracker.session.store.edit_log import COLUMNS, NUMBERS, EditLog, LoggedEdit, PoseRow
+from tracker.session.store.edit_tree import program_version
+from tracker.session.store.identities import derived_uid
+from tracker.session.store.records import ModelRevision
+from tracker.session.store.task_log import CommentRow, Rows, StateRow, TaskRow
 
 _Row = TypeVar("_Row", TaskRow, StateRow, CommentRow)
 

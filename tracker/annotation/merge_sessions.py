@@ -14,8 +14,8 @@ from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.pipeline.calibration_revisions import same_calibration
 from tracker.session.session import Person, Session, load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.edit_log import EditLog
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.edit_log import EditLog
 
 
 class MergeReport(NamedTuple):

@@ -16,13 +16,13 @@ import numpy as np
 from tracker.annotation.expected_error import expected_errors, mean_errors
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours import occluding_contours
 from tracker.errors import SessionError, TrackerError
+from tracker.evidence.contours import occluding_contours
+from tracker.evidence.images.working_view import working_scale
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
-from tracker.images.working_view import working_scale
 from tracker.session.session import Session
-from tracker.store.stored_poses import StoredPose
+from tracker.session.store.stored_poses import StoredPose
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 from tracker.errors import DamagedStoreError
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
 from tracker.pipeline.stored_run import UNFINISHED
-from tracker.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, CALIBRATIONS_OF_EDITS
-from tracker.store.edit_log import Body, EditLog, Written
-from tracker.store.own_undo import TAKEN_BACK
+from tracker.session.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, CALIBRATIONS_OF_EDITS
+from tracker.session.store.edit_log import Body, EditLog, Written
+from tracker.session.store.own_undo import TAKEN_BACK
 
 _NUMBERED = (SIZES_EDITS, CALIBRATIONS, CALIBRATION_EDITS, CALIBRATIONS_OF_EDITS, TAKEN_BACK, UNFINISHED)
 """These settings; an unfinished run is dropped: it would go on in another store."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import tomli_w
 
 from tracker.files import write_text_atomic
-from tracker.observations.stored import DESCRIPTION, FOLDER, KIND
+from tracker.interchange.observations.stored import DESCRIPTION, FOLDER, KIND
 from tracker.text_files import read_toml
 
 

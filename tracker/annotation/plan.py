@@ -10,12 +10,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from tracker.errors import TrackerError
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.annotator import annotator
-from tracker.store.edit_tree import now
-from tracker.store.identities import derived_uid, new_uid
-from tracker.store.records import MarkChange
-from tracker.store.task_log import MadePose, PlannedPose, State, StateRow, TaskRow, last_verdict
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.annotator import annotator
+from tracker.session.store.edit_tree import now
+from tracker.session.store.identities import derived_uid, new_uid
+from tracker.session.store.records import MarkChange
+from tracker.session.store.task_log import MadePose, PlannedPose, State, StateRow, TaskRow, last_verdict
 
 STATES: tuple[State, ...] = ("draft", "annotated", "verified", "rejected")
 """States of the tasks that are not withdrawn, in the order in which they are counted."""

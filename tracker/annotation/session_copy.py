@@ -15,8 +15,8 @@ from tracker.files import sync_folder
 from tracker.pipeline.calibration_revisions import follow_history
 from tracker.session.folder import tidy_path
 from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.edit_log import EditLog
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.edit_log import EditLog
 
 
 def write_session_copy(

@@ -5,7 +5,7 @@ from datetime import datetime
 from typing import NamedTuple
 
 from tracker.annotation.plan import Task, read_tasks
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 class Speed(NamedTuple):

@@ -7,7 +7,7 @@ cleared one, a keyframe before a reviewed pose, that before any other, and of eq
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
-from tracker.store.edit_log import COLUMNS, NUMBERS, LoggedEdit, Pair, PinKey, PoseRow
+from tracker.session.store.edit_log import COLUMNS, NUMBERS, LoggedEdit, Pair, PinKey, PoseRow
 
 _BODY, _KEYFRAME, _REVIEWED = (COLUMNS.index(name) for name in ("model_revision", "keyframe", "reviewed"))
 

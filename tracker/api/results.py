@@ -7,18 +7,18 @@ from typing import Literal
 from tracker.api.pose_series import PoseSeries
 from tracker.api.sessions import PersonName, SessionOrFolder, frames_of, open_session, opened, people_of, person_of
 from tracker.api.work import Progress, ProgressSink
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.evaluation.judging import judge as judging
+from tracker.evaluation.judging.judge import Judgement
 from tracker.evaluation.metrics import Alignment, Evaluation
 from tracker.evaluation.references import placement, read_reference
 from tracker.evaluation.stored_evaluation import evaluate_stored
-from tracker.exports.export_files import check_options, for_format
-from tracker.exports.export_files import export as export_motion
-from tracker.exports.formats import find_format
-from tracker.exports.motion import Checked, read_motion
-from tracker.exports.options import ExportOptions
-from tracker.exports.pose_arrays import pose_arrays
-from tracker.judging import judge as judging
-from tracker.judging.judge import Judgement
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.interchange.exports.export_files import check_options, for_format
+from tracker.interchange.exports.export_files import export as export_motion
+from tracker.interchange.exports.formats import find_format
+from tracker.interchange.exports.motion import Checked, read_motion
+from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.pose_arrays import pose_arrays
 
 
 def read_poses(session: SessionOrFolder, person: PersonName = None, frames: Sequence[int] | None = None) -> PoseSeries:

@@ -6,10 +6,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.api.sessions import PersonName, SessionOrFolder, frames_of, opened, people_of, person_of
 from tracker.errors import TrackerError
-from tracker.initialization.first_pose import FirstPoses
+from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
+from tracker.estimation.initialization.first_pose import FirstPoses
+from tracker.estimation.tracking.method import OptionValue
 from tracker.pipeline.body_acquisition import acquire_body
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, unplaced
 from tracker.pipeline.find_people import FindSettings, find_people, sentences
@@ -17,7 +18,6 @@ from tracker.pipeline.methods import method_named
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.pipeline.track_session import Step, TrackSession
 from tracker.session.matching import check_names
-from tracker.tracking.method import OptionValue
 
 Progress: TypeAlias = Callable[[str, float], None]
 """Receives the kind of work and the share that is done, 0 to 1. Raise to stop; what was stored stays."""

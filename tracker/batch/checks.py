@@ -8,8 +8,8 @@ from tracker.api.work import track_plan
 from tracker.batch.plan import BatchPlan, PlannedRecording, Settings
 from tracker.batch.table import Footage, Problem
 from tracker.errors import TrackerError
-from tracker.exports.formats import FORMATS
-from tracker.observations.stored import list_observations
+from tracker.interchange.exports.formats import FORMATS
+from tracker.interchange.observations.stored import list_observations
 from tracker.session.assemble import check_parts
 from tracker.session.frame_list import parse_frame_list
 from tracker.session.relink import require_files

@@ -24,8 +24,8 @@ from tracker.geometry.arrays import Array
 from tracker.pipeline.keyframe_stretches import Seam, seam_of, with_seam
 from tracker.session.lock import SessionLock
 from tracker.session.session import Person, Session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import AssessmentChange, PoseChange, PoseRecord
 
 _JOINING = "joining"
 """Setting of the session: the task that joins stretches, and the entry of the history to which it adds poses."""

@@ -19,7 +19,7 @@ from tracker.errors import SessionError, TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array, IntArray
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 @dataclass(frozen=True)

@@ -17,18 +17,18 @@ from tracker.batch.plan import Settings
 from tracker.batch.stretches import Division, RecordingStretch, divide
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.fitting.retarget import retarget_pose
+from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.estimation.initialization.first_pose import FirstPoses, find_first_poses
+from tracker.estimation.initialization.generators.start_generators import GENERATORS
 from tracker.formats.model_toml import format_model
-from tracker.initialization.first_pose import FirstPoses, find_first_poses
-from tracker.initialization.generators.start_generators import GENERATORS
-from tracker.observations.stored import FOLDER as OBSERVATIONS
-from tracker.observations.stored_masks import list_masks
+from tracker.interchange.observations.stored import FOLDER as OBSERVATIONS
+from tracker.interchange.observations.stored_masks import list_masks
 from tracker.pipeline.chain import ChainPlan, StoredSession, begin_chain, run_chain
 from tracker.pipeline.find_people import FindSettings, find_people, frames_to_try
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import CALIBRATION_FILE, Session, save_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.backups import copy_store
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.backups import copy_store
 
 FOUND = "found"
 """Setting of a copy: whether its people were found in this stretch, so that their names are not sure."""

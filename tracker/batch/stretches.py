@@ -9,7 +9,7 @@ from math import ceil
 
 import msgspec
 
-from tracker.tracking.pose_errors import OFF_M
+from tracker.estimation.tracking.pose_errors import OFF_M
 
 
 class RecordingStretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -23,15 +23,15 @@ from tracker.batch.stretch_work import begin, track_stretch
 from tracker.batch.stretches import Division, SeamRow, n_stretches
 from tracker.batch.task_files import RecordingTask
 from tracker.errors import TrackerError
-from tracker.exports.formats import FORMATS
 from tracker.files import write_text_atomic
 from tracker.formats.file_names import own_identifier
 from tracker.formats.model_toml import format_model, has_preset_proportions, load_model
+from tracker.interchange.exports.formats import FORMATS
 from tracker.pipeline.body_acquisition import store_body
 from tracker.session.assemble import assemble
 from tracker.session.lock import SessionLock
 from tracker.session.session import ANNOTATIONS_FILE, Session, load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 _TRACKED = "batch"
 """Setting of the session: the task that tracked it, and what it found. The same task does not track again."""

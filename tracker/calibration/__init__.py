@@ -1,22 +1,5 @@
-"""Is the calibration right, which camera is off, by how much: from contours of bodies and from points (GD96 Sect. 5).
+"""The cameras: whether they are calibrated well, and their calibration by a board or by people.
 
-`tracker/calibrations` reads and writes the files of calibrations; this room judges and corrects cameras. It may import
-`acquisition` and the rooms below. `camera_columns.project_with_columns` differentiates projections by a camera, and
-`point_adjustment.adjust_points` fits cameras and points to reprojection errors.
+The wing may import those up to `interchange`. Files of calibrations are in `formats.calibrations`; a change of those of
+a session is an entry of its history (`pipeline.calibration_revisions`).
 """
-
-__all__ = [
-    "camera_columns",
-    "camera_correction",
-    "diagnosis",
-    "fault_search",
-    "findings",
-    "lens_priors",
-    "point_adjustment",
-    "reprojection",
-    "residual_pieces",
-    "rig_problem",
-    "single_frames",
-    "solvable",
-    "viewed_frames",
-]

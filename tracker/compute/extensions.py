@@ -10,11 +10,11 @@ The module that it names should import little, because help and menus load it. G
 
 | group | object |
 |---|---|
-| `quadrille.exporters` | `tracker.exports.export_format.ExportFormat` |
+| `quadrille.exporters` | `tracker.interchange.exports.export_format.ExportFormat` |
 | `quadrille.metrics` | `tracker.evaluation.metric.Metric` |
-| `quadrille.calibrations` | `tracker.calibrations.calibration_layout.CalibrationLayout` |
-| `quadrille.detectors` | `tracker.detection.detector.DetectorKind` |
-| `quadrille.starts` | `tracker.initialization.generators.start_generators.StartGenerator` |
+| `quadrille.calibrations` | `tracker.formats.calibrations.calibration_layout.CalibrationLayout` |
+| `quadrille.detectors` | `tracker.interchange.detection.detector.DetectorKind` |
+| `quadrille.starts` | `tracker.estimation.initialization.generators.start_generators.StartGenerator` |
 """
 
 import io

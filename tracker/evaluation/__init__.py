@@ -1,6 +1,6 @@
 """Errors of estimated poses against a reference.
 
-Imports `geometry`, `body`, `formats`, `observations`, `plausibility`, `session` and `store`. Callers use
+Rooms: `agreement` of annotators, and `judging` what other programs found. Callers use
 `metrics.evaluate_joints`, `metrics.evaluate_poses` and `references.read_reference`.
 """
 

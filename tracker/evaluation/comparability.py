@@ -12,8 +12,8 @@ from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.plausibility.posed_people import read_beside
-from tracker.plausibility.readings import Reading, ReadPoints
+from tracker.interchange.plausibility.posed_people import read_beside
+from tracker.interchange.plausibility.readings import Reading, ReadPoints
 
 APART_M = 1.0
 """Median distance above which two motions are not estimates of one."""

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import BENT_RAD
 from tracker.body.model import BodyModel
+from tracker.body.motion.shortest_step import shortest_step
 from tracker.errors import FormatError, Remedy
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.motion.shortest_step import shortest_step
 
 LOST_M = 0.15
 """A frame with a limb joint off by more is lost, metres."""

@@ -18,13 +18,13 @@ from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.pose_csv import PoseTable, is_pose_table, read_pose_table
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
-from tracker.observations.readers import FORMATS, SPACE_FORMATS, find_files
-from tracker.observations.space import name_points
+from tracker.interchange.observations.readers import FORMATS, SPACE_FORMATS, find_files
+from tracker.interchange.observations.space import name_points
 from tracker.session.clocks import Clock, Placement, place_rows
 from tracker.session.folder import SESSION_FILE
 from tracker.session.session import Session, load_session
-from tracker.store.records import PoseRecord
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.records import PoseRecord
+from tracker.session.store.stored_poses import read_stored_poses
 
 
 class Reference(NamedTuple):
@@ -130,7 +130,7 @@ def stored_motion(session: Session, person: int) -> Reference:
 
 
 def _assessment(record: PoseRecord) -> PoseDoubt:
-    from tracker.tracking.pose_errors import probability_off  # imported lazily: it loads kernels
+    from tracker.estimation.tracking.pose_errors import probability_off  # imported lazily: it loads kernels
 
     off = float(probability_off(np.array(record.limbs_lost)).max()) if record.limbs_lost else None
     return PoseDoubt("keyframe" if record.keyframe else record.status, off, record.remark, record.seam_mm)

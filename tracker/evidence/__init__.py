@@ -1,7 +1,8 @@
 """Turn footage into the evidence that poses are scored against: edges, distance images, silhouettes and colours per
 view.
 
-The room imports `geometry`, `footage` and `images`, and knows no body. Callers use `observer.Observer` and
+Rooms: `images` (pixels to features), `contours` (what a camera sees of a posed body) and `voxels`. This one imports
+`geometry`, `footage` and `evidence.images`, and knows no body. Callers use `observer.Observer` and
 `view_evidence`.
 """
 

@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.evidence.images import background_subtraction
+from tracker.evidence.images.background_subtraction import Changes
+from tracker.evidence.images.change import change_threshold
+from tracker.evidence.images.image_statistics import ImageStatistics, SampleGrid
+from tracker.evidence.images.working_view import WorkingView
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.mask_image import parts_of_mask
 from tracker.footage.recording import read_background, read_mask
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Region
-from tracker.images import background_subtraction
-from tracker.images.background_subtraction import Changes
-from tracker.images.change import change_threshold
-from tracker.images.image_statistics import ImageStatistics, SampleGrid
-from tracker.images.working_view import WorkingView
 
 
 class Prepared(NamedTuple):

@@ -2,7 +2,7 @@
 
 Detectors are consistently off: the hip of most lies higher and farther out than the joint. Each point therefore has an
 offset from the joint in the frame of its part, and a standard deviation, both learnt per recording
-(`tracker.acquisition.from_keypoints`).
+(`tracker.estimation.acquisition.from_keypoints`).
 """
 
 from collections.abc import Sequence

@@ -15,6 +15,11 @@ import cv2
 import numpy as np
 
 from tracker.evidence.foreground import Foreground, Prepared
+from tracker.evidence.images import background_subtraction
+from tracker.evidence.images.edge_segments import link_edges, sample_segments
+from tracker.evidence.images.edges import detect_edges, levels
+from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.working_view import fit_region
 from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.view_evidence import (
     DEFAULT_EDGES,
@@ -29,11 +34,6 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Camera, Region
-from tracker.images import background_subtraction
-from tracker.images.edge_segments import link_edges, sample_segments
-from tracker.images.edges import detect_edges, levels
-from tracker.images.static_edges import StaticEdgeModel
-from tracker.images.working_view import fit_region
 
 FOREGROUND_MARGIN = 0.012
 """Width of the margin around the silhouette in which edges count, as a fraction of the longer side of the image."""

@@ -1,7 +1,7 @@
 """Find the silhouettes of a frame in all views, from the user's masks or by background subtraction.
 
 Silhouettes are in *raw* pixels: as filmed, lens distortion included, at working scale. A look-up table
-(`tracker.voxels.sensor_lookup`) leads from points in space to them (MTHC01 Sect. 2).
+(`tracker.evidence.voxels.sensor_lookup`) leads from points in space to them (MTHC01 Sect. 2).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,13 +13,8 @@ import cv2
 import numpy as np
 
 from tracker.errors import RecordingError, Remedy
-from tracker.footage.camera_source import CameraSource
-from tracker.footage.mask_image import parts_of_mask
-from tracker.footage.recording import Recording, background_frames, read_mask
-from tracker.geometry.arrays import FloatArray, Image
-from tracker.geometry.cameras import Camera
-from tracker.images.background_model import BackgroundModel, background_of_clip, background_of_recording
-from tracker.images.background_subtraction import (
+from tracker.evidence.images.background_model import BackgroundModel, background_of_clip, background_of_recording
+from tracker.evidence.images.background_subtraction import (
     SHADOWS_AND_HIGHLIGHTS,
     Changes,
     Mask,
@@ -30,10 +25,15 @@ from tracker.images.background_subtraction import (
     smooth_image,
     subtract_background,
 )
-from tracker.images.change import change_threshold
-from tracker.images.image_statistics import SPACING_PX
-from tracker.images.silhouette_cleaning import clean_silhouette
-from tracker.images.working_view import WorkingView
+from tracker.evidence.images.change import change_threshold
+from tracker.evidence.images.image_statistics import SPACING_PX
+from tracker.evidence.images.silhouette_cleaning import clean_silhouette
+from tracker.evidence.images.working_view import WorkingView
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.mask_image import parts_of_mask
+from tracker.footage.recording import Recording, background_frames, read_mask
+from tracker.geometry.arrays import FloatArray, Image
+from tracker.geometry.cameras import Camera
 
 SilhouetteSource = Literal["mask", "background", "recording", "none"]
 """Source of a silhouette: the user's mask, an empty scene, the recording's own median, or none: a damaged frame, or one

@@ -13,13 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
-from tracker.evidence.keypoints import ViewKeypoints
-from tracker.geometry.arrays import FloatArray, Image, Mask
-from tracker.geometry.cameras import Camera, Region
-from tracker.images.background_subtraction import Changes
-from tracker.images.color_histogram import BINS, count_colors
-from tracker.images.distance_transform import distance_image
-from tracker.images.edge_segments import (
+from tracker.evidence.images.background_subtraction import Changes
+from tracker.evidence.images.color_histogram import BINS, count_colors
+from tracker.evidence.images.distance_transform import distance_image
+from tracker.evidence.images.edge_segments import (
     MAX_ANGLE_RAD,
     MAX_LENGTH,
     EdgeSegments,
@@ -27,9 +24,12 @@ from tracker.images.edge_segments import (
     accept_segments,
     sample_segments,
 )
-from tracker.images.edges import Edges
-from tracker.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
-from tracker.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.edges import Edges
+from tracker.evidence.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
+from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.keypoints import ViewKeypoints
+from tracker.geometry.arrays import FloatArray, Image, Mask
+from tracker.geometry.cameras import Camera, Region
 
 SCENE_SPACING_PX = 4
 """Size of the cells in which edges are thinned to one point each, px."""

@@ -3,7 +3,7 @@
 One section per camera: `name`, `size` (width, height), `matrix` (3x3), `distortions` (OpenCV's order), `rotation`
 (Rodrigues vector, or a 3x3 matrix) and `translation` with `X_camera = R X_world + t`, and `fisheye`: with true, the
 distortions are k1 to k4 of OpenCV's equidistant model. A section `metadata` is not a camera. Foreign files, which may
-say the same in other words and units, are read by `tracker.calibrations`.
+say the same in other words and units, are read by `tracker.formats.calibrations`.
 """
 
 from collections.abc import Sequence

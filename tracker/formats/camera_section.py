@@ -1,6 +1,6 @@
 """One camera of a calibration, as data of the anipose layout, and the checks of what it says.
 
-Other layouts are rewritten to this one (`tracker.calibrations`), so that all are checked by one declaration.
+Other layouts are rewritten to this one (`tracker.formats.calibrations`), so that all are checked by one declaration.
 """
 
 from collections.abc import Sequence

@@ -18,7 +18,7 @@ from tracker.geometry.triangulation import MIN_ANGLE_RAD
 
 INLIER_M = 0.10
 """Distance from a point, metres, within which a view's observation is of it. Poses that differ by no more are the same
-pose elsewhere (`tracker.fitting.hypothesis`): a limb is about as thick."""
+pose elsewhere (`tracker.estimation.fitting.hypothesis`): a limb is about as thick."""
 _STEPS = 5
 """Number of Gauss-Newton steps; from the nearest point of two rays, the last ones move it by less than a micrometre."""
 _ROBUST_ROUNDS = 3

@@ -1,6 +1,6 @@
 """Drive a session through a tracker: find people, acquire sizes, track, estimate all frames together, resume and save.
 
-The top of the library: it may import every room of `tracker`. The command line and the page use
+It may import the wings up to `calibration`. The command line and the page use
 `find_people.find_people`, `body_acquisition.acquire_body`, `stored_run.stored_run` and `track_session.TrackSession`.
 """
 

@@ -6,11 +6,17 @@ import numpy as np
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.store.records import PoseRecord
-from tracker.tracking.confidence import classify_limbs, probabilities
-from tracker.tracking.pose_errors import elsewhere_odds, limb_odds, mass_odds, point_covariances, unshown_odds
-from tracker.tracking.remarks import may_be_elsewhere, uncertain, without_uncertainty
-from tracker.tracking.runs.path_assessment import RunPose
+from tracker.estimation.runs.path_assessment import RunPose
+from tracker.estimation.tracking.confidence import classify_limbs, probabilities
+from tracker.estimation.tracking.pose_errors import (
+    elsewhere_odds,
+    limb_odds,
+    mass_odds,
+    point_covariances,
+    unshown_odds,
+)
+from tracker.estimation.tracking.remarks import may_be_elsewhere, uncertain, without_uncertainty
+from tracker.session.store.records import PoseRecord
 
 
 def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseRecord:

@@ -11,8 +11,13 @@ import numpy as np
 
 from tracker.compute.progress import mapped
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.by_frame.settings import EstimationSettings
+from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.estimation.runs.frame_hypotheses import Proposal
+from tracker.estimation.runs.path_assessment import RunPose
+from tracker.estimation.runs.run_estimate import Progress, RunFrames, estimate_run, poses_beside
+from tracker.estimation.tracking.subjects import Subjects
 from tracker.evidence.observer import Observer
-from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.pipeline.assessed_poses import assessed_by_run
@@ -20,14 +25,9 @@ from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row, po
 from tracker.pipeline.tracked_changes import settings_record
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
-from tracker.store.stored_poses import read_stored_poses
-from tracker.tracking.estimation.settings import EstimationSettings
-from tracker.tracking.runs.frame_hypotheses import Proposal
-from tracker.tracking.runs.path_assessment import RunPose
-from tracker.tracking.runs.run_estimate import Progress, RunFrames, estimate_run, poses_beside
-from tracker.tracking.subjects import Subjects
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import AssessmentChange, PoseChange, PoseRecord
+from tracker.session.store.stored_poses import read_stored_poses
 
 
 @dataclass(frozen=True)

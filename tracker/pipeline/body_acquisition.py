@@ -8,30 +8,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
-from tracker.acquisition.from_joints import place_joints
-from tracker.acquisition.size_report import unobservable_joints
-from tracker.acquisition.two_views import TwoViewSettings, acquire_from_two_views
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
+from tracker.estimation.acquisition.from_joints import place_joints
+from tracker.estimation.acquisition.size_report import unobservable_joints
+from tracker.estimation.acquisition.two_views import TwoViewSettings, acquire_from_two_views
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.tracker import ChamferTracker
+from tracker.estimation.fitting.gauss_newton import PointTargets
+from tracker.estimation.fitting.pins import PinBlock, pin_block
+from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.estimation.initialization.first_pose import HEIGHT_SIGMA
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evidence.observer import Observer
-from tracker.fitting.gauss_newton import PointTargets
-from tracker.fitting.pins import PinBlock, pin_block
-from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.initialization.first_pose import HEIGHT_SIGMA
 from tracker.pipeline.seen_points import seen_points
 from tracker.session.session import Session, save_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import SEEN, SOURCES, Change, PoseChange, PoseRecord
-from tracker.store.stored_poses import StoredPose, read_stored_poses
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import SEEN, SOURCES, Change, PoseChange, PoseRecord
+from tracker.session.store.stored_poses import StoredPose, read_stored_poses
 
 SIZES_EDITS = "sizes_edits"
 """Setting of the session: the entries of the history that changed sizes, see `sizes_changed`."""

@@ -11,8 +11,8 @@ from tracker.formats.model_toml import load_model
 from tracker.pipeline.body_acquisition import store_body
 from tracker.pipeline.chain import FOLLOWED
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.stored_poses import read_stored_poses
 
 
 class ChangedBody(NamedTuple):

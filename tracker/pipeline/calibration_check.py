@@ -5,18 +5,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.acquisition.size_parameters import SizeParameters
-from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, TIME
-from tracker.calibration.diagnosis import Diagnosis, diagnose, glance
-from tracker.calibration.fault_search import prior_sigmas
-from tracker.calibration.findings import CameraFinding, findings, sentence
-from tracker.calibration.point_adjustment import NEWS
-from tracker.calibration.residual_pieces import ResidualPieces, residual_pieces
-from tracker.calibration.single_frames import FrameScore, find_change, score_frame
-from tracker.calibration.viewed_frames import ViewedFrame
+from tracker.calibration.check.camera_correction import KINDS, N_CORRECTIONS, TIME
+from tracker.calibration.check.diagnosis import Diagnosis, diagnose, glance
+from tracker.calibration.check.fault_search import prior_sigmas
+from tracker.calibration.check.findings import CameraFinding, findings, sentence
+from tracker.calibration.check.point_adjustment import NEWS
+from tracker.calibration.check.residual_pieces import ResidualPieces, residual_pieces
+from tracker.calibration.check.single_frames import FrameScore, find_change, score_frame
+from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import Remedy, TrackerError
-from tracker.fitting.hypothesis import SAME_POSE_M
+from tracker.estimation.acquisition.size_parameters import SizeParameters
+from tracker.estimation.fitting.hypothesis import SAME_POSE_M
 from tracker.footage.camera_source import LostFrames
 from tracker.geometry.arrays import Array
 from tracker.pipeline.posed_recording import MIN_FRAMES, N_FRAMES, PosedRecording

@@ -1,4 +1,4 @@
-"""Change the calibration of a session: corrections are entries of the history (`tracker.store.calibration_log`)."""
+"""Change the calibration of a session: corrections are entries of the history (`store.calibration_log`)."""
 
 import math
 import tomllib
@@ -7,7 +7,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
-from tracker.calibration.camera_correction import DRIFT, TIME, corrected
+from tracker.calibration.check.camera_correction import DRIFT, TIME, corrected
 from tracker.errors import SessionError
 from tracker.files import refuse_links, write_text_atomic
 from tracker.footage.camera_source import Clock, LostFrames
@@ -18,15 +18,15 @@ from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.stored_run import forget_unfinished
 from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_cameras
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_log import (
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.calibration_log import (
     CALIBRATION_EDITS,
     CALIBRATIONS,
     calibration_edits,
     present_revision,
     revisions_of_poses,
 )
-from tracker.store.edit_tree import now
+from tracker.session.store.edit_tree import now
 
 
 def apply_check(session: Session, store: AnnotationStore, check: CalibrationCheck) -> Session:

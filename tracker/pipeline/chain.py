@@ -9,16 +9,16 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
-from tracker.acquisition.body_points import BodyPoints
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, part_of
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
+from tracker.estimation.fitting.gauss_newton import PointTargets
+from tracker.estimation.initialization.first_pose import FirstPoses
 from tracker.evidence.observer import Observer
-from tracker.fitting.gauss_newton import PointTargets
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import has_preset_proportions
-from tracker.initialization.first_pose import FirstPoses
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
 from tracker.pipeline.calibration_revisions import follow_history, outdated_sizes
 from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found
@@ -37,7 +37,7 @@ from tracker.pipeline.track_session import Step, TrackSession
 from tracker.session.lock import SessionLock
 from tracker.session.relink import require_files
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 FOLLOWED = ("tracked", "interpolated")
 """Sources of poses that follow from those of other frames, so that no run starts from them."""

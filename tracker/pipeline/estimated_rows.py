@@ -5,11 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from tracker.body.model import BodyModel
+from tracker.estimation.runs.path_assessment import RunPose
 from tracker.geometry.arrays import Array
 from tracker.pipeline.assessed_poses import assessed_by_run
 from tracker.pipeline.tracked_changes import number
-from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
-from tracker.tracking.runs.path_assessment import RunPose
+from tracker.session.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 
 
 def estimated_row(

@@ -8,9 +8,7 @@ import numpy as np
 
 from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
-from tracker.evidence.observer import Observer
-from tracker.formats.model_toml import format_model
-from tracker.initialization.first_pose import (
+from tracker.estimation.initialization.first_pose import (
     ENOUGH_FRAMES,
     VOXEL_M,
     FirstPose,
@@ -19,13 +17,15 @@ from tracker.initialization.first_pose import (
     find_first_poses,
     find_first_poses_anywhere,
 )
-from tracker.initialization.known_start import fit_to_contours
-from tracker.observations.stored import list_observations
+from tracker.estimation.initialization.known_start import fit_to_contours
+from tracker.evidence.observer import Observer
+from tracker.formats.model_toml import format_model
+from tracker.interchange.observations.stored import list_observations
 from tracker.pipeline.body_acquisition import MEASURED, SIZES_EDITS, with_sizes_changed
 from tracker.pipeline.keypoint_evidence import MAX_FRAMES, find_by_keypoints
 from tracker.session.session import Session, save_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 AXES = "silhouette_axes"
 """Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera.

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
-from tracker.acquisition.from_joints import height_from_joints, pose_at_joints
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
+from tracker.estimation.acquisition.from_joints import height_from_joints, pose_at_joints
+from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evidence.observer import Observer
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, has_preset_sizes
@@ -18,11 +18,11 @@ from tracker.formats.pose_csv import PoseTable
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.geometry.framing import Framing, framings
-from tracker.plausibility.examine import examine_joints
+from tracker.interchange.plausibility.examine import examine_joints
 from tracker.session.lock import SessionLock
 from tracker.session.session import Person, Session, save_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 
 @dataclass(frozen=True)

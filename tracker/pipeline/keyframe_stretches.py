@@ -15,15 +15,15 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.tracking.confidence import classify_limbs, probabilities, status_named, worst
+from tracker.estimation.tracking.pose_errors import limb_odds, point_covariances
+from tracker.estimation.tracking.remarks import uncertain, without_uncertainty
+from tracker.estimation.tracking.subjects import Keyframes
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import BETWEEN, SEAM, PoseRecord
-from tracker.tracking.confidence import classify_limbs, probabilities, status_named, worst
-from tracker.tracking.pose_errors import limb_odds, point_covariances
-from tracker.tracking.remarks import uncertain, without_uncertainty
-from tracker.tracking.subjects import Keyframes
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import BETWEEN, SEAM, PoseRecord
 
 _POSES = "keyframe_poses"
 """Key of a pose's settings: checksums of the poses of the two keyframes."""

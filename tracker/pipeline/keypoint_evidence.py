@@ -9,26 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from tracker.acquisition.body_points import BodyPoints
-from tracker.acquisition.from_joints import place_joints
-from tracker.acquisition.from_keypoints import SeenBody, fit_to_keypoints, learn_seen_body
-from tracker.acquisition.segment_lengths import segment_lengths
 from tracker.body.dimensions import HEIGHT_LIMITS_M
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.sampling import spread_indices
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.from_joints import place_joints
+from tracker.estimation.acquisition.from_keypoints import SeenBody, fit_to_keypoints, learn_seen_body
+from tracker.estimation.acquisition.segment_lengths import segment_lengths
+from tracker.estimation.fitting.gauss_newton import PointTargets
+from tracker.estimation.fitting.hypothesis import Hypothesis
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
 from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.observer import Observer
-from tracker.fitting.gauss_newton import PointTargets
-from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model, has_preset_sizes
-from tracker.initialization.first_pose import FirstPose, FirstPoses
-from tracker.observations.assignment import people_by_poses
-from tracker.observations.body_points import body_points
-from tracker.observations.observed import ObservationSet
-from tracker.observations.stored import load_observations
+from tracker.interchange.observations.assignment import people_by_poses
+from tracker.interchange.observations.body_points import body_points
+from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.stored import load_observations
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 SEEN_BODIES = "seen bodies"
 """Setting of the session: how the detector of each set of observations sees the people, see `seen_bodies_record`."""

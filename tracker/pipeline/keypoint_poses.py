@@ -4,22 +4,22 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tracker.acquisition.body_points import BodyPoints
-from tracker.acquisition.from_keypoints import fit_to_keypoints, learn_seen_body
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, part_of, result_of, unreported
 from tracker.errors import TrackerError
+from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import fit_to_keypoints, learn_seen_body
+from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, solve, weak_pull
+from tracker.estimation.fitting.interpenetration import SelfPenetration
+from tracker.estimation.fitting.keypoints import KeypointBlock
+from tracker.estimation.trajectory.solve import PosedPath, solve_path
 from tracker.evidence.keypoints import PersonKeypoints
-from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, solve, weak_pull
-from tracker.fitting.interpenetration import SelfPenetration
-from tracker.fitting.keypoints import KeypointBlock
 from tracker.formats.model_toml import format_model
 from tracker.geometry.cameras import Camera
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import Session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.trajectory.solve import PosedPath, solve_path
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 
 def store_keypoint_poses(

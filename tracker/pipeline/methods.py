@@ -3,14 +3,14 @@
 from typing import TYPE_CHECKING
 
 from tracker.errors import TrackerError
-from tracker.tracking.chamfer.method import CHAMFER
-from tracker.tracking.contour.method import CONTOUR
-from tracker.tracking.method import Method, Option
-from tracker.tracking.voxel.method import VOXEL
+from tracker.estimation.chamfer.method import CHAMFER
+from tracker.estimation.contour.method import CONTOUR
+from tracker.estimation.tracking.method import Method, Option
+from tracker.estimation.voxel.method import VOXEL
 
 if TYPE_CHECKING:
-    from tracker.tracking.estimation.settings import EstimationSettings
-    from tracker.tracking.tracker import Tracker, TrackerSettings
+    from tracker.estimation.by_frame.settings import EstimationSettings
+    from tracker.estimation.tracking.tracker import Tracker, TrackerSettings
 
 METHODS: dict[str, Method] = {method.name: method for method in (CHAMFER, CONTOUR, VOXEL)}
 """All methods in the order in which they are shown. The first is the default."""
@@ -39,8 +39,8 @@ def make_tracker(settings: "TrackerSettings") -> "Tracker":
 def compared_by(settings: "TrackerSettings") -> "EstimationSettings":
     """Return the settings of the evidence by which the poses of a run are compared: its own, or those of contours where
     the method measures something else."""
-    from tracker.tracking.chamfer.settings import TrackSettings
-    from tracker.tracking.estimation.settings import EstimationSettings
+    from tracker.estimation.by_frame.settings import EstimationSettings
+    from tracker.estimation.chamfer.settings import TrackSettings
 
     return settings if isinstance(settings, EstimationSettings) else TrackSettings()
 

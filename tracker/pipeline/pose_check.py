@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.compute.progress import Report, mapped, result_of, unreported
 from tracker.errors import TrackerError
+from tracker.estimation.by_frame.settings import EstimationSettings
+from tracker.estimation.runs.frame_hypotheses import Proposal
+from tracker.estimation.runs.path_assessment import RunPose
+from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
+from tracker.estimation.tracking.person_memory import HISTORY_FRAMES
+from tracker.estimation.tracking.subjects import Subjects
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
 from tracker.pipeline.assessed_poses import assessed_by_run
 from tracker.session.session import Session
-from tracker.store.records import PoseRecord
-from tracker.tracking.estimation.settings import EstimationSettings
-from tracker.tracking.person_memory import HISTORY_FRAMES
-from tracker.tracking.runs.frame_hypotheses import Proposal
-from tracker.tracking.runs.path_assessment import RunPose
-from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
-from tracker.tracking.subjects import Subjects
+from tracker.session.store.records import PoseRecord
 
 
 @dataclass(frozen=True, eq=False)

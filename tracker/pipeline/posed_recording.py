@@ -6,20 +6,20 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker.acquisition.from_contours import learn_static_edges
 from tracker.body.model import BodyModel, PosedBody
-from tracker.calibration.viewed_frames import ViewedFrame, spread_poses
+from tracker.body.motion.pose_path import PosePath
+from tracker.calibration.check.viewed_frames import ViewedFrame, spread_poses
 from tracker.compute.progress import Report, unreported
 from tracker.compute.sampling import spread_indices
 from tracker.errors import TrackerError
+from tracker.estimation.acquisition.from_contours import learn_static_edges
+from tracker.estimation.fitting.hypothesis import SAME_POSE_M
+from tracker.estimation.tracking.estimate import TrackedFrame
+from tracker.estimation.tracking.view_regions import regions
+from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.observer import Observer
-from tracker.fitting.hypothesis import SAME_POSE_M
-from tracker.images.static_edges import StaticEdgeModel
-from tracker.motion.pose_path import PosePath
 from tracker.session.session import Session
-from tracker.store.stored_poses import read_stored_poses
-from tracker.tracking.estimate import TrackedFrame
-from tracker.tracking.view_regions import regions
+from tracker.session.store.stored_poses import read_stored_poses
 
 N_FRAMES = 20
 """Frames of diverse poses that a check uses: with 3 the camera is found, with 20 its correction is known to 0.02

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.fitting.hypothesis import SETTLED_M
+from tracker.estimation.fitting.hypothesis import SETTLED_M
 from tracker.footage.camera_source import CameraSource
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.store.records import SEEN, Pin, PoseRecord
+from tracker.session.store.records import SEEN, Pin, PoseRecord
 
 _Seen = dict[str, dict[str, Any]]
 """Position in each camera, original px, by point."""

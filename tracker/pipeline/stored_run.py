@@ -11,6 +11,13 @@ from typing import Any
 import numpy as np
 
 from tracker.errors import Remedy, SessionError
+from tracker.estimation.runs.run_estimate import poses_beside
+from tracker.estimation.tracking.confidence import Status, status_named
+from tracker.estimation.tracking.estimate import TrackedFrame
+from tracker.estimation.tracking.person_memory import HISTORY_FRAMES
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
+from tracker.estimation.trajectory.solve import even_blocks
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model
@@ -28,15 +35,8 @@ from tracker.pipeline.tracked_changes import (
 )
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseRecord
-from tracker.tracking.confidence import Status, status_named
-from tracker.tracking.estimate import TrackedFrame
-from tracker.tracking.person_memory import HISTORY_FRAMES
-from tracker.tracking.runs.run_estimate import poses_beside
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackerSettings, TrackingRun
-from tracker.trajectory.solve import even_blocks
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseRecord
 
 _SAVE_FRAMES = 10
 """Frames after which a run is saved."""

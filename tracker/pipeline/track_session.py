@@ -6,6 +6,15 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from tracker.compute.progress import mapped
+from tracker.estimation.runs.frame_hypotheses import Proposal
+from tracker.estimation.runs.path_assessment import RunPose
+from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
+from tracker.estimation.tracking.confidence import Status, status_named
+from tracker.estimation.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
+from tracker.estimation.tracking.person_memory import HISTORY_FRAMES
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Tracker, TrackingRun
+from tracker.estimation.trajectory.solve import even_blocks
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
 from tracker.pipeline.calibration_check import contradiction
@@ -14,16 +23,7 @@ from tracker.pipeline.keyframe_stretches import between_keyframes, seam_of, with
 from tracker.pipeline.methods import compared_by
 from tracker.pipeline.posed_recording import PosedRecording
 from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson, settings_record, tracked_changes
-from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
-from tracker.tracking.confidence import Status, status_named
-from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
-from tracker.tracking.person_memory import HISTORY_FRAMES
-from tracker.tracking.runs.frame_hypotheses import Proposal
-from tracker.tracking.runs.path_assessment import RunPose
-from tracker.tracking.runs.run_estimate import RunFrames, estimate_run
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import Tracker, TrackingRun
-from tracker.trajectory.solve import even_blocks
+from tracker.session.store.records import AssessmentChange, PoseChange, PoseRecord
 
 
 class EstimateStep(NamedTuple):

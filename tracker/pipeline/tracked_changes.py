@@ -6,14 +6,14 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from tracker.estimation.tracking.confidence import PoseQuality
+from tracker.estimation.tracking.estimate import PoseEstimate
+from tracker.estimation.tracking.subjects import Keyframes
+from tracker.estimation.tracking.tracker import TrackerSettings
 from tracker.geometry.arrays import Array
 from tracker.session.session import Person
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
-from tracker.tracking.confidence import PoseQuality
-from tracker.tracking.estimate import PoseEstimate
-from tracker.tracking.subjects import Keyframes
-from tracker.tracking.tracker import TrackerSettings
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 
 _FIRST_METHOD = "chamfer"
 """The method of settings that name none: they are older than any other method."""

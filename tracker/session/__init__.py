@@ -1,7 +1,7 @@
 """The session folder: reading and writing it, its lock, making it from loose files.
 
-Imports `geometry`, `body`, `formats` and `footage`. Callers use `session.load_session`, `lock.SessionLock`,
-`assemble.assemble` and `locked_dofs`.
+The room `store` has its annotations. Imports `geometry`, `body`, `formats` and `footage`. Callers use
+`session.load_session`, `lock.SessionLock`, `assemble.assemble` and `locked_dofs`.
 """
 
 __all__ = [

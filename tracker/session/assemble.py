@@ -5,13 +5,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
-from tracker.calibrations.convention_names import PoseConvention
-from tracker.calibrations.reading import CalibratedCameras, read_cameras
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size
 from tracker.footage.video import Footage, open_footage
+from tracker.formats.calibrations.convention_names import PoseConvention
+from tracker.formats.calibrations.reading import CalibratedCameras, read_cameras
 from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
@@ -54,7 +54,7 @@ class NewSession:
     folder: Path
     """Folder of the session; must not exist, or be empty."""
     calibration: Path | Sequence[Path]
-    """A file or folder, or a file for each camera (`tracker.calibrations`)."""
+    """A file or folder, or a file for each camera (`tracker.formats.calibrations`)."""
     videos: Sequence[Path] = ()
     """Video files or image folders, each named after its camera."""
     camera_paths: Mapping[str, Path] = field(default_factory=dict)

@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.calibrations.pose_conventions import FITS_DEG
 from tracker.errors import CalibrationError, Remedy
+from tracker.formats.calibrations.pose_conventions import FITS_DEG
 from tracker.formats.camera_section import MAX_OFFSET
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array

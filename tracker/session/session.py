@@ -4,7 +4,7 @@
       session.toml         version, name, fps, n_frames, up, floor, per camera its footage, the people
       calibration.toml     anipose / Pose2Sim layout, metres
       models/NAME.toml     a person's body model
-      annotations.sqlite   poses (see `tracker.store.annotation_store`)
+      annotations.sqlite   poses (see `tracker.session.store.annotation_store`)
       identity.txt         identity that copies of the folder share
 
 Footage may lie anywhere. Paths in session.toml are relative to the session folder for files in it or beside it, so

@@ -1,7 +1,8 @@
 """Simulated recordings with known truth: smooth-skinned people filmed in a furnished room.
 
-Three inner rooms: `motion` (postures, choreography, scenes), `people` (skeleton, skin, clothes) and `stage` (room,
-cameras, rendering). Imports `geometry`, `body`, `formats`, `footage` and `session`. Callers use `simulate`.
+Inner rooms: `motion` (postures, choreography, scenes), `people` (skeleton, skin, clothes) and `stage` (room,
+cameras, rendering); above it `experiments`. Nothing of the product imports the wing but the command that
+simulates and the benchmarks. Callers use `simulate`.
 """
 
 from tracker.simulate.record import Simulation, simulate

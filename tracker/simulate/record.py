@@ -24,6 +24,7 @@ from tracker.formats.trc import write_trc
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
 from tracker.session.session import PALETTE, Person, Session, load_session, save_session
+from tracker.session.store.identities import derived_uid
 from tracker.simulate.motion.postures import Role, solve_posture
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.model_figure import ModelFigure
@@ -33,7 +34,6 @@ from tracker.simulate.stage.camera_rig import make_cameras
 from tracker.simulate.stage.film import exposed, film, freeze
 from tracker.simulate.stage.rasterizer import Figure
 from tracker.simulate.stage.room import Backdrop, see_room
-from tracker.store.identities import derived_uid
 
 BodyKind = Literal["skinned", "model"]
 Progress = Callable[[int, int], None]

@@ -16,7 +16,7 @@ from tracker.errors import TrackerError
 if TYPE_CHECKING:
     from tracker.annotation.plan import Task
     from tracker.session.session import Session
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
 _FrameList = Annotated[str | None, tyro.conf.arg(metavar="A,B,C:D", help_behavior_hint="")]
 _SECOND_PASS = "_pass_2"
@@ -62,7 +62,7 @@ def command(arguments: Annotated[AssignArguments, tyro.conf.arg(name="")]) -> No
     from app.session.annotator import set_annotator
     from tracker.annotation.plan import add_tasks, read_tasks
     from tracker.session.lock import SessionLock
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
     set_annotator(arguments.annotator)
     arguments = replace(arguments, to=tuple(map(_annotator, arguments.to)))

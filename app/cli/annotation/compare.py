@@ -13,9 +13,9 @@ from app.runtime.json_output import format_json
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.agreement.comparison import Agreement
-    from tracker.agreement.copies import Copies
-    from tracker.agreement.statistics import Icc
+    from tracker.evaluation.agreement.comparison import Agreement
+    from tracker.evaluation.agreement.copies import Copies
+    from tracker.evaluation.agreement.statistics import Icc
 
 _LISTED = 10
 """Number of frames in the list of the largest differences; `--json` has all."""
@@ -55,7 +55,7 @@ def command(arguments: Annotated[CompareArguments, tyro.conf.arg(name="")]) -> N
     """
     from app.export.agreement_report import write_report
     from app.export.agreement_table import agreement_record, pairs_of, write_consensus, write_table
-    from tracker.agreement.comparison import compare
+    from tracker.evaluation.agreement.comparison import compare
 
     files = {"--csv": arguments.csv, "--report": arguments.report, "--consensus": arguments.consensus}
     for option, path in files.items():
@@ -97,7 +97,7 @@ def _tolerance_m(millimetres: float | None) -> float | None:
 
 def _read(arguments: CompareArguments) -> "Copies":
     from app.cli.target import load_target
-    from tracker.agreement.copies import read_copies
+    from tracker.evaluation.agreement.copies import read_copies
 
     folders = arguments.sessions
     if len(folders) < 2:

@@ -53,8 +53,8 @@ def next_clicks(at: Target, frames: range, count: int) -> dict[str, Any]:
     """
     from tracker.annotation.expected_error import contradicted_keyframes
     from tracker.annotation.next_click import propose
-    from tracker.store.annotation_store import AnnotationStore
-    from tracker.store.stored_poses import read_stored_poses
+    from tracker.session.store.annotation_store import AnnotationStore
+    from tracker.session.store.stored_poses import read_stored_poses
 
     session = at.session
     poses = [

@@ -42,7 +42,7 @@ def command(arguments: Annotated[ShareArguments, tyro.conf.arg(name="")]) -> Non
     Open OUT/index.html in a browser; no network is needed. Ctrl+C stops it and leaves nothing behind.
     """
     from app.share.folder import share
-    from tracker.exports.motion import frames_text, read_motion
+    from tracker.interchange.exports.motion import frames_text, read_motion
     from tracker.session.frame_list import parse_frame_list
     from tracker.session.relink import require_files
 
@@ -79,7 +79,7 @@ def _comments(session: "Session") -> list["SharedComment"]:
     """Read the comments of a session."""
     from app.share.content import SharedComment
     from tracker.annotation.comments import read_comments
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
     with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
         return [

@@ -14,7 +14,7 @@ from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from tracker.session.session import Session
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
 _Text = Annotated[str | None, tyro.conf.arg(metavar="TEXT", help_behavior_hint="")]
 
@@ -59,8 +59,8 @@ def command(arguments: Annotated[TasksArguments, tyro.conf.arg(name="")]) -> Non
     from tracker.annotation.plan import read_tasks
     from tracker.annotation.speed import measure_speed
     from tracker.session.lock import SessionLock
-    from tracker.store.annotation_store import AnnotationStore
-    from tracker.store.annotator import one_form
+    from tracker.session.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotator import one_form
 
     set_annotator(arguments.annotator)
     arguments = replace(arguments, of=None if arguments.of is None else one_form(arguments.of))

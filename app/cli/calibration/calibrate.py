@@ -25,7 +25,7 @@ from tracker.errors import Remedy, TrackerError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tracker.boards.footage_calibration import FilmedCalibration
+    from tracker.calibration.boards.footage_calibration import FilmedCalibration
     from tracker.compute.progress import Report
     from tracker.geometry.cameras import Camera
 
@@ -95,8 +95,8 @@ def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) ->
 
 
 def _by_board(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
-    from tracker.boards.board_description import read_board
-    from tracker.boards.footage_calibration import FilmedBoard, calibrate_footage
+    from tracker.calibration.boards.board_description import read_board
+    from tracker.calibration.boards.footage_calibration import FilmedBoard, calibrate_footage
 
     assert arguments.board is not None
     filmed = FilmedBoard(
@@ -116,7 +116,7 @@ def _by_board(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
 
 def _by_person(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
     from app.cli.calibration.person_report import format_record, record_of
-    from tracker.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
+    from tracker.calibration.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
 
     filmed = FilmedPerson(
         arguments.people,
@@ -165,8 +165,8 @@ def _check(arguments: CalibrateArguments) -> None:
 
 
 def _write(arguments: CalibrateArguments, cameras: "Sequence[Camera]") -> None:
-    from tracker.calibrations.writing import write_layout
     from tracker.formats.anipose import write_calibration
+    from tracker.formats.calibrations.writing import write_layout
 
     try:
         if arguments.layout == "quadrille":

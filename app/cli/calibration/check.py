@@ -14,8 +14,8 @@ from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.calibration.findings import CameraFinding
-    from tracker.calibration.single_frames import FrameScore
+    from tracker.calibration.check.findings import CameraFinding
+    from tracker.calibration.check.single_frames import FrameScore
     from tracker.pipeline.calibration_check import CalibrationCheck
     from tracker.session.session import Session
 
@@ -99,7 +99,7 @@ def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["Fr
     """Correct the named cameras; return the names of people whose sizes are then of an earlier calibration."""
     from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_sizes
     from tracker.session.lock import SessionLock
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.session.store.annotation_store import AnnotationStore
 
     found.require_applicable(scores)
     with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
@@ -129,7 +129,7 @@ def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameS
 
 
 def _camera(finding: "CameraFinding", check: "CalibrationCheck") -> dict[str, Any]:
-    from tracker.calibration.camera_correction import in_units
+    from tracker.calibration.check.camera_correction import in_units
 
     return {
         "name": finding.name,

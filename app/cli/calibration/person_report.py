@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from tracker.self_calibration.person_calibration import PersonCalibration
+    from tracker.calibration.self_calibration.person_calibration import PersonCalibration
 
 
 def record_of(found: "PersonCalibration") -> dict[str, Any]:

@@ -47,7 +47,7 @@ def command(arguments: Annotated[DetectArguments, tyro.conf.arg(name="")]) -> No
     --evidence both tracks by the key points and the contours.
     """
     from app.cli.observations.model_packages import fetch_models
-    from tracker.detection.model_files import LICENSE, default_folder
+    from tracker.interchange.detection.model_files import LICENSE, default_folder
 
     folder = arguments.models or default_folder()
     reporter = Reporter(silent=arguments.json)
@@ -65,9 +65,9 @@ def command(arguments: Annotated[DetectArguments, tyro.conf.arg(name="")]) -> No
 
 
 def _detect(arguments: DetectArguments, path: Path, folder: Path, reporter: Reporter) -> dict[str, Any]:
-    from tracker.detection.detect import DetectionPlan, detect_people
-    from tracker.detection.detectors import load_detector
     from tracker.footage.recording import Recording
+    from tracker.interchange.detection.detect import DetectionPlan, detect_people
+    from tracker.interchange.detection.detectors import load_detector
     from tracker.session.lock import SessionLock
     from tracker.session.session import load_session
 

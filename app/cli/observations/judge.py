@@ -12,7 +12,7 @@ from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.judging.judge import Judgement
+    from tracker.evaluation.judging.judge import Judgement
     from tracker.session.session import Session
 
 _LISTED = 20
@@ -64,11 +64,11 @@ def judge_session(session: "Session", name: str, progress: Reporter) -> list["Ju
         TrackerError: there are no such observations, or footage is missing.
     """
     from app.cli.track_report import ChainProgress
+    from tracker.estimation.chamfer.settings import TrackSettings
+    from tracker.evaluation.judging.judge import judge
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
-    from tracker.judging.judge import judge
     from tracker.session.relink import require_files
-    from tracker.tracking.chamfer.settings import TrackSettings
 
     require_files(session)
     with Recording(session.cameras) as recording, ChainProgress(progress) as sink:

@@ -9,10 +9,10 @@ import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tracker.detection.model_files import MODEL_FILES, TARBALL, WHEEL, model_file
 from tracker.errors import TrackerError
 from tracker.files import write_bytes_atomic
-from tracker.observations.observed import checksum
+from tracker.interchange.detection.model_files import MODEL_FILES, TARBALL, WHEEL, model_file
+from tracker.interchange.observations.observed import checksum
 
 
 def fetch_models(folder: Path, say: Callable[[str], None]) -> list[Path]:

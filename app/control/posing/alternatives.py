@@ -7,7 +7,7 @@ import numpy as np
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from tracker.errors import TrackerError
-from tracker.store.records import Alternative, PoseChange, PoseRecord
+from tracker.session.store.records import Alternative, PoseChange, PoseRecord
 
 
 class Alternatives:

@@ -8,11 +8,11 @@ from app.control.session.session_state import SessionState
 from app.drawing.body_outlines import body_outlines
 from app.remedies import page_text
 from app.state.people import AcquiredSize, AcquisitionState, SizeDraft
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, SizeMethod
-from tracker.acquisition.from_voxels import VoxelSizeSettings
-from tracker.acquisition.size_report import size_changes, unobservable_joints
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
+from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings, SizeMethod
+from tracker.estimation.acquisition.from_voxels import VoxelSizeSettings
+from tracker.estimation.acquisition.size_report import size_changes, unobservable_joints
 from tracker.pipeline.body_acquisition import acquire_body
 
 _LOG = logging.getLogger(__name__)

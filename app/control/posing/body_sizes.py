@@ -12,7 +12,7 @@ from app.state.people import SizeDraft
 from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
-from tracker.fitting.retarget import retarget_pose
+from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
 from tracker.pipeline.body_acquisition import (
     SIZES_EDITS,
@@ -25,8 +25,8 @@ from tracker.pipeline.body_change import joints_off_m, moved_body
 from tracker.pipeline.chain import FOLLOWED
 from tracker.session.locked_dofs import load_locks
 from tracker.session.session import save_model
-from tracker.store.records import Change, PoseChange
-from tracker.store.stored_poses import StoredPose
+from tracker.session.store.records import Change, PoseChange
+from tracker.session.store.stored_poses import StoredPose
 
 
 class _Refitted(NamedTuple):

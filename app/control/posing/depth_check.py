@@ -5,8 +5,8 @@ from contextlib import suppress
 from app.control.session.session_state import SessionState
 from app.state.people import DepthNote
 from tracker.errors import SessionError
+from tracker.estimation.posing.placed_depth import unseen_depth
 from tracker.pipeline.seen_points import seen_points
-from tracker.posing.placed_depth import unseen_depth
 
 _MIN_MARKS = 2
 """Placements of a person on a frame before depth is missed: after a single one, the user may go on to any view."""

@@ -12,10 +12,10 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.people import DragState, HeldPoint
 from app.state.state import State
 from tracker.body.limbs import display_name
+from tracker.estimation.posing import drag as modes
+from tracker.estimation.posing.grab import Grab, grab, grab_part, holdable_points, regrab
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing import drag as modes
-from tracker.posing.grab import Grab, grab, grab_part, holdable_points, regrab
 
 _CHECKPOINT_S = 1.0
 """A long drag is saved at least this often."""
@@ -103,7 +103,7 @@ class Dragging:
         self, page: int, pointer_px: tuple[float, float], seq: int, mode: str = "move", is_last: bool = False
     ) -> None:
         """Move the grabbed point to the pointer, turn its part, push it in depth, or bend the trunk as well (see
-        `tracker.posing.drag`).
+        `tracker.estimation.posing.drag`).
 
         A change of mode grabs the point again at the last pointer position, so that nothing jumps.
 

@@ -5,7 +5,7 @@ from app.control.session.session_state import SessionState
 from app.state.people import HeldPoint
 from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
-from tracker.posing.grab import holdable_points
+from tracker.estimation.posing.grab import holdable_points
 
 
 class HeldPoints:

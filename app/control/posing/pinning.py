@@ -15,10 +15,10 @@ from app.state.people import ShownPose
 from tracker.body.limbs import display_name, limb_display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.estimation.posing.edits import copy_dofs, limb_of
+from tracker.estimation.posing.pinned_fit import fit_frame
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing.edits import copy_dofs, limb_of
-from tracker.posing.pinned_fit import fit_frame
 
 _CHECKPOINT_S = 1.0
 """A long drag of a pin is saved at least this often."""

@@ -11,12 +11,12 @@ from app.control.session.session_state import SessionState
 from tracker.body.limbs import display_name, limb_display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.fitting.retarget import retarget_pose
+from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.estimation.posing import grab as grabbing
+from tracker.estimation.posing.drag import drag
+from tracker.estimation.posing.edits import copy_dofs, copy_joint_angles, limb_of, mirror_pose
+from tracker.estimation.posing.orient import orient
 from tracker.geometry.arrays import Array
-from tracker.posing import grab as grabbing
-from tracker.posing.drag import drag
-from tracker.posing.edits import copy_dofs, copy_joint_angles, limb_of, mirror_pose
-from tracker.posing.orient import orient
 
 _SAME_GESTURE_S = 1.0
 """Maximum time between changes of one slider, or steps of one joint, that make one entry of the history."""

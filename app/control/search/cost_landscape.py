@@ -13,10 +13,10 @@ from app.state.state import State
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
+from tracker.estimation.chamfer.settings import TrackSettings, pose_cost
+from tracker.estimation.posing.edits import joint_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
-from tracker.posing.edits import joint_of
-from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 
 SAMPLES = 121
 _REACH_M, _REACH_RAD = 0.5, float(np.pi)

@@ -15,11 +15,11 @@ from app.state.state import State
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
+from tracker.estimation.by_frame.frame_problem import Bodies
+from tracker.estimation.by_frame.pose_score import scorer_without_prediction
+from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.frame_problem import Bodies
-from tracker.tracking.estimation.pose_score import scorer_without_prediction
 
 SAMPLES = 31
 """Samples along each degree of freedom, the present value in the middle unless a limit is near."""

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.search.best_first import SearchStep, Stage, stages
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.search.best_first import SearchStep, Stage, stages
-from tracker.tracking.chamfer.settings import TrackSettings
 
 MAX_STEPS = 10_000
 """Maximum number of recorded steps of a run; beyond, every other step without improvement is discarded."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.search.best_first import SearchSettings, stages
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.search.best_first import SearchSettings, stages
 
 _PLAIN = ("bound_rad", "bound_m", "step_rad", "step_m")
 

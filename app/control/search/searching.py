@@ -17,11 +17,11 @@ from app.state.people import ShownPose
 from app.state.search import SearchState, SearchView
 from app.state.state import Costs, finite_or_none
 from tracker.errors import TrackerError
+from tracker.estimation.chamfer.settings import TrackSettings, search_frame
+from tracker.estimation.contour.fit_steps import FitPlan, contour_steps
+from tracker.estimation.search.best_first import SearchStep, Stage, stages
+from tracker.estimation.tracking.subjects import Subjects
 from tracker.geometry.arrays import Array
-from tracker.search.best_first import SearchStep, Stage, stages
-from tracker.tracking.chamfer.settings import TrackSettings, search_frame
-from tracker.tracking.contour.fit_steps import FitPlan, contour_steps
-from tracker.tracking.subjects import Subjects
 
 _ContourFit = Literal["body", "chains"]
 _SAVE_S = 0.5

@@ -16,10 +16,10 @@ from tracker.annotation.plan import add_tasks, decide, read_tasks, require_seen
 from tracker.annotation.speed import measure_speed
 from tracker.body.limbs import limbs
 from tracker.errors import TrackerError
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.annotator import checked_annotator
-from tracker.store.records import MarkChange
-from tracker.store.task_log import State as Decision
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.annotator import checked_annotator
+from tracker.session.store.records import MarkChange
+from tracker.session.store.task_log import State as Decision
 
 T = TypeVar("T")
 

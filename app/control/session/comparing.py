@@ -11,9 +11,9 @@ from app.state.people import ShownPose
 from app.state.state import Costs
 from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
+from tracker.estimation.posing.limb_moves import LimbMove, untouched_moves
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing.limb_moves import LimbMove, untouched_moves
 
 _Placed = Mapping[str, Sequence[PointObservation]]
 """Points that the user has placed, with where in which views."""

@@ -6,11 +6,11 @@ from app.state.people import ShownPose
 from app.state.state import ShownFrame
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
+from tracker.body.motion.velocity import velocity
+from tracker.estimation.posing.default_pose import default_pose
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
-from tracker.motion.velocity import velocity
-from tracker.posing.default_pose import default_pose
 from tracker.session.session import Session
 
 Pins = tuple[tuple[PointObservation, ...], ...]

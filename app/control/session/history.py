@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from tracker.errors import TrackerError
-from tracker.store.records import HistoryEntry
+from tracker.session.store.records import HistoryEntry
 
 
 class History:

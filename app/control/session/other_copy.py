@@ -12,8 +12,11 @@ from app.control.session.session_state import SessionState
 from app.runtime.jobs import LatestWinsWorker
 from app.state.other_copy import TOLERANCE_MM, CopyDifference, OtherCopy
 from app.state.state import State
-from tracker.agreement.consensus import mean_pose
-from tracker.agreement.copies import (
+from tracker.body.model import PosedBody
+from tracker.errors import TrackerError
+from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.evaluation.agreement.consensus import mean_pose
+from tracker.evaluation.agreement.copies import (
     Subject,
     annotator_names,
     check_same_recording,
@@ -21,13 +24,10 @@ from tracker.agreement.copies import (
     is_annotated,
     notes_on,
 )
-from tracker.body.model import PosedBody
-from tracker.errors import TrackerError
-from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session, load_session
-from tracker.store.records import TAKEN_FROM, Alternative, MarkChange, PoseChange, PoseRecord
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.records import TAKEN_FROM, Alternative, MarkChange, PoseChange, PoseRecord
+from tracker.session.store.stored_poses import read_stored_poses
 
 Decision = Literal["keep", "take", "mean"]
 """The own pose, that of the other copy, or the mean of both."""

@@ -11,7 +11,7 @@ from app.state.state import State
 from tracker.annotation.expected_error import contradicted_keyframes
 from tracker.annotation.next_click import Proposals, propose
 from tracker.errors import TrackerError
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.stored_poses import read_stored_poses
 
 _LOG = logging.getLogger(__name__)
 _REST_S = 1.0

@@ -21,15 +21,15 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.interpretation import interpreted
 from tracker.compute.kernel_cache import STAGES
 from tracker.errors import SessionError, TrackerError
+from tracker.estimation.by_frame.settings import chamfer_cost
+from tracker.estimation.fitting.gauss_newton import value_mask, with_locked_dofs
+from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.estimation.posing.grab import Constraints
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import value_mask, with_locked_dofs
-from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
 from tracker.pipeline.seen_points import seen_points
-from tracker.posing.grab import Constraints
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
-from tracker.tracking.estimation.settings import chamfer_cost
 
 T = TypeVar("T")
 

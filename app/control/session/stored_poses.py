@@ -4,7 +4,7 @@ from app.control.session.session_state import SessionState
 from app.storage.pose_origins import PoseOrigin
 from tracker.body.model import PosedBody
 from tracker.geometry.arrays import Array
-from tracker.store.records import FramePose
+from tracker.session.store.records import FramePose
 
 
 class StoredPoses:

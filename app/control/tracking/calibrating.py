@@ -14,12 +14,12 @@ from app.remedies import page_text
 from app.runtime.jobs import LatestWinsWorker
 from app.state.calibration import CorrectedFrame
 from app.state.state import State
-from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import PosedBody
-from tracker.calibration.camera_correction import corrected, later_s
-from tracker.calibration.fault_search import prior_sigmas
-from tracker.calibration.single_frames import score_frame
+from tracker.calibration.check.camera_correction import corrected, later_s
+from tracker.calibration.check.fault_search import prior_sigmas
+from tracker.calibration.check.single_frames import score_frame
 from tracker.errors import TrackerError
+from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.pipeline.calibration_check import (
     CalibrationCheck,
     check_calibration,

@@ -13,7 +13,7 @@ from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.pipeline.tracked_changes import recorded_method
-from tracker.store.records import SOURCES, PoseRecord
+from tracker.session.store.records import SOURCES, PoseRecord
 
 _REST_S = 0.3
 """Minimum time between two comparisons: a tracker writes twice a second."""

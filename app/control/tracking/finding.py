@@ -14,12 +14,12 @@ from app.control.tracking import track_settings
 from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.state.progress import FindState, Line
-from tracker.acquisition.from_contours import Acquisition
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
+from tracker.estimation.acquisition.from_contours import Acquisition
+from tracker.estimation.initialization.first_pose import FirstPoses
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
-from tracker.initialization.first_pose import FirstPoses
 from tracker.pipeline.body_acquisition import SIZES_EDITS, resized_start, with_sizes_changed
 from tracker.pipeline.chain import ChainPlan, Sink, run_chain, unplaced
 from tracker.pipeline.find_people import AXES, FindSettings, axes_record, first_record
@@ -27,8 +27,8 @@ from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, 
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.pipeline.track_session import Step, TrackSession
 from tracker.session.session import Session, save_model
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.store.stored_poses import StoredPose
+from tracker.session.store.records import PoseChange, PoseRecord
+from tracker.session.store.stored_poses import StoredPose
 
 _LOG = logging.getLogger(__name__)
 _STEPS = 100

@@ -12,9 +12,9 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.people import KeyframeDoubt
 from app.state.state import State
 from tracker.body.limbs import display_name
-from tracker.motion.consistency import inconsistent_frames
-from tracker.motion.keyframe_doubts import neighbour_gaps, raised_views
-from tracker.store.records import FramePose, FrameRow
+from tracker.body.motion.consistency import inconsistent_frames
+from tracker.body.motion.keyframe_doubts import neighbour_gaps, raised_views
+from tracker.session.store.records import FramePose, FrameRow
 
 _REST_S = 0.3
 """Minimum time between two checks: a tracker writes twice a second."""

@@ -16,26 +16,26 @@ from app.control.tracking.finding import FindingPeople
 from app.remedies import page_text
 from app.state.observations import ObservedSet
 from tracker.compute.progress import Report
-from tracker.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
-from tracker.detection.detector import Detector
-from tracker.detection.detectors import load_detector
-from tracker.detection.model_files import default_folder
 from tracker.errors import TrackerError
-from tracker.initialization.first_pose import FirstPoses
-from tracker.judging.judge import judge
-from tracker.observations.importing import store_import
-from tracker.observations.observed import ObservationSet
-from tracker.observations.plans import ImportPlan, MaskPlan
-from tracker.observations.request import ImportRequest
-from tracker.observations.stored import list_observations, load_observations
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.initialization.first_pose import FirstPoses
+from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
+from tracker.evaluation.judging.judge import judge
+from tracker.interchange.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
+from tracker.interchange.detection.detector import Detector
+from tracker.interchange.detection.detectors import load_detector
+from tracker.interchange.detection.model_files import default_folder
+from tracker.interchange.observations.importing import store_import
+from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.plans import ImportPlan, MaskPlan
+from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.stored import list_observations, load_observations
+from tracker.interchange.plausibility.examine import plan_examined_import
 from tracker.pipeline.chain import unplaced
 from tracker.pipeline.keypoint_evidence import find_by_keypoints, read_points
 from tracker.pipeline.keypoint_poses import imported_changes, poses_of
 from tracker.pipeline.track_session import EstimateStep, Step, TrackSession
-from tracker.plausibility.examine import plan_examined_import
 from tracker.session.session import Session
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 _LOG = logging.getLogger(__name__)
 _DETECTED = "detected"

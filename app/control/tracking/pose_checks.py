@@ -12,7 +12,7 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.errors import TrackerError
 from tracker.pipeline.pose_check import checked_pose, compared_pose
-from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
+from tracker.session.store.records import AssessmentChange, PoseChange, PoseRecord
 
 _LOG = logging.getLogger(__name__)
 _GIVE_WAY_S = 0.05

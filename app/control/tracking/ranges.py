@@ -15,10 +15,18 @@ from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.progress import RangeState
+from tracker.body.motion.interpolation import interpolate_pose
 from tracker.errors import TrackerError
-from tracker.motion.interpolation import interpolate_pose
 from tracker.pipeline.audit import AuditPlan, PoseAudit
-from tracker.store.records import BETWEEN, AssessmentChange, Change, FrameRow, MarkChange, PoseChange, PoseRecord
+from tracker.session.store.records import (
+    BETWEEN,
+    AssessmentChange,
+    Change,
+    FrameRow,
+    MarkChange,
+    PoseChange,
+    PoseRecord,
+)
 
 Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]
 """`unreviewed` leaves keyframes unchanged; `none` removes the mark of keyframes too."""

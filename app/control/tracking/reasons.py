@@ -16,17 +16,17 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.identity import Identity
 from app.state.reason import RankedPose, Reason
 from app.state.state import State
-from tracker.appearance.background_density import MIN_SEEN
-from tracker.appearance.region_learning import learning_frames
 from tracker.body.limbs import limb_display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.estimation.appearance.background_density import MIN_SEEN
+from tracker.estimation.appearance.region_learning import learning_frames
+from tracker.estimation.by_frame.frame_problem import Bodies
+from tracker.estimation.by_frame.part_evidence import UsualEvidence, contradiction, learn_run, read_frame
+from tracker.estimation.fitting.hypothesis import limbs_elsewhere
 from tracker.evidence.observer import Observer
-from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.pipeline.pose_check import compared_pose
-from tracker.tracking.estimation.frame_problem import Bodies
-from tracker.tracking.estimation.part_evidence import UsualEvidence, contradiction, learn_run, read_frame
 
 _LOG = logging.getLogger(__name__)
 _REST_S = 0.1

@@ -8,9 +8,9 @@ from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
 from app.state.progress import TrackStage, TrackState
 from app.state.state import StateChanges, finite_or_none
+from tracker.estimation.tracking import confidence
+from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
 from tracker.pipeline.track_session import EstimatedRows, EstimateStep, Step, TrackSession
-from tracker.tracking import confidence
-from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 
 class RunDisplay:

@@ -8,12 +8,12 @@ import msgspec
 
 from app.state.run_choices import MAX_STRIDE, RunChoices
 from tracker.errors import TrackerError
+from tracker.estimation.by_frame.settings import EstimationSettings
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.method import Method, OptionValue
+from tracker.estimation.tracking.tracker import TrackerSettings
 from tracker.pipeline.methods import METHODS, all_options, compared_by, method_named
 from tracker.session.matching import check_names
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.settings import EstimationSettings
-from tracker.tracking.method import Method, OptionValue
-from tracker.tracking.tracker import TrackerSettings
 
 SETTING = "track_settings"
 """Setting of the session."""

@@ -16,15 +16,15 @@ from app.state.progress import TrackState
 from app.state.run_choices import RunChoices
 from app.storage.turns import TurnError
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.tracking.confidence import Status
+from tracker.estimation.tracking.estimate import PoseEstimate, TrackedFrame
+from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
 from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import Leg, Step, TrackSession, outward
 from tracker.pipeline.tracked_changes import RunChange, StoredPerson
-from tracker.tracking.confidence import Status
-from tracker.tracking.estimate import PoseEstimate, TrackedFrame
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
 _SAVE_S = 0.5
 """Shortest time between two saves of a running tracker, seconds."""

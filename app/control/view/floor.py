@@ -11,13 +11,13 @@ import numpy as np
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.state.floor_picking import FloorState, Picking, with_mark, with_next, without_last
+from tracker.body.motion.floor_from_feet import floor_from_feet
 from tracker.errors import TrackerError
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane, nearest_axis
-from tracker.motion.floor_from_feet import floor_from_feet
 from tracker.session.session import save_floor
 from tracker.session.session_file import UPS
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.stored_poses import read_stored_poses
 
 _KEY = "former_floor"
 """Setting of the session: the floor before the one that is set."""

@@ -8,10 +8,10 @@ from app.state.identity import Identity
 from app.state.page_view import View
 from app.state.state import State
 from tracker.body.model import PosedBody
-from tracker.fitting.observability import OBSERVABLE_M, OBSERVABLE_RAD, Observability, observe_pose
-from tracker.fitting.observability_reasons import describe_all
+from tracker.estimation.fitting.observability import OBSERVABLE_M, OBSERVABLE_RAD, Observability, observe_pose
+from tracker.estimation.fitting.observability_reasons import describe_all
+from tracker.evidence.images.working_view import working_scale
 from tracker.geometry.cameras import Camera
-from tracker.images.working_view import working_scale
 from tracker.session.session import Session
 
 LAYER = "observability"

@@ -14,8 +14,8 @@ from app.state.identity import Identity
 from app.state.other_copy import OtherCopy
 from app.state.state import State
 from app.storage.pose_origins import PoseOrigin
-from tracker.exports.provenance import point_lost
-from tracker.store.records import BETWEEN, SOURCES, TAKEN_FROM
+from tracker.interchange.exports.provenance import point_lost
+from tracker.session.store.records import BETWEEN, SOURCES, TAKEN_FROM
 
 _UNWATCHED = WatchProvenance(None)
 _NO_COPY = OtherCopyMessage("", "", 0.0, (), (), ())

@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tracker.exports.export_format import ExportFormat
+from tracker.interchange.exports.export_format import ExportFormat
 
 if TYPE_CHECKING:
-    from tracker.exports.motion import ExportedMotion
-    from tracker.exports.options import ExportOptions
+    from tracker.interchange.exports.motion import ExportedMotion
+    from tracker.interchange.exports.options import ExportOptions
 
 
 def write(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:

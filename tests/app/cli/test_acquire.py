@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from command_line import SAMPLE, WITH_POSE, assert_refused, stored
 
-from tracker.acquisition import size_fit
-from tracker.acquisition.chamfer_search import ChamferSearchSettings
-from tracker.acquisition.two_views import TwoViewSettings
+from tracker.estimation.acquisition import size_fit
+from tracker.estimation.acquisition.chamfer_search import ChamferSearchSettings
+from tracker.estimation.acquisition.two_views import TwoViewSettings
 from tracker.formats.model_toml import format_model, load_model
 from tracker.session.session import load_session
 
@@ -100,7 +100,7 @@ def test_a_fit_that_is_stopped_leaves_the_session_as_it_was(run, placed, monkeyp
 @pytest.mark.slow
 def test_the_paper_s_way_names_its_views(run, placed, monkeypatch):
     quick = TwoViewSettings(search=ChamferSearchSettings(levels=1, passes=1))
-    monkeypatch.setattr("tracker.acquisition.two_views.TwoViewSettings", lambda views, n, coupled: quick)
+    monkeypatch.setattr("tracker.estimation.acquisition.two_views.TwoViewSettings", lambda views, n, coupled: quick)
     words = ("acquire", placed, "--paper", "--frames", "20:21", "--dry-run")
     status, out, _ = run(*words, "--json")
     found = json.loads(out)

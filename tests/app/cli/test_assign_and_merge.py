@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command_line import assert_refused, stored
 
-from tracker.calibration.camera_correction import N_CORRECTIONS
+from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.calibration_revisions import (
     change_calibration,
@@ -17,9 +17,9 @@ from tracker.pipeline.calibration_revisions import (
     with_corrections,
 )
 from tracker.session.session import create_session, load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_log import revisions_of_poses
-from tracker.store.records import PinChange, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.calibration_log import revisions_of_poses
+from tracker.session.store.records import PinChange, PoseChange, PoseRecord
 
 
 def annotate(folder, x, frames, author, keyframe=True):

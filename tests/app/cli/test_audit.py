@@ -10,8 +10,8 @@ from command_line import SAMPLE, assert_refused, stored
 from run_poses import Estimate, doubted
 
 from tracker.pipeline import audit
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, MarkChange, PinChange, PoseChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Alternative, MarkChange, PinChange, PoseChange
 
 FRAMES, APART, STEP_M = range(20, 26), 23, 0.02
 

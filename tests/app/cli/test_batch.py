@@ -17,8 +17,8 @@ from app.cli.batches.local import n_workers
 from tracker.batch.manifest import Manifest
 from tracker.batch.task_files import Result
 from tracker.batch.worker import work
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange
 
 GB = 1 << 30
 

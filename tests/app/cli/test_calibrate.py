@@ -7,9 +7,9 @@ import pytest
 from command_line import assert_refused
 from drawn_boards import arc, carried, facing, filmed_folders
 
-from tracker.boards.board_description import Board
-from tracker.calibrations.reading import read_cameras
+from tracker.calibration.boards.board_description import Board
 from tracker.formats.anipose import read_calibration
+from tracker.formats.calibrations.reading import read_cameras
 from tracker.geometry import rigid
 
 BOARD = Board("charuco", 4, 5, 0.1)
@@ -101,7 +101,7 @@ def test_wrong_words_are_refused_before_footage_is_read(run, footage, tmp_path):
 
 
 def test_a_stop_writes_nothing(run, footage, tmp_path, monkeypatch):
-    from tracker.boards import footage_calibration
+    from tracker.calibration.boards import footage_calibration
 
     def stopped(*_):
         raise KeyboardInterrupt

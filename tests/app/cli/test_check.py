@@ -10,13 +10,13 @@ from command_line import WITH_POSE, assert_refused
 
 from app.cli.calibration.check import clock_notes
 from app.cli.track_report import format_summary
-from tracker.calibration.camera_correction import N_CORRECTIONS, TIME, corrected
+from tracker.calibration.check.camera_correction import N_CORRECTIONS, TIME, corrected
 from tracker.footage.start_times import StartTime, time_code_frames
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.session import footage_clocks, synchronize
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import MarkChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import MarkChange
 
 FRAMES = range(10, 34)
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-from tracker.calibration.camera_correction import N_CORRECTIONS
+from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.pipeline.calibration_revisions import follow_history, with_corrections
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 CORRECTION = np.zeros(N_CORRECTIONS)
 CORRECTION[[1, 7, 8]] = 0.02, 0.01, 0.0005
@@ -26,7 +26,7 @@ CHILD = textwrap.dedent("""
     import numpy as np
     from app.__main__ import main
     from tracker.pipeline import calibration_check, posed_recording
-    from tracker.store.connection import Connection
+    from tracker.session.store.connection import Connection
 
     folder, last, left = sys.argv[1], sys.argv[2], [int(sys.argv[3])]
     correction = np.fromstring(last, sep=",")

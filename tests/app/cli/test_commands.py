@@ -17,6 +17,9 @@ from run_poses import Estimate, doubted
 from app.cli.track import TrackArguments, settings_of
 from app.server import address
 from tracker.compute.kernel_cache import compiled_mark
+from tracker.estimation.chamfer.tracker import ChamferTracker
+from tracker.estimation.runs.run_estimate import Progress
+from tracker.estimation.trajectory import solve
 from tracker.formats.file_axes import axes_matrix
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
@@ -24,11 +27,8 @@ from tracker.formats.trc import read_trc, write_trc
 from tracker.pipeline import track_session
 from tracker.pipeline.methods import METHODS
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.runs.run_estimate import Progress
-from tracker.trajectory import solve
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange
 
 
 def test_new_info_init_track_evaluate(run, tmp_path):

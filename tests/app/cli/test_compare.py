@@ -13,13 +13,13 @@ from bodies import MODELS
 from command_line import assert_refused
 from stored_motions import random_poses, store_motion
 
-from tracker.fitting.gauss_newton import PointTargets, solve
+from tracker.estimation.fitting.gauss_newton import PointTargets, solve
 from tracker.formats.joint_maps import JOINTS
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import read_trc
 from tracker.session.session import create_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 N, BIAS_M = 30, 0.008
 MODEL = MODELS["gavrila22"]

@@ -8,9 +8,9 @@ from command_line import assert_refused
 from fake_detector import FakeDetector
 from observed_people import make_session, seen, walking
 
-from tracker.detection.detector import DetectorKind
-from tracker.detection.detectors import DETECTORS
-from tracker.detection.model_files import MODEL_FILES
+from tracker.interchange.detection.detector import DetectorKind
+from tracker.interchange.detection.detectors import DETECTORS
+from tracker.interchange.detection.model_files import MODEL_FILES
 
 N = 8
 

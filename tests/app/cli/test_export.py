@@ -14,11 +14,11 @@ from full_disks import full_disk
 from stored_motions import store_motion
 
 from tracker.errors import TrackerError
-from tracker.exports.export_files import export
-from tracker.exports.formats import FORMATS
-from tracker.exports.motion import read_motion
-from tracker.exports.options import ExportOptions
 from tracker.formats.trc import read_trc
+from tracker.interchange.exports.export_files import export
+from tracker.interchange.exports.formats import FORMATS
+from tracker.interchange.exports.motion import read_motion
+from tracker.interchange.exports.options import ExportOptions
 from tracker.session.holder import this_holder
 from tracker.session.session import load_session
 
@@ -160,7 +160,7 @@ def test_what_cannot_be_written_leaves_nothing(run, couple, tmp_path, monkeypatc
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("tracker.exports.export_files.os.replace", full)
+    monkeypatch.setattr("tracker.interchange.exports.export_files.os.replace", full)
     result = run("export", couple, "--out", tmp_path / "a.mot", "--person", "ann")
     assert_refused(result, [f"cannot write {tmp_path / 'a.mot'}: No space left on device", "choose a folder"])
     assert [p.name for p in tmp_path.iterdir()] == ["s"]

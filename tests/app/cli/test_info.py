@@ -6,12 +6,12 @@ from contextlib import closing
 import numpy as np
 from command_line import WITH_POSE
 
-from tracker.calibration.camera_correction import N_CORRECTIONS
+from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.footage.start_times import StartTime, time_code_frames
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.session import footage_clocks, synchronize
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 def test_poses_of_an_earlier_calibration_are_counted(run, session):

@@ -8,15 +8,15 @@ import pytest
 from command_line import SAMPLE, assert_refused
 from observed_people import BODY_25
 
+from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.evaluation.judging import judge
 from tracker.evaluation.references import read_joints
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import write_trc
-from tracker.judging import judge
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
+from tracker.session.store.stored_poses import read_stored_poses
 
 FRAMES, EXCHANGED = range(10, 22), (14, 15)
 

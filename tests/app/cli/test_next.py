@@ -10,8 +10,8 @@ from command_line import SAMPLE, assert_refused
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.formats.model_toml import format_model
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 FRAMES = range(20, 29)
 

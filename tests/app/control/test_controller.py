@@ -8,9 +8,9 @@ import pytest
 from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 
 from tracker.errors import SessionError
-from tracker.search.best_first import SearchSettings
-from tracker.store.annotation_store import AnnotationStore
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.search.best_first import SearchSettings
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 def test_a_fresh_session_shows_a_draft_that_is_not_stored(opened):

@@ -3,7 +3,7 @@ import pytest
 
 from app.drawing.curves import GROUPS, Plot, plots_of, samples
 from tracker.formats.model_toml import load_model, parse_model
-from tracker.store.records import FramePose
+from tracker.session.store.records import FramePose
 
 CAMERAS = ("front", "left")
 

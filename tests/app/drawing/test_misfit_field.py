@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.drawing.misfit_field import NO_MISFITS, misfit_field
-from tracker.calibration.residual_pieces import ResidualPieces
+from tracker.calibration.check.residual_pieces import ResidualPieces
 
 SIZE = (640, 480)
 NOTHING = ResidualPieces(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2)))

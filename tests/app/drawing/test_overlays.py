@@ -10,9 +10,9 @@ from app.drawing.overlays import Path
 from app.state.page_view import View
 from app.state.people import ShownPose
 from tracker.body.model import PosedBody
-from tracker.contours import occluding_contours, part_edges
+from tracker.evidence.contours import occluding_contours, part_edges
+from tracker.evidence.images.edge_segments import EdgeSegments, sample_segments
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.images.edge_segments import EdgeSegments, sample_segments
 
 
 def kinds_of(paths, kind, camera=0):

@@ -11,9 +11,9 @@ from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
 from tracker.body.model import PosedBody
-from tracker.exports.keypoints import keypoints_in_views
 from tracker.footage.camera_source import Clock
 from tracker.geometry.triangulation import PointObservation
+from tracker.interchange.exports.keypoints import keypoints_in_views
 from tracker.session.session import load_session
 
 LATE = 1

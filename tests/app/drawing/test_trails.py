@@ -6,8 +6,8 @@ import pytest
 from app.drawing.predicted_pose import prediction
 from app.drawing.trails import Trails
 from tracker.body.model import BodyModel
+from tracker.body.motion.prediction import PredictSettings
 from tracker.formats.model_toml import load_model
-from tracker.motion.prediction import PredictSettings
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from app.export.agreement_report import write_report
-from tracker.agreement.comparison import compare
-from tracker.agreement.copies import Copies, Subject
+from tracker.evaluation.agreement.comparison import compare
+from tracker.evaluation.agreement.copies import Copies, Subject
 
 
 @pytest.mark.parametrize(("n", "joints"), [(1, ("left_elbow", "neck")), (3, ("left_elbow",)), (2, ())])

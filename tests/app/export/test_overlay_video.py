@@ -8,10 +8,10 @@ from stored_motions import distorted_cameras, random_poses
 from app.export import overlay_video
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.exports.motion import ExportedMotion, PersonMotion, StoredPose
-from tracker.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportedMotion, PersonMotion, StoredPose
+from tracker.interchange.exports.options import ExportOptions
 from tracker.session.session import load_session
-from tracker.store.records import PoseRecord
+from tracker.session.store.records import PoseRecord
 
 
 def posed_motion(session, frames, gaps=()):
@@ -92,8 +92,8 @@ def test_contours_are_drawn_where_the_lens_shows_them():
 
 
 def test_nothing_is_left_of_a_video_that_was_stopped(session, tmp_path):
-    from tracker.exports.export_files import export
-    from tracker.exports.formats import FORMATS
+    from tracker.interchange.exports.export_files import export
+    from tracker.interchange.exports.formats import FORMATS
 
     def stop():
         raise KeyboardInterrupt

@@ -15,7 +15,7 @@ from app.page.feeds.inspector import InspectorFeed
 from tracker.body.dimensions import dimensions_of
 from tracker.body.searches import Search
 from tracker.errors import TrackerError
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.records import PoseChange, PoseRecord
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from gestures import drag
 
 from app.messages.observation import AnnotatorsMessage, OtherCopyMessage, ProvenanceMessage, WatchProvenance
 from app.page.feeds.provenance import ProvenanceFeed
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import BETWEEN, SEAM, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import BETWEEN, SEAM, PoseChange, PoseRecord
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ from gestures import wait_for
 from app.drawing.overlay_colors import rgb
 from app.scene3d import voxel_layer
 from app.scene3d.voxel_layer import VoxelLayer, part_colors
+from tracker.estimation.voxel.body_pose import state_of
+from tracker.estimation.voxel.figure import figure_of
+from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.formats.model_toml import load_model
-from tracker.tracking.voxel.body_pose import state_of
-from tracker.tracking.voxel.figure import figure_of
-from tracker.tracking.voxel.settings import VoxelSettings
 
 MODEL = load_model("gavrila34", 1.72)
 POSE = MODEL.neutral()

@@ -18,11 +18,11 @@ from app.server import server
 from app.server.access import Access
 from app.server.export_routes import ExportRoutes
 from app.server.static_files import static_folder
-from tracker.exports import formats
-from tracker.exports.export_format import ExportFormat
 from tracker.formats.trc import write_trc
-from tracker.observations.importing import plan_import, store_import
-from tracker.observations.request import ImportRequest
+from tracker.interchange.exports import formats
+from tracker.interchange.exports.export_format import ExportFormat
+from tracker.interchange.observations.importing import plan_import, store_import
+from tracker.interchange.observations.request import ImportRequest
 from tracker.session.session import load_session
 
 

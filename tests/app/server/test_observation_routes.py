@@ -17,10 +17,10 @@ from app.server.observation_routes import ObservationRoutes
 from app.server.static_files import static_folder
 from tracker import files
 from tracker.body.model import PosedBody
-from tracker.judging.judge import Judgement, LimbVerdict
+from tracker.evaluation.judging.judge import Judgement, LimbVerdict
 from tracker.pipeline.keypoint_evidence import read_points
-from tracker.store.records import PoseRecord
-from tracker.store.stored_poses import StoredPose
+from tracker.session.store.records import PoseRecord
+from tracker.session.store.stored_poses import StoredPose
 
 PLAN, IMPORT, REPORT = "/observations/plan", "/observations/import", "/observations/report"
 COPY = "/copies/open"

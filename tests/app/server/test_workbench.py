@@ -23,8 +23,8 @@ from app.storage import rescue
 from tracker.errors import SessionError, TrackerError
 from tracker.session.lock import SessionLock
 from tracker.session.session import load_session
-from tracker.store import connection
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store import connection
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 @pytest.fixture(autouse=True)

@@ -17,13 +17,13 @@ from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.camera_exchange import find_exchange
 from tracker.evidence.observer import Observer
-from tracker.exports.motion import ExportedMotion, PersonMotion, StoredPose
-from tracker.exports.options import ExportOptions
 from tracker.footage.recording import Recording
 from tracker.footage.video import open_footage
+from tracker.interchange.exports.motion import ExportedMotion, PersonMotion, StoredPose
+from tracker.interchange.exports.options import ExportOptions
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseRecord
 
 
 @pytest.fixture(scope="module")

@@ -19,10 +19,10 @@ from app.share.folder import is_shared_folder, share
 from app.share.overlay_lines import UNITS_PER_PX, polylines, view_lines
 from app.share.pictures import GRADES, Encoder
 from tracker.errors import TrackerError
-from tracker.exports.motion import read_motion
+from tracker.interchange.exports.motion import read_motion
 from tracker.session.session import Person, save_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange
 
 LARGE = 30e6
 

@@ -16,8 +16,8 @@ from app.storage.retry_queue import RetryQueue
 from tracker.body.searches import Search
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, load_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, AssessmentChange, MarkChange, PinChange, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Alternative, AssessmentChange, MarkChange, PinChange, PoseChange, PoseRecord
 
 MODEL = load_model("gavrila22")
 N_VALUES = len(MODEL.value_names)

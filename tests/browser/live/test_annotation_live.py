@@ -11,7 +11,7 @@ from program import ROOT, started
 from tracker.annotation.comments import read_comments
 from tracker.annotation.plan import read_tasks
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 pytestmark = pytest.mark.slow
 

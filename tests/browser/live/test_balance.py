@@ -8,8 +8,8 @@ import pytest_asyncio
 from page_driver import drags_of, handle_of, shows, state_of, to_client, until
 from program import started
 
+from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
-from tracker.fitting.gauss_newton import fit_to_points
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 

@@ -8,9 +8,9 @@ from page_driver import shows
 from program import ROOT, started, visited
 
 from tracker.evaluation.references import read_joints
-from tracker.observations.stored import list_observations
+from tracker.interchange.observations.stored import list_observations
 from tracker.session.session import load_session
-from tracker.store.stored_poses import read_stored_poses
+from tracker.session.store.stored_poses import read_stored_poses
 
 pytestmark = pytest.mark.slow
 

@@ -12,8 +12,8 @@ from program import ROOT, started, visited
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 START = 8

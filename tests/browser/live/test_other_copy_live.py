@@ -9,12 +9,12 @@ import pytest
 from page_driver import shows
 from program import ROOT, started, visited
 
-from tracker.agreement.consensus import mean_pose
+from tracker.estimation.posing.default_pose import default_pose
+from tracker.evaluation.agreement.consensus import mean_pose
 from tracker.formats.model_toml import format_model
-from tracker.posing.default_pose import default_pose
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,7 @@ from page_driver import dragging, shows, state_of
 from program import ROOT, started, visited
 from run_with_doubt import store_run
 
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 @pytest_asyncio.fixture(loop_scope="session")

@@ -15,15 +15,15 @@ from page_driver import shows, state_of, to_client
 from program import started
 
 from tracker.body.model import PosedBody
-from tracker.contours.occluding_contours import part_poses
+from tracker.estimation.posing.default_pose import default_pose
+from tracker.evidence.contours.occluding_contours import part_poses
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
-from tracker.posing.default_pose import default_pose
 from tracker.session.session import Person, create_session, load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 pytestmark = pytest.mark.slow
 

@@ -17,14 +17,14 @@ from page_driver import shows as shows_within
 from program import ROOT, started, visited
 from scripted_user import TRUNK, ScriptedUser
 
+from tracker.estimation.chamfer.settings import TrackSettings, pose_cost
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ from page_driver import OPENED, dragging, shows
 from program import ROOT, WITHOUT_3D, started
 
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 pytestmark = pytest.mark.slow
 

@@ -11,8 +11,8 @@ from true_poses import sample_with_poses
 
 from app.share.content import SharedComment
 from app.share.folder import share
-from tracker.exports.motion import read_motion
 from tracker.footage.recording import Recording
+from tracker.interchange.exports.motion import read_motion
 from tracker.session.session import Person
 
 EVIL = "</script><script>globalThis.hacked = 1</script><img src=x onerror='globalThis.hacked = 1'>"

@@ -5,7 +5,7 @@ import json
 import pytest
 from page_driver import shows
 
-import tracker.exports.formats
+import tracker.interchange.exports.formats
 
 FORMATS = [
     {
@@ -13,7 +13,7 @@ FORMATS = [
         "units": format.units, "holds_provenance": format.holds_provenance, "numbering": format.numbering,
     }
     for name, options in (("trc", ["axes", "units"]), ("bvh", ["axes", "units"]), ("mp4", ["view"]))
-    for format in [tracker.exports.formats.FORMATS[name]]
+    for format in [tracker.interchange.exports.formats.FORMATS[name]]
 ]  # fmt: skip
 SENT_BACK = {
     "name": "like/mp", "title": "mp, as it came", "options": ["poses"], "axes": "", "units": "",

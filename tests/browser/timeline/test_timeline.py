@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 from page_driver import shows, state_of, until
 
-from tracker.store.records import SOURCES
+from tracker.session.store.records import SOURCES
 
 GUTTER, PADDING = 52, 8
 INSIDE_THE_MENU = """(() => {

@@ -11,10 +11,10 @@ from tracker.annotation.edit_union import interleave
 from tracker.annotation.numbered_settings import join_numbered, numbered_settings, renumbered
 from tracker.annotation.plan import decide, read_tasks
 from tracker.formats.model_toml import format_model, load_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, present_revision, revisions_of_poses
-from tracker.store.edit_log import Written
-from tracker.store.records import AssessmentChange, MarkChange, PinChange, PoseChange
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, present_revision, revisions_of_poses
+from tracker.session.store.edit_log import Written
+from tracker.session.store.records import AssessmentChange, MarkChange, PinChange, PoseChange
 
 STEPS = st.lists(st.tuples(st.integers(0, ACTIONS - 1), st.sampled_from(FRAMES), st.integers(0, 9)), max_size=8)
 

@@ -13,8 +13,8 @@ from tracker.body.model import PosedBody
 from tracker.errors import SessionError
 from tracker.evaluation.metrics import LOST_M
 from tracker.session.session import load_session
-from tracker.store.records import PoseRecord
-from tracker.store.stored_poses import StoredPose
+from tracker.session.store.records import PoseRecord
+from tracker.session.store.stored_poses import StoredPose
 
 N = 40
 SURE_M, UNSURE_M = 0.006, 0.08

@@ -10,9 +10,9 @@ from tracker.annotation.plan import add_tasks, count_states, decide, read_tasks
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import AssessmentChange, MarkChange, PoseChange, PoseRecord
-from tracker.store.stored_poses import StoredPose
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import AssessmentChange, MarkChange, PoseChange, PoseRecord
+from tracker.session.store.stored_poses import StoredPose
 
 
 @pytest.fixture

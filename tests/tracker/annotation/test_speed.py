@@ -8,8 +8,8 @@ from annotated_copies import copied, merged, new_store, pose
 from tracker.annotation import plan
 from tracker.annotation.speed import measure_speed
 from tracker.errors import DamagedStoreError
-from tracker.store import edit_tree
-from tracker.store.records import PoseChange
+from tracker.session.store import edit_tree
+from tracker.session.store.records import PoseChange
 
 
 @pytest.fixture

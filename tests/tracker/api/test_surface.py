@@ -8,7 +8,7 @@ import tracker
 from tracker.api.pose_series import PoseSeries
 from tracker.api.work import Found, Tracked
 from tracker.evaluation.metric import ComparedJoints, Metric
-from tracker.exports.export_format import ExportFormat
+from tracker.interchange.exports.export_format import ExportFormat
 
 SURFACE = Path(__file__).with_name("surface.txt")
 RESULTS = (ComparedJoints, ExportFormat, Found, Metric, PoseSeries, Tracked)

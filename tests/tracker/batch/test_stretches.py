@@ -22,8 +22,8 @@ from tracker.batch.tasks import Done
 from tracker.batch.worker import work
 from tracker.errors import TrackerError
 from tracker.pipeline.keyframe_stretches import pose_checksum
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import BETWEEN, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import BETWEEN, PoseChange, PoseRecord
 
 MODEL = MODELS["gavrila38"]
 

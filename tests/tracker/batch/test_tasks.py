@@ -17,7 +17,7 @@ from tracker.batch.tasks import do_task
 from tracker.evaluation.references import read_joints
 from tracker.formats.model_toml import load_model
 from tracker.pipeline.given_pose import set_pose_at_joints
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 @pytest.fixture

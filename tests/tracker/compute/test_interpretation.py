@@ -15,14 +15,14 @@ import numpy as np
 from app.session.samples import bundled
 from tracker.body.model import PosedBody
 from tracker.compute.interpretation import interpreted
-from tracker.contours import occluding_contours
+from tracker.evidence.contours import occluding_contours
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.posing.default_pose import default_pose
-from tracker.posing.drag import drag
-from tracker.posing.grab import grab
-from tracker.search import chamfer_kernels
-from tracker.search.chamfer_cost import ChamferCost
+from tracker.estimation.posing.default_pose import default_pose
+from tracker.estimation.posing.drag import drag
+from tracker.estimation.posing.grab import grab
+from tracker.estimation.search import chamfer_kernels
+from tracker.estimation.search.chamfer_cost import ChamferCost
 from tracker.session.session import load_session
 
 session = load_session(bundled("elbow_rotation"))
@@ -97,7 +97,7 @@ def test_chosen_modules_are_interpreted_in_all_threads(kernel):
         other.start()
         other.join()
         assert not kernel.signatures
-        assert not is_interpreted("tracker.images.edges")
+        assert not is_interpreted("tracker.evidence.images.edges")
     finally:
         interpret_modules()
     kernel(np.ones(3))

@@ -12,7 +12,7 @@ import pytest
 import tracker
 from tracker.compute import kernel_cache
 from tracker.compute.kernel_keys import KernelKeys, UnknownSourceError
-from tracker.contours import part_edges
+from tracker.evidence.contours import part_edges
 
 SOURCE = Path(tracker.__file__).parent
 
@@ -170,8 +170,8 @@ def test_a_kernel_depends_on_the_kernels_of_other_files(tmp_path):
     visibility.write_text(text.replace("far, near = shared[0, i], shared[1, i]", "far, near = 1.0, 0.0"))
     after = keys_of(KernelKeys(copy))
     changed = {module for module, name in before if before[module, name] != after[module, name]}
-    assert {"tracker.contours.visibility", "tracker.contours.part_edges"} <= changed
-    assert not any(module.startswith(("tracker.images", "tracker.body")) for module in changed)
+    assert {"tracker.evidence.contours.visibility", "tracker.evidence.contours.part_edges"} <= changed
+    assert not any(module.startswith(("tracker.evidence.images", "tracker.body")) for module in changed)
 
 
 def keys_of(source):

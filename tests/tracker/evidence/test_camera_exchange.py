@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-from tracker.calibrations.reading import read_cameras
 from tracker.evidence.camera_exchange import find_body_exchange, find_exchange
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
+from tracker.formats.calibrations.reading import read_cameras
 from tracker.formats.trc import read_trc
 from tracker.session.session import load_session
 

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from fisheye import with_fisheye
 
+from tracker.evidence.images.background_subtraction import SHADOWS
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.mask_image import ANYONE, UNKNOWN
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
-from tracker.images.background_subtraction import SHADOWS
 
 W, H, N = 320, 240, 9
 K = np.array([[200.0, 0.0, 159.5], [0.0, 200.0, 119.5], [0.0, 0.0, 1.0]])

@@ -7,8 +7,11 @@ from fisheye import with_fisheye
 from staging import camera_at, view_evidence
 
 from tracker.body.model import PosedBody
-from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
+from tracker.evidence.contours import occluding_contours
+from tracker.evidence.images.edge_segments import MAX_LENGTH, accept_segments, link_edges
+from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.working_view import WorkingView, region_around, working_scale
 from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
 from tracker.evidence.view_evidence import (
     ACCEPTED_SHARE,
@@ -21,9 +24,6 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.mask_image import UNKNOWN
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
-from tracker.images.edge_segments import MAX_LENGTH, accept_segments, link_edges
-from tracker.images.static_edges import StaticEdgeModel
-from tracker.images.working_view import WorkingView, region_around, working_scale
 from tracker.session.session import load_session
 
 

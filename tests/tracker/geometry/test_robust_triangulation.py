@@ -3,8 +3,8 @@ import pytest
 from observed_people import BODY_25, make_session, seen, walking
 
 from tracker.geometry.robust_triangulation import Views, triangulate_points
-from tracker.observations.identities import match_people
-from tracker.observations.sides import exchanged_sides, with_sides_exchanged
+from tracker.interchange.observations.identities import match_people
+from tracker.interchange.observations.sides import exchanged_sides, with_sides_exchanged
 
 LEGS = [(BODY_25.points.index(f"L{j}"), BODY_25.points.index(f"R{j}")) for j in ("Hip", "Knee", "Ankle", "Heel")]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tracker.trajectory import solve
+from tracker.estimation.trajectory import solve
 
 
 @pytest.fixture

@@ -7,11 +7,11 @@ from run_poses import MOVED, run_pose
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.body.searches import Search
-from tracker.fitting.hypothesis import Hypothesis
+from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import load_model
 from tracker.pipeline.assessed_poses import assessed_by_run
 from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row
-from tracker.store.records import PoseRecord
+from tracker.session.store.records import PoseRecord
 
 
 def record(model, remark=""):

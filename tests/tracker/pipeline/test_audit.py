@@ -12,14 +12,14 @@ from run_with_doubt import WRONG_FRAME, store_run
 from tracker.body.model import PosedBody
 from tracker.compute.progress import mapped, result_of
 from tracker.errors import Remedy, TrackerError
-from tracker.fitting.hypothesis import Hypothesis
-from tracker.fitting.retarget import retarget_pose
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.fitting.hypothesis import Hypothesis
+from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model
 from tracker.pipeline import audit
 from tracker.pipeline.audit import AuditPlan, PoseAudit
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, AssessmentChange, MarkChange, PoseChange, PoseRecord
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Alternative, AssessmentChange, MarkChange, PoseChange, PoseRecord
 
 FRAMES = range(17, 24)
 OBSERVER = SimpleNamespace(cameras=(None, None))

@@ -8,15 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
-from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.errors import TrackerError
+from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
+from tracker.estimation.acquisition.size_parameters import SizeParameters, SizePriors
+from tracker.estimation.initialization.first_pose import HEIGHT_SIGMA
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, has_preset_sizes, load_model
 from tracker.geometry.triangulation import sigma_px
-from tracker.initialization.first_pose import HEIGHT_SIGMA
 from tracker.pipeline import body_acquisition
 from tracker.pipeline.body_acquisition import (
     MEASURED,
@@ -27,8 +27,8 @@ from tracker.pipeline.body_acquisition import (
     store_body,
 )
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PinChange, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PinChange, PoseChange, PoseRecord
 
 
 @pytest.fixture

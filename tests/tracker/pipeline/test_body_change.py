@@ -11,8 +11,8 @@ from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline.body_acquisition import SIZES_EDITS
 from tracker.pipeline.body_change import change_body
 from tracker.session.session import load_session, save_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 FRAMES = {0: ("manual", True), 3: ("searched", False), 4: ("tracked", False)}
 

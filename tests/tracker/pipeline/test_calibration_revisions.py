@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-from tracker.calibration.camera_correction import DRIFT, N_CORRECTIONS, TIME
+from tracker.calibration.check.camera_correction import DRIFT, N_CORRECTIONS, TIME
 from tracker.errors import SessionError
 from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
@@ -20,9 +20,9 @@ from tracker.pipeline.calibration_revisions import (
     with_corrections,
 )
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_log import CALIBRATION_EDITS, present_revision, revisions_of_poses
-from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.calibration_log import CALIBRATION_EDITS, present_revision, revisions_of_poses
+from tracker.session.store.records import AssessmentChange, PoseChange, PoseRecord
 
 
 @pytest.fixture

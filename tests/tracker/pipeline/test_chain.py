@@ -11,15 +11,17 @@ import pytest
 from fake_tracker import Walker
 from run_poses import Estimate
 
-from tracker.acquisition.from_contours import Acquisition
 from tracker.body.dimensions import dimensions_of, with_dimensions
 from tracker.body.model import PosedBody
-from tracker.calibration.camera_correction import N_CORRECTIONS
+from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.errors import TrackerError
-from tracker.fitting.hypothesis import Hypothesis
-from tracker.fitting.retarget import retarget_pose
+from tracker.estimation.acquisition.from_contours import Acquisition
+from tracker.estimation.chamfer.method import CHAMFER
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.fitting.hypothesis import Hypothesis
+from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
 from tracker.formats.model_toml import format_model, load_model
-from tracker.initialization.first_pose import FirstPose, FirstPoses
 from tracker.pipeline import chain, track_session
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, start_frame
@@ -27,10 +29,8 @@ from tracker.pipeline.find_people import FindSettings
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import load_session, save_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.chamfer.method import CHAMFER
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 FRAME = 3
 

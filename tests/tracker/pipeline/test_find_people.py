@@ -14,13 +14,19 @@ from solids import ellipsoid, silhouettes_of
 
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton import fit_to_points
-from tracker.fitting.hypothesis import Hypothesis
+from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.estimation.fitting.hypothesis import Hypothesis
+from tracker.estimation.initialization import first_pose, known_start, own_figure
+from tracker.estimation.initialization.first_pose import (
+    FirstPose,
+    FirstPoses,
+    find_first_poses,
+    find_first_poses_anywhere,
+)
+from tracker.estimation.initialization.generators.start_generators import GENERATORS, from_voxels
+from tracker.estimation.initialization.start_fit import StartTrack
+from tracker.evidence.voxels.visual_hull import VisualHull
 from tracker.formats.model_toml import format_model
-from tracker.initialization import first_pose, known_start, own_figure
-from tracker.initialization.first_pose import FirstPose, FirstPoses, find_first_poses, find_first_poses_anywhere
-from tracker.initialization.generators.start_generators import GENERATORS, from_voxels
-from tracker.initialization.start_fit import StartTrack
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
 from tracker.pipeline.find_people import (
     AXES,
@@ -31,8 +37,7 @@ from tracker.pipeline.find_people import (
     store_found,
 )
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.voxels.visual_hull import VisualHull
+from tracker.session.store.annotation_store import AnnotationStore
 
 NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 CAMERAS = [replace(c, name=n) for c, n in zip(cameras_about_a_figure(), NAMES, strict=True)]

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.posing.default_pose import default_pose
 from tracker.evaluation.references import read_joints
 from tracker.formats.pose_csv import PoseTable
 from tracker.pipeline.given_pose import set_pose_at_joints, set_pose_from_table
-from tracker.posing.default_pose import default_pose
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 @pytest.fixture

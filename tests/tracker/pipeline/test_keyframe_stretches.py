@@ -8,17 +8,17 @@ import pytest
 from run_poses import Estimate
 
 from tracker.errors import TrackerError
+from tracker.estimation.chamfer.method import CHAMFER
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.estimate import PoseEstimate
 from tracker.formats.model_toml import format_model
 from tracker.pipeline import track_session
 from tracker.pipeline.keyframe_stretches import KeyframeStretch, frames_of, stretches_to_track
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.chamfer.method import CHAMFER
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimate import PoseEstimate
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 APART_M = {3: 0.04, 8: 0.3}
 """Distance of the passes on a frame of each stretch; elsewhere they agree."""

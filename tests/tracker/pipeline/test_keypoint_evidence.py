@@ -10,8 +10,8 @@ from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, load_model
-from tracker.observations.importing import plan_import, store_import
-from tracker.observations.request import ImportRequest
+from tracker.interchange.observations.importing import plan_import, store_import
+from tracker.interchange.observations.request import ImportRequest
 from tracker.pipeline import keypoint_evidence as module
 from tracker.pipeline.keypoint_evidence import (
     SEEN_BODIES,
@@ -25,8 +25,8 @@ from tracker.pipeline.keypoint_evidence import (
 )
 from tracker.pipeline.keypoint_poses import store_keypoint_poses
 from tracker.session.session import save_model
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 N = 10
 

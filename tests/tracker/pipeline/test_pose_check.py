@@ -11,12 +11,12 @@ from run_with_doubt import DOUBTED, WRONG_FRAME, store_run
 
 from tracker.body.limbs import limbs
 from tracker.errors import TrackerError
+from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.pipeline import pose_check
 from tracker.pipeline.pose_check import PoseInRun, checked_pose, compared_pose, frames_around
-from tracker.store.stored_poses import read_stored_poses
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.session.store.stored_poses import read_stored_poses
 
 
 @pytest.mark.parametrize(

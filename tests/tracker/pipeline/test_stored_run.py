@@ -9,17 +9,17 @@ import pytest
 from run_poses import MOVED, Estimate
 
 from tracker.errors import Remedy, SessionError, TrackerError
+from tracker.estimation.chamfer.method import CHAMFER
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.estimate import AlternativePose, BackwardStep, PoseEstimate
 from tracker.formats.model_toml import format_model
 from tracker.pipeline import methods, track_session
 from tracker.pipeline.methods import METHODS, make_tracker
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.pipeline.track_session import EstimatedRows, EstimateStep
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.chamfer.method import CHAMFER
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimate import AlternativePose, BackwardStep, PoseEstimate
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 STEP_M, MOVED_M = 0.01, 0.1
 N = 6

@@ -2,6 +2,8 @@ import json
 
 import numpy as np
 
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.tracking.estimate import AlternativePose, PoseEstimate
 from tracker.pipeline.methods import METHODS, make_tracker
 from tracker.pipeline.tracked_changes import (
     StoredPerson,
@@ -9,9 +11,7 @@ from tracker.pipeline.tracked_changes import (
     settings_record,
     tracked_changes,
 )
-from tracker.store.annotation_store import AnnotationStore
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimate import AlternativePose, PoseEstimate
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 def estimate(other):

@@ -8,11 +8,11 @@ import pytest
 from app.drawing import overlays
 from app.state.page_view import View
 from tracker.errors import TrackerError
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.edit_tree import now
-from tracker.store.identities import new_uid
-from tracker.store.records import Alternative, PoseChange, PoseRecord
-from tracker.store.task_log import StateRow, TaskRow
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.edit_tree import now
+from tracker.session.store.identities import new_uid
+from tracker.session.store.records import Alternative, PoseChange, PoseRecord
+from tracker.session.store.task_log import StateRow, TaskRow
 
 ANN, BOB = 0, 1
 VIEW = View(frozenset(("contours", "alternatives")), (1, 1, 1, 1))

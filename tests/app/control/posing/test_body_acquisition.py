@@ -8,10 +8,10 @@ from gestures import drag, wait_for
 
 from app.control.posing import body_acquisition
 from app.page.feeds import inspector
-from tracker.acquisition.from_contours import Acquisition
-from tracker.acquisition.size_fit import SizeFit
-from tracker.acquisition.size_parameters import SizeParameters
 from tracker.errors import TrackerError
+from tracker.estimation.acquisition.from_contours import Acquisition
+from tracker.estimation.acquisition.size_fit import SizeFit
+from tracker.estimation.acquisition.size_parameters import SizeParameters
 
 
 @pytest.fixture

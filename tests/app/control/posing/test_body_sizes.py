@@ -11,7 +11,7 @@ from app.state.page_view import View
 from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.errors import TrackerError
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 FRAMES = (0, 3)
 

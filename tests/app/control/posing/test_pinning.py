@@ -5,10 +5,10 @@ import pytest
 from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 
 from tracker.errors import TrackerError
-from tracker.fitting import gauss_newton
-from tracker.posing import pinned_fit
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.estimation.fitting import gauss_newton
+from tracker.estimation.posing import pinned_fit
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import PoseChange, PoseRecord
 
 RIGHT, BACK = 1, 2
 

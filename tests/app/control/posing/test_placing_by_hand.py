@@ -21,7 +21,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model, load_model
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 TANGO = ROOT / "sample_sessions" / "tango"
 LIMBS = [

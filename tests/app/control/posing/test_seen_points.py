@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gestures import PAGE, drag, pixel_of
 
-from tracker.store.records import SEEN
+from tracker.session.store.records import SEEN
 
 
 def seen(controller):

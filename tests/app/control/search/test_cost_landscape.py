@@ -6,7 +6,7 @@ from gestures import drag, wait_for
 
 from app.control.search.cost_landscape import SAMPLES, landscape
 from tracker.errors import TrackerError
-from tracker.tracking.chamfer.settings import pose_cost
+from tracker.estimation.chamfer.settings import pose_cost
 
 
 @pytest.mark.slow

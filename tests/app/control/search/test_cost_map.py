@@ -7,7 +7,7 @@ from gestures import drag, wait_for
 from app.control.search.cost_map import SAMPLES, cost_map
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.tracking.estimation.pose_score import scorer_without_prediction
+from tracker.estimation.by_frame.pose_score import scorer_without_prediction
 
 PAGE = 7
 JOINTS = ("left_shoulder.abduction", "left_elbow.extension")

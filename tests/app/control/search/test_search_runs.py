@@ -5,9 +5,9 @@ import pytest
 
 from app.control.search import search_runs
 from app.control.search.search_runs import SearchRun, SearchRuns
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.search.best_first import SearchStep
 from tracker.formats.model_toml import load_model
-from tracker.search.best_first import SearchStep
-from tracker.tracking.chamfer.settings import TrackSettings
 
 MODEL = load_model("gavrila22")
 START = MODEL.neutral()

@@ -5,8 +5,8 @@ import pytest
 
 from app.control.search.search_settings import changed, differences, leaves
 from tracker.errors import TrackerError
+from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.formats.model_toml import load_model
-from tracker.tracking.chamfer.settings import TrackSettings
 
 MODELS = [load_model("gavrila22")]
 BEFORE = TrackSettings()

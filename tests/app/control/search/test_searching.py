@@ -9,8 +9,8 @@ import pytest
 from gestures import drag, wait_for
 
 from tracker.errors import TrackerError
-from tracker.search.best_first import SearchSettings
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.search.best_first import SearchSettings
 
 QUICK = TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=3))
 

@@ -15,8 +15,8 @@ from app.state.page_view import View
 from app.state.people import ShownPose
 from tracker.body.limbs import limbs
 from tracker.errors import TrackerError
-from tracker.search.best_first import SearchSettings
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.search.best_first import SearchSettings
 
 QUICK = TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=3))
 CONTOURS = View(frozenset({"contours"}), (1, 1, 1, 1), False)

@@ -15,7 +15,7 @@ from tracker.footage import packet_scan
 from tracker.footage.recording import Recording
 from tracker.footage.video import VideoFile
 from tracker.session.session import load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 @pytest.fixture

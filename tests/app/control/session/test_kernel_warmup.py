@@ -19,10 +19,10 @@ from app.state.page_view import View
 from tracker.compute import kernel_cache
 from tracker.compute.interpretation import is_interpreted
 from tracker.compute.kernel_cache import STAGES, compiled_mark, compiled_stages, record_compiled, record_stage
-from tracker.initialization.generators import silhouette_overlap
+from tracker.estimation.initialization.generators import silhouette_overlap
+from tracker.estimation.voxel import labels
+from tracker.evidence.voxels import carving
 from tracker.session.session import load_session
-from tracker.tracking.voxel import labels
-from tracker.voxels import carving
 
 VIEW = View(frozenset({"contours"}), (1, 0, 0, 0))
 """The contours of one camera."""
@@ -118,7 +118,7 @@ def test_closing_ends_the_program_and_what_it_started(empty_cache):
 def test_bodies_are_placed_by_interpreted_kernels_until_these_are_compiled(empty_cache):
     compiler = KernelCompiler(WAITS)
     assert is_interpreted("tracker.body.kinematics")
-    assert not is_interpreted("tracker.images.edges")
+    assert not is_interpreted("tracker.evidence.images.edges")
     assert compiler.follow() == frozenset()
     assert is_interpreted("tracker.body.kinematics")
     record_stage("posing")

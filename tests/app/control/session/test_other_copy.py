@@ -9,10 +9,10 @@ from gestures import drag, wait_for
 
 from app.drawing.ghosts import copy_lines
 from app.state.page_view import View
-from tracker.agreement.consensus import mean_pose
 from tracker.errors import TrackerError
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import TAKEN_FROM, PoseChange, PoseRecord
+from tracker.evaluation.agreement.consensus import mean_pose
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import TAKEN_FROM, PoseChange, PoseRecord
 
 VIEW = View(frozenset(("contours",)), (1, 0, 0, 1))
 RAISED_RAD = 0.4

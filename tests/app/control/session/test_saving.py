@@ -10,10 +10,10 @@ from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 from app.messages.encoding import state as state_message
 from tracker.body.dimensions import dimensions_of
 from tracker.errors import SessionError
-from tracker.search.best_first import SearchSettings
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, PoseChange
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.search.best_first import SearchSettings
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.records import Alternative, PoseChange
 
 
 class Disk:

@@ -5,7 +5,7 @@ import pytest
 from gestures import FRONT, PAGE, drag, pixel_of
 from page_visits import visiting
 
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.records import PoseChange, PoseRecord
 
 TRACKED, PLAIN = 3, 5
 SIGMA_M = 0.04

@@ -7,7 +7,7 @@ import pytest
 from gestures import drag, wait_for
 
 from app.control.tracking import calibrating
-from tracker.calibration.camera_correction import N_CORRECTIONS
+from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.errors import TrackerError
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 

@@ -7,7 +7,7 @@ from gestures import drag, wait_for
 from app.control.tracking.comparing_runs import method_of
 from app.state.comparison import Stretch
 from tracker.errors import TrackerError
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.records import PoseChange, PoseRecord
 
 RANGE = range(3, 7)
 

@@ -10,7 +10,7 @@ from run_poses import Estimate
 from app.state.run_choices import RunChoices
 from tracker.errors import TrackerError
 from tracker.pipeline import audit
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.store.records import PoseChange, PoseRecord
 
 FRAMES, CORRECTED, STEP_M = range(3, 12), 7, 0.1
 

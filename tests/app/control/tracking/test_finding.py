@@ -9,11 +9,11 @@ from gestures import drag, wait_for
 from app.drawing import joint_handles, overlays
 from app.page.feeds import inspector
 from app.state.page_view import View
-from tracker.acquisition.from_contours import Acquisition
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.fitting.hypothesis import Hypothesis
-from tracker.initialization.first_pose import FirstPose, FirstPoses
+from tracker.estimation.acquisition.from_contours import Acquisition
+from tracker.estimation.fitting.hypothesis import Hypothesis
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
 from tracker.pipeline import chain
 
 FRAME = 1

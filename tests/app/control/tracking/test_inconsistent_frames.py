@@ -8,7 +8,7 @@ from gestures import wait_for
 
 from app.control.tracking import inconsistent_frames
 from app.messages import encoding
-from tracker.store.records import AssessmentChange, MarkChange, PoseChange, PoseRecord
+from tracker.session.store.records import AssessmentChange, MarkChange, PoseChange, PoseRecord
 
 KEY = 10
 

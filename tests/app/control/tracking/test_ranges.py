@@ -5,9 +5,9 @@ import pytest
 from gestures import drag, wait_for
 
 from app.control.tracking import ranges
+from tracker.body.motion.interpolation import interpolate_pose
 from tracker.errors import TrackerError
-from tracker.motion.interpolation import interpolate_pose
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 @pytest.fixture

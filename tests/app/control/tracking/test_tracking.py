@@ -15,7 +15,7 @@ from run_poses import Estimate, doubted
 from app.state.run_choices import RunChoices
 from tracker.errors import SessionError, TrackerError
 from tracker.pipeline import track_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.session.store.annotation_store import AnnotationStore
 
 
 def at(controller, frame):

@@ -10,10 +10,10 @@ from app.messages.encoding import state as state_message
 from app.messages.parsing import MessageError
 from app.page.commands import dispatch
 from app.page.feeds.inspector import view_3d
+from tracker.body.motion.floor_from_feet import FeetFloor
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.geometry.ground_plane import UP_ROTATIONS, GroundPlane, nearest_axis, up_rotation
-from tracker.motion.floor_from_feet import FeetFloor
 from tracker.session.session import load_session
 
 TILT = rigid.so3_exp(np.array([0.05, -0.03, 0.0]))

@@ -7,8 +7,8 @@ from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 from app.drawing import joint_handles, overlays, part_outlines, pin_marks
 from app.state.page_view import View
 from tracker.errors import TrackerError
-from tracker.search.best_first import SearchSettings
-from tracker.tracking.chamfer.tracker import TrackSettings
+from tracker.estimation.chamfer.tracker import TrackSettings
+from tracker.estimation.search.best_first import SearchSettings
 
 ANN, BOB = 0, 1
 QUICK = TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=2))

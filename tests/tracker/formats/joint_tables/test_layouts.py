@@ -20,7 +20,7 @@ from tracker.formats.joint_tables.layouts import (
 from tracker.formats.joint_tables.subjects import by_subject
 from tracker.formats.observation_layout import Sample
 from tracker.geometry.arrays import DAMAGED_ARRAYS
-from tracker.observations.readers import find_files
+from tracker.interchange.observations.readers import find_files
 
 N = 6
 ONE = walking(N)

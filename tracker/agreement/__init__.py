@@ -1,7 +1,0 @@
-"""How far the copies of one session differ in which several annotators worked apart.
-
-Imports `body`, `formats`, `session` and `store`. Callers use `copies.read_copies`, `comparison.compare` and
-`consensus.mean_pose`.
-"""
-
-__all__ = ["comparison", "consensus", "copies", "statistics"]

@@ -1,0 +1,29 @@
+"""Velocities of poses, by which a body is shown to cameras whose pictures were taken between frames."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tracker.body.model import BodyModel
+from tracker.body.motion.shortest_step import shortest_step
+from tracker.geometry.arrays import Array
+
+
+def velocity(model: BodyModel, poses: Mapping[int, Array], frame: int) -> Array | None:
+    """Return the change of a pose from one frame to the next, (n_dofs,), rad or metres; None without a neighbour.
+
+    It is the central difference, averaged over three frames where the poses of two frames to both sides are known. At
+    the end of known poses it is the difference from the only neighbour.
+
+    Args:
+        model: the body of all poses.
+        poses: by frame, (n_values,) each.
+        frame: a frame with a pose.
+    """
+    known = {i: poses[frame + i] for i in range(-2, 3) if frame + i in poses}
+    if len(known) == 5:
+        return np.asarray(sum(shortest_step(model, known[i + 1], known[i - 1]) for i in (-1, 0, 1)) / 6)
+    before, after = (-1 if -1 in known else 0), (1 if 1 in known else 0)
+    if 0 not in known or before == after:
+        return None
+    return shortest_step(model, known[after], known[before]) / (after - before)

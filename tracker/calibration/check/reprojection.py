@@ -1,0 +1,390 @@
+"""Least squares over cameras and what they see: normal equations of reprojection errors, robust, with weak priors.
+
+Corrections of the cameras are the shared unknowns; each group of observations has its own ones, such as a free point or
+the pose of a board. Squared errors s, in standard deviations of a picture, count as s / (1 + s / k^2) (Geman & McClure
+1987), so that gross errors have no influence.
+"""
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.calibration.check.camera_columns import camera_difference, moved_camera, n_columns, project_with_columns
+from tracker.estimation.fitting.bundle import ArrowEquations, solve_bundle
+from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.cameras import Camera
+
+OUTLIER_SIGMAS = 4.0
+"""The k of the robust errors, standard deviations: Gaussian errors then keep 96% of their information (the ratio of
+E[w + s w']^2 to E[w^2 s] / 2), and an error of 12 pulls as much as one of 1.2."""
+_MEDIAN_SQUARE = 2 * np.log(2.0)
+"""Median of the squared length of a Gaussian error in the plane, in variances."""
+_ROUNDS = 12
+"""Most fits with noise measured again in between. It settles to 1% within three to six."""
+_SETTLED = 0.01
+"""Largest relative change of the noise at which it has settled: 1% of all intervals."""
+_STEPS, _ROUGH, FINAL = 2, 1e-2, 1e-6
+"""Most steps before the noise is measured again, and relative decreases of the cost at which a fit ends: before the
+noise has settled, and after."""
+_LARGE, _FALL = 0.95, 4.0
+"""Quantile of the errors that the noise begins at, and the factor by which it falls at most from fit to fit."""
+_NOT_SHOWN_PX = 1e4
+"""Error of a point that its camera does not show, px: larger than a picture."""
+_FLOOR = 1e-8
+"""Added to second derivatives by own unknowns, 1 / rad^2 or 1 / m^2: groups whose observations are all gross errors
+stay where they are."""
+_MIN_SIGMA_PX = 0.01
+"""Least standard deviation of a corner or a key point, px: none is found more precisely."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Places at which cameras see points. They are sorted by camera and group."""
+
+    cameras: IntArray
+    """Index of the camera of each, (N,)."""
+    groups: IntArray
+    """Index of the group of each, such as the number of a free point or of the frame of a board, (N,)."""
+    px: Array
+    """Observed place, original px, (N, 2)."""
+
+    def __post_init__(self) -> None:
+        order = self.cameras.astype(np.int64) * (self.groups.max(initial=0) + 1) + self.groups
+        assert np.all(np.diff(order) >= 0), "observations must be sorted by camera and group"
+
+    def of_camera(self, camera: int) -> slice:
+        """Return where the observations of a camera stand."""
+        return slice(*np.searchsorted(self.cameras, [camera, camera + 1]))
+
+
+class Rig(NamedTuple):
+    """Unknowns of a problem: cameras, and the own unknowns of each group."""
+
+    cameras: tuple[Camera, ...]
+    own: Array
+    """Free points, (G, 3), or poses, (G, 4, 4)."""
+
+
+class Located(NamedTuple):
+    """Observed points in the world."""
+
+    points_world: Array
+    """(N, 3), metres."""
+    by_own: Array | None
+    """Derivatives by the own unknowns of the group, (N, 3, m); None for free points, which are their own unknowns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Knowledge of cameras before they are adjusted: Gaussian around a mean."""
+
+    cameras: tuple[Camera, ...]
+    """The means."""
+    sigmas: tuple[Array, ...]
+    """Standard deviations of the corrections of each camera, (n_columns,): 0 holds one, infinity leaves it free."""
+
+
+class RigFit(NamedTuple):
+    """Cameras and own unknowns at which the cost is least."""
+
+    rig: Rig
+    sigmas_px: Array
+    """Measured standard deviation of an observation along each axis in each camera, (n_cameras,), px."""
+    covariance: Array
+    """Covariance of the corrections of all cameras, one after the other, (n, n); 0 for those that are held."""
+    errors_px: Array
+    """Projection minus observation, (N, 2), px."""
+    weights: Array
+    """Robust weight of each observation, 0 to 1, (N,)."""
+    common_share: float
+    """By how much errors of one view agree, at least 1; see `ReprojectionProblem.common_share`."""
+
+
+class ReprojectionProblem(ABC):
+    """Cameras that see the points of groups, for `solve_bundle`. Subclasses say where the points are."""
+
+    n_own: int
+    """Number of own unknowns of a group."""
+    has_common_noise = False
+    """Whether the ratios of the cameras' noise are given, and only its size is measured."""
+
+    def __init__(self, observations: Observations, prior: Prior, n_groups: int, sigmas_px: Array) -> None:
+        """State a problem.
+
+        Args:
+            observations: of all cameras.
+            prior: knowledge of the cameras.
+            n_groups: number of groups; each must be determined by its observations.
+            sigmas_px: standard deviation of an observation in each camera, (n_cameras,), px.
+        """
+        self.observations, self.n_groups, self.sigmas_px = observations, n_groups, sigmas_px
+        self._take_prior(prior)
+
+    def _take_prior(self, prior: Prior) -> None:
+        self.prior = prior
+        self.columns = [np.flatnonzero(sigmas > 0) for sigmas in prior.sigmas]
+        self.ends = np.cumsum([0, *(len(columns) for columns in self.columns)])
+        self.precision = np.concatenate([s[c] ** -2.0 for s, c in zip(prior.sigmas, self.columns, strict=True)])
+
+    # --- for subclasses -----------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def locate(self, own: Array) -> Located:
+        """Return the places of the observed points."""
+
+    @abstractmethod
+    def move_own(self, own: Array, step: Array) -> Array:
+        """Return the own unknowns after a step, (G, m)."""
+
+    # --- for the solver -----------------------------------------------------------------------------------------
+
+    def linearize(self, rig: Rig, below: float = np.inf) -> ArrowEquations:
+        """See `BundleProblem`."""
+        out, cost = ArrowEquations.zeros(int(self.ends[-1]), self.n_groups, self.n_own), 0.0
+        located = self.locate(rig.own)
+        for i, camera in enumerate(rig.cameras):
+            at = self.observations.of_camera(i)
+            by_own = None if located.by_own is None else located.by_own[at]
+            cost += self._add_camera(out, i, camera, Located(located.points_world[at], by_own))
+        diagonal = np.arange(self.n_own)
+        out.own_hessians[:, diagonal, diagonal] += _FLOOR
+        moves = zip(self.prior.cameras, rig.cameras, self.columns, strict=True)
+        offsets = np.concatenate([camera_difference(before, now)[columns] for before, now, columns in moves])
+        out.gradient[:] += self.precision * offsets
+        out.hessian[:] += np.diag(self.precision)
+        return out._replace(cost=cost + 0.5 * float(self.precision @ offsets**2))
+
+    def _add_camera(self, out: ArrowEquations, index: int, camera: Camera, located: Located) -> float:
+        """Add the equations of one camera; return its cost."""
+        J, own, r, cost = self._scaled_rows(index, camera, located)
+        part, flat = slice(self.ends[index], self.ends[index + 1]), J.reshape(2 * len(J), J.shape[2])
+        out.gradient[part] += flat.T @ r.ravel()
+        out.hessian[part, part] += flat.T @ flat
+        groups, transposed = self.observations.groups[self.observations.of_camera(index)], own.swapaxes(1, 2)
+        _add(out.own_gradients, groups, (transposed @ r)[..., 0])
+        _add(out.own_hessians, groups, transposed @ own)
+        _add(out.cross[:, :, part], groups, transposed @ J)
+        return cost
+
+    def _scaled_rows(self, index: int, camera: Camera, located: Located) -> tuple[Array, Array, Array, float]:
+        """Return rows in standard deviations, weighted, and the cost of a camera.
+
+        Returns:
+            Derivatives by the camera, (N, 2, n), and by the own unknowns, (N, 2, m); errors, (N, 2, 1); half the sum of
+            robust squares. Points that the camera does not show have rows of 0 and the largest robust square.
+        """
+        sigma = self.sigmas_px[index]
+        found = project_with_columns(camera, located.points_world)
+        errors = found.px - self.observations.px[self.observations.of_camera(index)]
+        s = np.sum(errors**2, axis=1) / sigma**2
+        shown = np.isfinite(s)
+        scale = np.sqrt(np.where(shown, _weights(s), 0.0)) / sigma
+        J, own = found.by_camera[:, :, self.columns[index]], found.by_point
+        if not shown.all():
+            J, own, errors = (np.where(np.isfinite(rows), rows, 0.0) for rows in (J, own, errors))
+        if located.by_own is not None:
+            own = own @ located.by_own
+        cost = 0.5 * float(np.where(shown, s / (1 + s / OUTLIER_SIGMAS**2), OUTLIER_SIGMAS**2).sum())
+        scale = scale[:, None, None]
+        return J * scale, own * scale, errors[:, :, None] * scale, cost
+
+    def moved(self, rig: Rig, shared: Array, own: Array) -> Rig:
+        """See `BundleProblem`."""
+        cameras = tuple(moved_camera(c, self.step_of(i, shared)) for i, c in enumerate(rig.cameras))
+        return Rig(cameras, self.move_own(rig.own, own))
+
+    def free(self, rig: Rig, equations: ArrowEquations) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """See `BundleProblem`."""
+        return np.ones(len(self.precision), dtype=bool), np.ones((self.n_groups, self.n_own), dtype=bool)
+
+    def step_of(self, camera: int, shared: Array) -> Array:
+        """Return the correction of one camera, (n_columns,), of a step of the shared unknowns, (n,)."""
+        out = np.zeros(n_columns(self.prior.cameras[camera]))
+        out[self.columns[camera]] = shared[self.ends[camera] : self.ends[camera + 1]]
+        return out
+
+    def common_share(self, rig: Rig) -> float:
+        """Return by how much errors of one view agree, at least 1: variance of their means over that of lone errors.
+
+        A board that moves while cameras film it at slightly different times shifts all its corners together. A view
+        with such errors holds less information than its number of corners promises; it is a camera's part of a group.
+        """
+        equations, located = self.linearize(rig), self.locate(rig.own)
+        if located.by_own is None:
+            return 1.0
+        inverse = np.linalg.pinv(equations.own_hessians, hermitian=True)
+        squares, expected, lone = 0.0, 0.0, 0.0
+        for i, camera in enumerate(rig.cameras):
+            at = self.observations.of_camera(i)
+            groups = self.observations.groups[at]
+            _, own, r, _ = self._scaled_rows(i, camera, Located(located.points_world[at], located.by_own[at]))
+            sums, own_sums = np.zeros((self.n_groups, 2)), np.zeros((self.n_groups, 2, self.n_own))
+            _add(sums, groups, r[..., 0])
+            _add(own_sums, groups, own)
+            counts = np.maximum(np.bincount(groups, minlength=self.n_groups), 1)
+            weights = np.bincount(groups, np.sum(own**2, axis=(1, 2)) > 0, self.n_groups)
+            squares, lone = squares + float(np.sum(sums**2 / counts[:, None])), lone + float(np.sum(r**2))
+            leverages = np.einsum("gij,gjk,gik->g", own_sums, inverse, own_sums) / counts
+            expected += float(np.sum(2 * weights / counts - leverages))
+        variance = lone / (2 * len(self.observations.px) * self.left)
+        return max(1.0, squares / max(expected * variance, 1.0))
+
+    # --- noise --------------------------------------------------------------------------------------------------
+
+    def errors_px(self, rig: Rig) -> Array:
+        """Return projection minus observation, (N, 2), px; NaN where a camera does not show the point."""
+        points = self.locate(rig.own).points_world
+        parts = [self.observations.of_camera(i) for i in range(len(rig.cameras))]
+        return np.concatenate(
+            [c.project(points[at]) - self.observations.px[at] for c, at in zip(rig.cameras, parts, strict=True)]
+        )
+
+    def scaled_sigmas_px(self, rig: Rig, quantile: float) -> Array:
+        """Scale all standard deviations by one factor, so that a quantile of the errors is that of Gaussian ones."""
+        squares = self._squares_px2(rig) / self.sigmas_px[self.observations.cameras] ** 2
+        scale2 = np.quantile(squares, quantile) / (-2 * np.log(1 - quantile)) / self.left
+        return np.maximum(self.sigmas_px * np.sqrt(scale2), _MIN_SIGMA_PX)
+
+    def measured_sigmas_px(self, rig: Rig) -> Array:
+        """Measure the standard deviation of an observation in each camera by the median error, (n_cameras,), px.
+
+        Free points can be moved onto what a single camera observes, so that its errors alone do not show its noise. The
+        ratios of the cameras' noise then stay as they are.
+        """
+        if self.has_common_noise:
+            return self.scaled_sigmas_px(rig, 0.5)
+        squares = self._squares_px2(rig)
+        parts = [squares[self.observations.of_camera(i)] for i in range(len(rig.cameras))]
+        medians = np.array([np.median(part) if len(part) else _MEDIAN_SQUARE for part in parts])
+        return np.maximum(np.sqrt(medians / _MEDIAN_SQUARE / self._left_in_cameras(rig)), _MIN_SIGMA_PX)
+
+    def _squares_px2(self, rig: Rig) -> Array:
+        """Return squared errors, (N,); a large one where a camera does not show the point."""
+        return np.nan_to_num(np.sum(self.errors_px(rig) ** 2, axis=1), nan=_NOT_SHOWN_PX**2)
+
+    @property
+    def left(self) -> float:
+        """Share of the squared errors that a fit leaves, 0 to 1: one less the unknowns over the observed numbers."""
+        spent = self.n_groups * self.n_own + len(self.precision)
+        return max(1.0, 2 * len(self.observations.px) - spent) / (2 * len(self.observations.px))
+
+    def _left_in_cameras(self, rig: Rig) -> Array:
+        """Return the same share of the errors in each camera, (n_cameras,), by the leverage of its observations."""
+        equations, located = self.linearize(rig), self.locate(rig.own)
+        inverse = np.linalg.pinv(equations.own_hessians, hermitian=True)
+        out = np.ones(len(rig.cameras))
+        for i, camera in enumerate(rig.cameras):
+            at = self.observations.of_camera(i)
+            if at.start == at.stop:
+                continue
+            by_own = None if located.by_own is None else located.by_own[at]
+            own = self._scaled_rows(i, camera, Located(located.points_world[at], by_own))[1]
+            leverage = np.einsum("nij,njk,nik->", own, inverse[self.observations.groups[at]], own)
+            spent = leverage + len(self.columns[i])
+            n = 2 * (at.stop - at.start)
+            out[i] = max(1.0, n - spent) / n
+        return out
+
+    def group_costs(self, rig: Rig) -> Array:
+        """Return the robust cost of the observations of each group, (G,)."""
+        s = self._squares_px2(rig) / self.sigmas_px[self.observations.cameras] ** 2
+        robust = s / (1 + s / OUTLIER_SIGMAS**2)
+        return np.asarray(0.5 * np.bincount(self.observations.groups, robust, self.n_groups), dtype=np.float64)
+
+    def with_sigmas(self, sigmas_px: Array) -> Self:
+        """Return the problem with other standard deviations."""
+        out = copy(self)
+        out.sigmas_px = sigmas_px
+        return out
+
+    def with_prior(self, prior: Prior) -> Self:
+        """Return the problem with other knowledge of the cameras."""
+        out = copy(self)
+        out._take_prior(prior)
+        return out
+
+
+def fit_rig(problem: ReprojectionProblem, rig: Rig) -> RigFit:
+    """Fit cameras and own unknowns, and measure the noise between fits until it settles.
+
+    The standard deviation begins at that of the largest errors and falls to that of the median one, so that no error of
+    the start is taken for a gross one (graduated non-convexity, Yang et al. 2020).
+    """
+    problem = problem.with_sigmas(problem.scaled_sigmas_px(rig, _LARGE))
+    for _ in range(_ROUNDS):
+        rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
+        sigmas = problem.scaled_sigmas_px(rig, 0.5)
+        is_settled = bool(np.all(sigmas > (1 - _SETTLED) * problem.sigmas_px))
+        problem = problem.with_sigmas(np.maximum(sigmas, problem.sigmas_px / _FALL))
+        if is_settled:
+            break
+    if not problem.has_common_noise:
+        for _ in range(_ROUNDS):
+            sigmas = problem.measured_sigmas_px(rig)
+            is_settled = np.allclose(sigmas, problem.sigmas_px, rtol=_SETTLED)
+            problem = problem.with_sigmas(sigmas)
+            if is_settled:
+                break
+            rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
+    rig = solve_bundle(problem, rig, tolerance=FINAL).state
+    return _result(problem, rig)
+
+
+def _result(problem: ReprojectionProblem, rig: Rig) -> RigFit:
+    equations, errors = problem.linearize(rig), problem.errors_px(rig)
+    squares = np.sum(errors**2, axis=1) / problem.sigmas_px[problem.observations.cameras] ** 2
+    squares = np.nan_to_num(squares, nan=np.inf)
+    weights, prior = _weights(squares), np.diag(problem.precision)
+    data = equations._replace(hessian=equations.hessian - prior).reduced()[1]
+    share = problem.common_share(rig)
+    information = _information(squares, weights, problem.left) / share
+    precision = information * data + prior
+    if not np.isfinite(precision).all():
+        raise np.linalg.LinAlgError("numbers that are not finite")
+    covariance = inverse(precision)
+    at = np.concatenate([start + c for start, c in zip(column_ends(rig.cameras), problem.columns, strict=False)])
+    whole = np.zeros(2 * (column_ends(rig.cameras)[-1],))
+    whole[np.ix_(at, at)] = covariance
+    return RigFit(rig, problem.sigmas_px, whole, errors, weights, share)
+
+
+def inverse(matrix: Array) -> Array:
+    """Invert a positive semidefinite matrix of unknowns with different units."""
+    units = 1 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+    return np.asarray(np.linalg.pinv(matrix * np.outer(units, units), hermitian=True) * np.outer(units, units))
+
+
+def column_ends(cameras: Sequence[Camera]) -> list[int]:
+    """Return where the corrections of each camera begin among those of all, and where the last ones end."""
+    return [0, *itertools.accumulate(n_columns(c) for c in cameras)]
+
+
+def _information(squares: Array, weights: Array, left: float) -> float:
+    """Return the true information of robust errors over that of the weighted normal equations (Huber 1981, Sect. 7.6).
+
+    Args:
+        squares: squared errors in variances, (N,).
+        weights: their robust weights, (N,).
+        left: share of the squared errors that the fit has left.
+    """
+    s = np.where(np.isfinite(squares), squares, 0.0)
+    slopes = weights * (1 - 2 * s / (OUTLIER_SIGMAS**2 + s))  # w + s dw/ds
+    variance = np.mean(weights**2 * s) / 2 / left
+    return float(np.mean(slopes) ** 2 / (variance * np.mean(weights)))
+
+
+def _weights(squares: Array) -> Array:
+    return np.asarray(1 / (1 + squares / OUTLIER_SIGMAS**2) ** 2)
+
+
+def _add(target: Array, groups: IntArray, values: Array) -> None:
+    """Add values, (N, ...), to the rows of their groups, which are sorted."""
+    if len(groups):
+        first = np.flatnonzero(np.diff(groups, prepend=-1))
+        target[groups[first]] += values if len(first) == len(groups) else np.add.reduceat(values, first, axis=0)

@@ -1,0 +1,99 @@
+"""Frames from which cameras are judged: what the views show there, and which of it the present cameras accept."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.body.model import PosedBody
+from tracker.body.motion.pose_path import PosePath
+from tracker.calibration.check.camera_correction import corrected, later_s
+from tracker.calibration.check.rig_problem import RigState, SeenPerson
+from tracker.estimation.acquisition.from_contours import own_views
+from tracker.evidence.contours import occluding_contours
+from tracker.evidence.images.edge_segments import accept_segments
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, with_all_segments, with_segments
+from tracker.geometry.arrays import Array
+
+
+class ViewedFrame(NamedTuple):
+    """People on a frame, and all that the views show around them."""
+
+    frame: int
+    views: tuple[ViewEvidence, ...]
+    """With their segments."""
+    bodies: tuple[PosedBody, ...]
+    """All people, as they were tracked."""
+    paths: tuple[PosePath, ...]
+    """Way of each person's pose around the frame."""
+    time_s: float
+    """Time of the frame, seconds, since that to which drifts are related."""
+    ahead_s: tuple[float, ...]
+    """Time by which the picture of each view was taken later than the frame, by the present clocks, seconds."""
+
+
+def seen_people(frames: Sequence[ViewedFrame], state: RigState | None = None) -> list[SeenPerson]:
+    """Return the evidence of each person on each frame.
+
+    Args:
+        frames: the frames.
+        state: cameras and poses by which segments are accepted; None takes all segments that may be a person's.
+    """
+    out, poses = [], iter(()) if state is None else iter(state.poses)
+    for seen in frames:
+        bodies = seen.bodies
+        if state is None:
+            views: Sequence[ViewEvidence] = [with_all_segments(v) for v in seen.views]
+        else:
+            bodies = tuple(PosedBody(b.model, next(poses)) for b in seen.bodies)
+            views = [
+                _accepted(view, _then(bodies, seen.paths, ahead_s + later_s(c, seen.time_s)), c)
+                for view, ahead_s, c in zip(seen.views, seen.ahead_s, state.corrections, strict=True)
+            ]
+        for person, path in enumerate(seen.paths):
+            own = own_views(views, bodies, person) if len(bodies) > 1 else views
+            out.append(SeenPerson(seen.frame, person, own, bodies, path, seen.time_s, seen.ahead_s))
+    return out
+
+
+def _then(bodies: Sequence[PosedBody], paths: Sequence[PosePath], delay_s: float) -> list[PosedBody]:
+    """Return people as they are some time later."""
+    return [PosedBody(b.model, b.model.retract(b.values, p.step(delay_s))) for b, p in zip(bodies, paths, strict=True)]
+
+
+def _accepted(view: ViewEvidence, bodies: Sequence[PosedBody], correction: Array) -> ViewEvidence:
+    """Return a view with the segments that the contours of people accept under a corrected camera."""
+    if view.segments is None or view.samples is None:
+        return view
+    contour = occluding_contours.trace(bodies, corrected(view.camera, correction))
+    pieces = contour.pieces_px[~contour.occluded]
+    chosen = accept_segments(view.samples, pieces, ACCEPTED_SHARE * view.theta_px)
+    return with_segments(view, chosen if view.is_static is None else chosen & ~view.is_static)
+
+
+def spread_poses(joints: Array, n: int, apart_m: float = 0.0, fewest: int = 1) -> list[int]:
+    """Choose frames with poses as different as possible, in order.
+
+    Each is the one farthest from those before (Gonzalez 1985). Two poses are as far apart as the joint that moves most.
+
+    Args:
+        joints: of each frame, (F, J, 3), metres.
+        n: number of frames to choose.
+        apart_m: least distance between two of them, metres. Frames of one pose show the same errors of a body's shape.
+        fewest: number of frames that are chosen at any distance.
+    """
+
+    def far_from(i: int) -> Array:
+        return np.asarray(np.linalg.norm(joints - joints[i], axis=2).max(axis=1))
+
+    flat = joints.reshape(len(joints), -1)
+    chosen = [int(np.argmin(np.linalg.norm(flat - flat.mean(axis=0), axis=1)))]
+    nearest = np.full(len(joints), np.inf)
+    while len(chosen) < min(n, len(joints)):
+        nearest = np.minimum(nearest, far_from(chosen[-1]))
+        nearest[chosen[-1]] = -1.0  # Equal poses are chosen, too, but each frame once.
+        farthest = int(np.argmax(nearest))
+        if nearest[farthest] < apart_m and len(chosen) >= fewest:
+            break
+        chosen.append(farthest)
+    return sorted(chosen)

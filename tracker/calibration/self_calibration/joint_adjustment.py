@@ -1,0 +1,180 @@
+"""Least squares over cameras and the joints that they see, with errors that agree from frame to frame."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.calibration.check.camera_columns import FOCAL, POSE, SHIFT, camera_difference, n_columns
+from tracker.calibration.check.lens_priors import CALIBRATED, UNKNOWN_LENS
+from tracker.calibration.check.point_adjustment import PointProblem, triangulate_all
+from tracker.calibration.check.reprojection import Observations, Prior, Rig, RigFit, column_ends, fit_rig
+from tracker.errors import CalibrationError
+from tracker.estimation.fitting.bundle import ArrowEquations
+from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.cameras import ROUNDING_PX2, Camera
+
+
+class AlikeLenses(PointProblem):
+    """Free points in cameras of which some have lenses of one model: their focal lengths differ by a percent."""
+
+    def __init__(self, problem: PointProblem, alike: Sequence[Sequence[int]]) -> None:
+        """State a problem.
+
+        Args:
+            problem: the same without that knowledge.
+            alike: cameras with lenses of one model, and free focal lengths.
+        """
+        super().__init__(problem.observations, problem.prior, problem.n_groups, problem.sigmas_px)
+        self._alike = alike
+
+    def linearize(self, rig: Rig, below: float = np.inf) -> ArrowEquations:
+        """See `BundleProblem`."""
+        out, cost = super().linearize(rig), 0.0
+        precision = CALIBRATED.focal**-2
+        logs = [camera_difference(b, c)[FOCAL] for b, c in zip(self.prior.cameras, rig.cameras, strict=True)]
+        for cameras in self._alike:
+            at = [self.ends[i] + int(np.searchsorted(self.columns[i], FOCAL)) for i in cameras]
+            apart = precision * (np.eye(len(at)) - np.full((len(at), len(at)), 1 / len(at)))
+            own = np.array([logs[i] for i in cameras])
+            out.gradient[at] += apart @ own
+            out.hessian[np.ix_(at, at)] += apart
+            cost += 0.5 * float(own @ apart @ own)
+        return out._replace(cost=out.cost + cost)
+
+
+class Gauge(NamedTuple):
+    """Cameras that fix the world and its scale while all others are free."""
+
+    held: int
+    """Index of the camera that stays."""
+    scale: int
+    """Index of the camera whose distance from it stays, along the nearest of its own axes."""
+
+
+class UnknownLenses(NamedTuple):
+    """Lenses of which only the sizes of the pictures are known; a focal length is free, the rest as on average."""
+
+    means: tuple[Camera, ...]
+    """Cameras with the means of what is known."""
+    alike: tuple[tuple[int, ...], ...] = ()
+    """Cameras with lenses of one model: joints hardly tell the focal length of each."""
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedJoints:
+    """Cameras and joints at which the reprojection error is least."""
+
+    cameras: tuple[Camera, ...]
+    points_world: Array
+    """(P, 3), in the unit of the distance that was held; NaN for joints that two cameras do not determine."""
+    observed: Observations
+    """Observations that took part; their groups are numbers of rows of `points_world`."""
+    fit: RigFit
+    """Its covariance heeds that errors agree, and that of rounding at least."""
+    share: float
+    """By how much errors of a joint in a camera agree from frame to frame, at least 1."""
+
+    @property
+    def sigma_px(self) -> float:
+        """Standard deviation of a joint along each axis of a picture, px; at least that of rounding to whole pixels."""
+        return max(float(np.median(self.fit.sigmas_px)), ROUNDING_PX2**0.5)
+
+    @property
+    def focal_sigmas(self) -> Array:
+        """Standard deviation of each focal length, as a share of it, (n_cameras,)."""
+        at = np.array(column_ends(self.cameras)[:-1]) + FOCAL
+        return np.asarray(np.sqrt(np.diag(self.fit.covariance)[at]))
+
+
+def adjust_joints(
+    cameras: Sequence[Camera],
+    observations: Observations,
+    n_joints: int,
+    gauge: Gauge,
+    lenses: UnknownLenses | None = None,
+) -> AdjustedJoints | None:
+    """Fit cameras and joints; None where fewer than two cameras see a joint from different sides.
+
+    A detector places a joint beside the anatomical one, alike from frame to frame. Such errors do not average out: the
+    covariance is multiplied by the share by which they agree, and the priors weigh as much against the observations.
+
+    Args:
+        cameras: where to begin.
+        observations: their groups are the joints of all frames, `frame * n_joints + joint`.
+        n_joints: number of joints of a frame.
+        gauge: what stays.
+        lenses: knowledge of the lenses; None for lenses that stay as they are.
+    """
+    points, determined = triangulate_all(cameras, observations)
+    numbers = np.flatnonzero(determined)
+    seen = among(observations, determined)
+    if not len(seen.px):
+        return None
+    prior = _prior(cameras, gauge, lenses)
+    alike = lenses.alike if lenses else ()
+    problem = PointProblem(seen, prior, len(numbers), np.ones(len(cameras)))
+    fit, share = _fitted(AlikeLenses(problem, alike), Rig(tuple(cameras), points[numbers]), numbers % n_joints)
+    out = np.full(points.shape, np.nan)
+    out[numbers] = fit.rig.own
+    observed = replace(seen, groups=numbers[seen.groups])
+    return AdjustedJoints(fit.rig.cameras, out, observed, fit, share)
+
+
+def no_common_view() -> CalibrationError:
+    """Return the error where no two cameras see a joint from different sides."""
+    return CalibrationError(
+        "expected joints that two cameras see from different sides, found none; film the person by cameras that stand "
+        "at an angle to each other"
+    )
+
+
+def among(observations: Observations, determined: Mask) -> Observations:
+    """Return the observations of determined points, with groups from 0 on without gaps."""
+    at = determined[observations.groups]
+    numbers: IntArray = np.cumsum(determined) - 1
+    return Observations(observations.cameras[at], numbers[observations.groups[at]], observations.px[at])
+
+
+def _prior(cameras: Sequence[Camera], gauge: Gauge, lenses: UnknownLenses | None) -> Prior:
+    sigmas, sharing = [], {i: len(group) for group in (lenses.alike if lenses else ()) for i in group}
+    for i, camera in enumerate(cameras):
+        own = np.zeros(n_columns(camera))
+        own[POSE] = 0.0 if i == gauge.held else np.inf
+        if i == gauge.scale:
+            baseline = camera.T_camera_world[:3, :3] @ (camera.center_world - cameras[gauge.held].center_world)
+            own[SHIFT.start + int(np.abs(baseline).argmax())] = 0.0
+        if lenses is not None:
+            # Lenses of one model are one draw from what is known, not several.
+            own[FOCAL] = UNKNOWN_LENS.focal * np.sqrt(sharing.get(i, 1))
+        sigmas.append(own)
+    means = tuple(
+        replace(b, T_world_camera=c.T_world_camera)
+        for b, c in zip(lenses.means if lenses else cameras, cameras, strict=True)
+    )
+    return Prior(means, tuple(sigmas))
+
+
+def _fitted(problem: PointProblem, rig: Rig, joints: IntArray) -> tuple[RigFit, float]:
+    """Fit a rig, with priors and covariance that heed by how much errors agree; return it with that share."""
+    fit = fit_rig(problem, rig)
+    share = _agreement(fit, problem.observations, joints)
+    if share > 1 and any(0 < s < np.inf for s in np.concatenate(problem.prior.sigmas)):
+        weaker = Prior(problem.prior.cameras, tuple(s / np.sqrt(share) for s in problem.prior.sigmas))
+        fit = fit_rig(problem.with_prior(weaker), fit.rig)
+    errors = np.nan_to_num(fit.errors_px) * fit.weights[:, None]
+    exact = max(1.0, ROUNDING_PX2 / max(float(np.mean(errors**2)), np.finfo(float).tiny))
+    return fit._replace(covariance=share * exact * fit.covariance), share
+
+
+def _agreement(fit: RigFit, seen: Observations, joints: IntArray) -> float:
+    """Return the variance of the sums of errors of each joint in each camera over that of errors that do not agree.
+
+    Robust weights keep gross errors out. Errors that are alike on n frames count as one observation.
+    """
+    n_joints = int(joints.max()) + 1
+    tracks = seen.cameras * n_joints + joints[seen.groups]
+    errors = np.nan_to_num(fit.errors_px) * fit.weights[:, None]
+    sums = np.stack([np.bincount(tracks, e) for e in errors.T])
+    return max(1.0, float(np.sum(sums**2) / max(np.sum(errors**2), np.finfo(float).tiny)))

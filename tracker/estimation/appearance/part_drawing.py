@@ -1,0 +1,138 @@
+"""Draw body parts into the cells of a view: the visible part of each cell, and its nearness.
+
+Meshes are coarser than those of `label_image`, and faces seen from behind are skipped, because whole recordings and
+hundreds of poses of a limb are drawn.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.model import BodyModel, PosedBody, ahead
+from tracker.compute.jit import njit
+from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.estimation.appearance.region_cells import CellView
+from tracker.evidence.contours.occluding_contours import part_poses
+from tracker.geometry.arrays import Array, FloatArray, Mask
+from tracker.geometry.cameras import NEAR_PLANE_M
+
+_N_RINGS, _N_SECTORS = 8, 16
+"""Cells of the mesh of a part. Chords around a thigh of 9 cm lie up to 2 mm inside it: a tenth of a cell."""
+
+
+class Meshes(NamedTuple):
+    """Triangles of the parts of some bodies, the same number for each part."""
+
+    points: FloatArray
+    """Corners in the coordinates of their part, (P, 3, n), metres."""
+    faces: NDArray[np.int32]
+    """Indices of the corners of each triangle within a part, counter-clockwise seen from outside, (F, 3)."""
+
+
+class Canvas(NamedTuple):
+    """Cells of a view with the parts that are drawn into them."""
+
+    nearness: FloatArray
+    """1 / depth of the visible surface, (h, w), 1/m; 0 without a part."""
+    labels: NDArray[np.uint8]
+    """1 + index of the visible part, counted through all bodies, (h, w); 0 for none."""
+
+
+@lru_cache(maxsize=32)
+def meshes_of(models: tuple[BodyModel, ...]) -> Meshes:
+    """Return the meshes of the parts of some bodies; at most 255 parts in all."""
+    parts = [(s, c) for m in models for s, c in zip(m.shapes, m.centers_part, strict=True)]
+    assert len(parts) < 256, len(parts)
+    surfaces = [shape.triangles(_N_RINGS, _N_SECTORS) for shape, _ in parts]
+    points = [(s.vertices + center).T for s, (_, center) in zip(surfaces, parts, strict=True)]
+    return Meshes(np.ascontiguousarray(points, np.float32), surfaces[0].faces.astype(np.int32))
+
+
+def draw(meshes: Meshes, P: Array, Ts_world_part: Array, height: int, width: int) -> Canvas:
+    """Draw parts, (n, 4, 4), metres, into a view with a projection, (3, 4), to its cells."""
+    canvas = Canvas(np.zeros((height, width), np.float32), np.zeros((height, width), np.uint8))
+    image = np.empty((meshes.points.shape[2], 3), np.float32)
+    _draw(meshes.points, meshes.faces, (P @ Ts_world_part).astype(np.float32), image, canvas.nearness, canvas.labels)
+    return canvas
+
+
+def draw_bodies(bodies: Sequence[PosedBody], view: CellView) -> Canvas:
+    """Draw all bodies into a view, where they are at the time of its picture."""
+    meshes, then = meshes_of(tuple(b.model for b in bodies)), ahead(bodies, view.ahead_frames)
+    return draw(meshes, view.camera.projection, part_poses(then), *view.colors.shape[:2])
+
+
+def grown(canvas: Canvas, margin: float) -> Mask:
+    """Return the cells within a margin, cells times metres, around what is drawn, at the depth of the nearest part."""
+    radius = max(1, round(margin * float(canvas.nearness.max(initial=0.0))))
+    mask = (canvas.labels > 0).view(np.uint8)
+    return np.asarray(cv2.dilate(mask, np.ones((2 * radius + 1, 2 * radius + 1), np.uint8))) > 0
+
+
+@njit(**NO_REFCOUNT)
+def _draw(
+    points: FloatArray, faces: NDArray[np.int32], to_px: FloatArray, image: FloatArray, nearness: FloatArray,
+    labels: NDArray[np.uint8],
+) -> None:  # fmt: skip
+    """Draw parts with a depth test.
+
+    Args:
+        points: see `Meshes`.
+        faces: see `Meshes`.
+        to_px: from the coordinates of each part to homogeneous cells, (P, 3, 4).
+        image: scratch, (n, 3).
+        nearness: see `Canvas`.
+        labels: see `Canvas`.
+    """
+    height, width = labels.shape
+    for part in range(points.shape[0]):
+        if not project_mesh(points[part], to_px[part], image):
+            continue
+        for f in range(faces.shape[0]):
+            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+            ua, va, na = image[a, 0], image[a, 1], image[a, 2]
+            ub, vb, nb = image[b, 0] - ua, image[b, 1] - va, image[b, 2] - na
+            uc, vc, nc = image[c, 0] - ua, image[c, 1] - va, image[c, 2] - na
+            area = ub * vc - uc * vb
+            if area >= 0.0:  # seen from behind: v points down
+                continue
+            top = max(0.0, np.ceil(va + min(0.0, vb, vc)))
+            bottom = min(height - 1.0, np.floor(va + max(0.0, vb, vc)))
+            left = max(0.0, np.ceil(ua + min(0.0, ub, uc)))
+            right = min(width - 1.0, np.floor(ua + max(0.0, ub, uc)))
+            if top > bottom or left > right:
+                continue
+            share = np.float32(1.0) / area
+            for v in range(int(top), int(bottom) + 1):
+                y = np.float32(v) - va
+                for u in range(int(left), int(right) + 1):
+                    x = np.float32(u) - ua
+                    in_b, in_c = (x * vc - uc * y) * share, (ub * y - x * vb) * share
+                    if in_b >= 0.0 and in_c >= 0.0 and in_b + in_c <= 1.0:
+                        near = na + in_b * nb + in_c * nc
+                        if near > nearness[v, u]:
+                            nearness[v, u] = near
+                            labels[v, u] = part + 1
+
+
+@njit(**NO_REFCOUNT)
+def project_mesh(points: FloatArray, to_px: FloatArray, image: FloatArray) -> bool:
+    """Fill column, row and 1 / depth of the corners of a part, (n, 3), px and 1/m.
+
+    Returns:
+        Whether the whole part is beyond the near plane; else it is not drawn.
+    """
+    for k in range(points.shape[1]):
+        x, y, z = points[0, k], points[1, k], points[2, k]
+        w = to_px[2, 0] * x + to_px[2, 1] * y + to_px[2, 2] * z + to_px[2, 3]
+        if w < NEAR_PLANE_M:
+            return False
+        near = np.float32(1.0) / w
+        image[k, 0] = (to_px[0, 0] * x + to_px[0, 1] * y + to_px[0, 2] * z + to_px[0, 3]) * near
+        image[k, 1] = (to_px[1, 0] * x + to_px[1, 1] * y + to_px[1, 2] * z + to_px[1, 3]) * near
+        image[k, 2] = near
+    return True

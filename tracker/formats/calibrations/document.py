@@ -1,0 +1,107 @@
+"""Read a calibration file to plain data; its syntax is told by its content, never by its name."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tracker.errors import CalibrationError
+from tracker.formats.anipose import KIND
+from tracker.formats.calibrations.foreign import name_binary
+from tracker.formats.plain_data import parse_json, parse_xml, parse_yaml, storage_data
+from tracker.text_files import parse_toml, read_text
+from tracker.validation import quoted
+
+_TOML_LINE = re.compile(r"\[{1,2}[^\[\]{}\n]+\]{1,2}\s*(#.*)?|[\w.\"'-]+\s*=.*")
+_PARSERS = {"toml": parse_toml, "json": parse_json, "yaml": parse_yaml, "xml": parse_xml}
+_YAML_LINE = re.compile(r"[^\s:,{}\[\]][^:,{}\[\]]*:(\s.*)?|- .*")
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """One calibration file."""
+
+    path: Path
+    syntax: str
+    """toml, json, yaml, xml or text."""
+    data: Any
+    """Dicts, lists, numbers and text; of XML that OpenCV has not written, its root element; of plain text the text."""
+
+    @property
+    def where(self) -> str:
+        """Name of the file for messages."""
+        return f"calibration {self.path}"
+
+    @cached_property
+    def groups(self) -> dict[str, dict[str, Any]]:
+        """Groups at the top of the data by their keys; empty if it is no dict."""
+        if not isinstance(self.data, dict):
+            return {}
+        return {str(key): value for key, value in self.data.items() if isinstance(value, dict)}
+
+    @property
+    def rows(self) -> list[tuple[str, dict[str, Any]]]:
+        """Groups at the top, or dicts of a list, with their names; of a lone camera the file itself, without one."""
+        if isinstance(self.data, list):
+            return [(str(row.get("name", i)), row) for i, row in enumerate(self.data) if isinstance(row, dict)]
+        return list(self.groups.items()) or ([("", self.data)] if isinstance(self.data, dict) else [])
+
+    @property
+    def stem(self) -> str:
+        """Name of the file without what follows its first dot."""
+        return self.path.name.partition(".")[0]
+
+
+def at_top(*keys: str) -> Callable[[Document], bool]:
+    """Return whether a file has all of some keys at its top."""
+    return lambda document: isinstance(document.data, dict) and {*keys} <= document.data.keys()
+
+
+def in_groups(*keys: str) -> Callable[[Document], bool]:
+    """Return whether a group at the top of a file has all of some keys."""
+    return lambda document: any({*keys} <= group.keys() for group in document.groups.values())
+
+
+def in_rows(*keys: str) -> Callable[[Document], bool]:
+    """Return whether a camera of a file, one of several or alone, has all of some keys."""
+    return lambda document: any({*keys} <= row.keys() for _, row in document.rows)
+
+
+def read_document(path: Path) -> Document:
+    """Read a file.
+
+    Raises:
+        CalibrationError: it is missing, too large, no text, malformed, or of no known syntax.
+    """
+    name_binary(path)
+    text = read_text(path, KIND)
+    syntax = _syntax(text)
+    data: Any = text if syntax is None else _PARSERS[syntax](text, str(path), KIND)
+    if syntax == "xml" and data.tag == "opencv_storage":
+        data = storage_data(data)
+    return Document(path, syntax or "text", data)
+
+
+def _syntax(text: str) -> str | None:
+    """Return toml, json, yaml or xml by the first line that is no comment; None for anything else."""
+    for line in map(str.strip, text.splitlines()):
+        if line.startswith("<"):
+            return "xml"
+        if line.startswith("%YAML") or line == "---":
+            return "yaml"
+        if not line or line.startswith("#"):
+            continue
+        if _TOML_LINE.fullmatch(line):
+            return "toml"
+        if line[0] in "[{":
+            return "json"
+        return "yaml" if _YAML_LINE.fullmatch(line) else None
+    return None
+
+
+def refuse(document: Document, camera: str | None, expected: str, found: str, advice: str) -> CalibrationError:
+    """Return the error of a file, or of one camera in it."""
+    place = document.where if camera is None else f"{document.where}, camera {quoted(camera)}"
+    return CalibrationError(f"{place}: expected {expected}, found {found}; {advice}")

@@ -1,0 +1,130 @@
+"""Write a motion to files that are arrays over frames, people and points, one function for each format."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tracker.footage.camera_source import CameraSource
+from tracker.formats.model_toml import format_model
+from tracker.formats.write_only.c3d import write_c3d
+from tracker.formats.write_only.movement_netcdf import PER_POSE, PoseDataset, Variable, per_point, write_dataset
+from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.motion import ExportedMotion
+from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.pose_arrays import pose_arrays
+from tracker.interchange.exports.view_arrays import view_arrays
+from tracker.interchange.exports.views import exported_cameras
+
+
+def write_person_c3d(
+    motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
+) -> None:
+    """Write the points of one person as C3D; residuals are the errors that the run expects."""
+    found = pose_arrays(motion, options)
+    write_c3d(
+        paths[0], found.points, found.joints[:, 0], motion.session.fps,
+        first_frame=motion.frames[0], residuals=found.errors_m[:, 0], units=options.units,
+    )  # fmt: skip
+    for _ in motion.frames:
+        tick()
+
+
+def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]) -> None:
+    """Write poses, joint centers, covariances, provenance and cameras as arrays of NumPy; docs/export.md lists them."""
+    found = pose_arrays(motion, options)
+    arrays: dict[str, Any] = {
+        "format_version": 1,
+        "session": motion.session.name,
+        "fps": motion.session.fps,
+        "axes": options.axes,
+        "T_file_world": file_from_world(motion.session, options.axes),
+        "frames": found.frames,
+        "times_s": found.times_s,
+        "people": found.people,
+        "points": found.points,
+        "bones": np.array(found.bones),
+        "joints": found.joints,
+        "covariance": found.covariances,
+        "point_source": found.point_sources,
+        "point_lost": found.point_lost,
+        **found.by_pose,
+    }
+    arrays |= _values(motion) | _cameras(motion.session.cameras, exported_cameras(motion, options))
+    plain = {name: np.asarray(values) for name, values in arrays.items()}
+    assert not any(values.dtype.hasobject for values in plain.values()), "readers refuse pickled objects"
+    np.savez_compressed(paths[0], **plain)  # pyrefly: ignore[bad-argument-type]
+    for _ in motion.frames:
+        tick()
+
+
+def _values(motion: ExportedMotion) -> dict[str, Any]:
+    """Return the values of the poses, and the bodies that they belong to."""
+    names = list(dict.fromkeys(v for person in motion.exported for model in person.models for v in model.value_names))
+    poses = np.full((len(motion.frames), len(motion.exported), len(names)), np.nan)
+    bodies = {}
+    for j, person in enumerate(motion.exported):
+        for i, frame in enumerate(motion.frames):
+            if stored := person.poses.get(frame):
+                model = stored.body.model
+                poses[i, j, [names.index(v) for v in model.value_names]] = stored.body.values
+                bodies[stored.record.model_revision] = model
+    revisions = sorted(bodies)
+    return {
+        "values": names,
+        "poses": poses,
+        "bodies": revisions,
+        "body_models": [format_model(bodies[r]) for r in revisions],
+    }
+
+
+def _cameras(sources: Sequence[CameraSource], cameras: Sequence[Camera]) -> dict[str, Any]:
+    """Return the cameras as arrays; distortion coefficients that a lens lacks are 0."""
+    lost = [(i, *own) for i, source in enumerate(sources) for own in source.clock.lost]
+    n_coefficients = max(camera.distortion.size for camera in cameras)
+    distortion: list[Array] = [np.pad(c.distortion, (0, n_coefficients - c.distortion.size)) for c in cameras]
+    return {
+        "cameras": [camera.name for camera in cameras],
+        "camera_size": [camera.size for camera in cameras],
+        "camera_K": [camera.K for camera in cameras],
+        "camera_distortion": distortion,
+        "camera_fisheye": [camera.fisheye for camera in cameras],
+        "camera_T_world_camera": [camera.T_world_camera for camera in cameras],
+        "camera_offset": [source.offset for source in sources],
+        "camera_clock": [(source.clock.ahead_frames, source.clock.rate) for source in sources],
+        "camera_lost_frames": np.array(lost, dtype=np.int64).reshape(-1, 3),
+        "camera_footage": [source.footage.name for source in sources],
+    }
+
+
+def write_movement(
+    motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
+) -> None:
+    """Write a dataset of `movement` with the joint centers in space, and another one with the points in all views.
+
+    Raises:
+        FormatError: a package is missing.
+    """
+    found = pose_arrays(motion, options)
+    seen = view_arrays(motion, options, found.points, tick)
+    attributes = {"fps": motion.session.fps, "session": motion.session.name}
+    poses = PoseDataset(found.joints, found.confidence, found.times_s, found.people, found.points)
+    in_space = attributes | {"space_unit": "metres", "axes": options.axes}
+    variables: dict[str, Variable] = {
+        "covariance": (
+            ("time", "space", "space_of", "keypoints", "individuals"),
+            found.covariances.transpose(0, 3, 4, 2, 1),
+        ),
+        "point_source": per_point(found.point_sources),
+        "point_lost": per_point(found.point_lost),
+        "frame": (("time",), found.frames),
+        **{name: (PER_POSE, values) for name, values in found.by_pose.items()},
+    }
+    write_dataset(paths[0], poses, in_space, variables)
+    confidence = np.where(np.isnan(seen.points_px[..., 0]), np.nan, found.confidence)
+    views = tuple(source.camera.name for source in motion.session.cameras)
+    in_views = poses._replace(position=seen.points_px, confidence=confidence, views=views)
+    pixels = attributes | {"space_unit": "pixels", "pixels": options.pixels}
+    write_dataset(paths[1], in_views, pixels, {"visibility": per_point(seen.visibility), "frame": variables["frame"]})

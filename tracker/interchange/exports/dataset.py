@@ -1,0 +1,184 @@
+"""Write a folder to train and test on: pictures, labels, calibration, poses, a card, and checksums.
+
+README.md                   the card
+splits.json                 recordings of training, validation and test
+provenance.json             names the file of each recording
+SHA256SUMS
+recordings/NAME/
+  images/CAMERA/000012.jpg  picture 12 of the footage; or videos/CAMERA.mp4, the footage as it is
+  labels/coco.json          keypoints and segmentation
+  labels/openpose/CAMERA_json/CAMERA_000000000012_keypoints.json
+  calibration/anipose.toml, opencv.yml
+  poses.npz                 poses, joint centres and covariances in space
+  provenance.json           of each pose
+"""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+
+from tracker.errors import FormatError, Remedy
+from tracker.files import write_text_atomic
+from tracker.formats.calibrations.writing import write_layout
+from tracker.formats.file_names import identifier
+from tracker.interchange.exports.array_writers import write_npz
+from tracker.interchange.exports.dataset_card import LabelCounts, RecordingSummary, format_card, summarize
+from tracker.interchange.exports.dataset_labels import DatasetLabels, DatasetRecording, RecordingLabels, plan_labels
+from tracker.interchange.exports.dataset_splits import SplitChoice, divide
+from tracker.interchange.exports.export_files import FOLDER_PROVENANCE, is_export_folder, moved_at_end, unwritable
+from tracker.interchange.exports.label_writers import write_views
+from tracker.interchange.exports.motion import ExportedMotion
+from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.provenance import write_provenance
+from tracker.interchange.exports.views import Pictures, exported_cameras
+from tracker.session.store.edit_tree import program_version
+
+CHECKSUMS = "SHA256SUMS"
+"""Name of the file that `sha256sum -c` reads."""
+SUFFIXES = {"anipose": ".toml", "opencv": ".yml"}
+"""Layouts of the calibration, with the ends of their files' names."""
+Tick = Callable[[], None]
+"""Called after each frame; it may raise to stop the export."""
+
+
+@dataclass(frozen=True)
+class DatasetPlan:
+    """A dataset of several recordings that can be written: each has poses, and a split."""
+
+    recordings: Sequence[DatasetRecording]
+    labels: DatasetLabels
+    splits: dict[str, list[str]]
+    """The recordings of each split."""
+    choice: SplitChoice
+
+
+def plan_dataset(
+    recordings: Sequence[DatasetRecording], options: ExportOptions, choice: SplitChoice, distinct_people: bool = False
+) -> DatasetPlan:
+    """Divide recordings, and read each once to see that it can be exported.
+
+    Args:
+        recordings: of different names.
+        options: of the export.
+        choice: how they are divided.
+        distinct_people: whether people of one name in two recordings are two people.
+
+    Raises:
+        FormatError: the choice names another recording, the options exclude each other, or bodies of one name differ.
+        SessionError: a session has no poses that are exported.
+    """
+    _check(options)
+    splits = {str(split): names for split, names in divide([r.name for r in recordings], choice).items()}
+    return DatasetPlan(recordings, plan_labels(recordings, options, distinct_people), splits, choice)
+
+
+def export_dataset(
+    plan: DatasetPlan, options: ExportOptions, out: Path, overwrite: bool = False, tick: Tick = lambda: None
+) -> list[RecordingSummary]:
+    """Write a dataset; the folder appears complete or not at all.
+
+    Args:
+        plan: what to write.
+        options: of the export.
+        out: the folder.
+        overwrite: whether to replace a folder that an export has made.
+        tick: called `plan.labels.n_frames` times; it may raise to stop the export, which leaves nothing behind.
+
+    Returns:
+        A summary of each recording.
+
+    Raises:
+        TrackerError: the folder exists or cannot be written, or footage cannot be read.
+    """
+    try:
+        with moved_at_end([out], overwrite, is_export_folder) as folder:
+            return _write(folder / out.name, plan, options, tick)
+    except OSError as error:
+        raise unwritable(out, error) from error
+
+
+def write_dataset(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
+    """Write a dataset of one recording.
+
+    Raises:
+        FormatError: videos are wanted in undistorted pixels.
+        RecordingError: the footage cannot be read.
+    """
+    recordings = [DatasetRecording(identifier(motion.session.folder.name), lambda: motion)]
+    _write(paths[0], plan_dataset(recordings, options, SplitChoice()), options, tick)
+
+
+def _check(options: ExportOptions) -> None:
+    if options.pictures == "video" and options.pixels == "undistorted":
+        raise FormatError(
+            "expected images with undistorted pixels, found video: footage is copied as it is", Remedy("export_images")
+        )
+
+
+def _write(folder: Path, plan: DatasetPlan, options: ExportOptions, tick: Tick) -> list[RecordingSummary]:
+    """Write all recordings and what is about them."""
+    summaries: list[RecordingSummary] = []
+    for recording in plan.recordings:
+        before = reduce(LabelCounts.plus, (s.labels for s in summaries), LabelCounts())
+        summaries.append(_write_recording(folder / "recordings", recording, plan.labels, before, options, tick))
+    write_text_atomic(folder / "splits.json", json.dumps(plan.splits, indent=1) + "\n")
+    own = {recording.name: f"recordings/{recording.name}/{FOLDER_PROVENANCE}" for recording in plan.recordings}
+    provenance = {
+        "content": "recordings of a dataset exported by Quadrille, with the provenance of their poses",
+        "version": 1,
+        "program": program_version(),
+        "recordings": own,
+    }
+    write_text_atomic(folder / FOLDER_PROVENANCE, json.dumps(provenance, indent=1) + "\n")
+    write_text_atomic(folder / "README.md", format_card(summaries, plan.splits, plan.choice.sentence, options))
+    _write_checksums(folder)
+    return summaries
+
+
+def _write_recording(
+    recordings: Path, recording: DatasetRecording, of_all: DatasetLabels, before: LabelCounts, options: ExportOptions,
+    tick: Tick,
+) -> RecordingSummary:  # fmt: skip
+    """Write the folder of a recording."""
+    motion, folder = recording.read(), recordings / recording.name
+    cameras = exported_cameras(motion, options)
+    labels = RecordingLabels(recording.name, motion, cameras, folder / "labels", of_all, before)
+    with ExitStack() as stack:
+        pictures = None
+        if options.pictures == "images":
+            pictures = stack.enter_context(Pictures(motion, cameras, folder))
+        else:
+            _copy_footage(motion, folder / "videos")
+        write_views(motion, cameras, pictures, labels.write, tick)
+    labels.finish()
+    (folder / "calibration").mkdir()
+    for layout, suffix in SUFFIXES.items():
+        write_layout(folder / "calibration" / f"{layout}{suffix}", layout, cameras)
+    write_npz(motion, options, [folder / "poses.npz"], lambda: None)
+    write_provenance(folder / FOLDER_PROVENANCE, motion, options)
+    people = {p.person.name: of_all.people[recording.name, p.person.name] for p in motion.exported}
+    return summarize(recording.name, motion, people, labels.counts)
+
+
+def _copy_footage(motion: ExportedMotion, folder: Path) -> None:
+    """Copy the footage of all cameras: a video as `CAMERA.mp4`, images of a folder to `CAMERA`."""
+    folder.mkdir(parents=True)
+    for source in motion.session.cameras:
+        if source.footage.is_dir():
+            shutil.copytree(source.footage, folder / source.camera.name)
+        else:
+            shutil.copyfile(source.footage, folder / f"{source.camera.name}{source.footage.suffix}")
+
+
+def _write_checksums(folder: Path) -> None:
+    """Write the SHA-256 of all files, as `sha256sum` does."""
+    lines = []
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        with path.open("rb") as file:
+            lines.append(f"{hashlib.file_digest(file, 'sha256').hexdigest()}  {path.relative_to(folder).as_posix()}\n")
+    write_text_atomic(folder / CHECKSUMS, "".join(lines))

@@ -1,0 +1,177 @@
+"""The formats that a session is exported to, one entry each. Another format is a writer and an entry here.
+
+Other packages add theirs by an entry point (`tracker.compute.extensions`), and so does `app` with its overlay video.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tracker.compute.extensions import Extended
+from tracker.errors import Remedy, TrackerError
+from tracker.interchange.exports.export_format import ExportFormat, Writer
+
+if TYPE_CHECKING:
+    from tracker.interchange.exports.motion import ExportedMotion
+    from tracker.interchange.exports.options import ExportOptions
+
+
+def _by_writer(name: str, module: str = "writers") -> Writer:
+    """Return a function of a module of `tracker.interchange.exports`, imported when first used: help is quick."""
+
+    def write(
+        motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]
+    ) -> None:
+        writer: Writer = getattr(import_module(f"tracker.interchange.exports.{module}"), name)
+        writer(motion, options, paths, tick)
+
+    return write
+
+
+OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "pictures", "character")
+"""Options that a format may have, the fields of `ExportOptions`."""
+_PLACE = frozenset(("axes", "units"))
+_FROM_1 = "counts from 1: frame {frame} of the session is"
+_OWN: Mapping[str, ExportFormat] = {
+    f.name: f
+    for f in (
+        ExportFormat(
+            "trc",
+            "joint centers (TRC)",
+            (".trc",),
+            _by_writer("write_person_trc"),
+            _PLACE,
+            one_person=True,
+            has_rate=True,
+            numbering=f"Frame# {_FROM_1} Frame# {{number}}",
+        ),
+        ExportFormat(
+            "csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _by_writer("write_tables"), _PLACE
+        ),
+        ExportFormat(
+            "mot",
+            "OpenSim motion with its model (MOT, OSIM)",
+            (".mot", ".osim"),
+            _by_writer("write_person_opensim"),
+            frozenset(("axes",)),
+            one_person=True,
+            axes="y-up",
+            gaps="left out",
+            one_body=True,
+        ),
+        ExportFormat(
+            "coco",
+            "keypoints in each view (COCO)",
+            (".json",),
+            _by_writer("write_keypoints"),
+            frozenset(("keypoints",)),
+            gaps="left without annotation",
+        ),
+        ExportFormat(
+            "bvh",
+            "skeleton animation (BVH)",
+            (".bvh",),
+            _by_writer("write_person_bvh"),
+            _PLACE,
+            one_person=True,
+            axes="y-up",
+            gaps="interpolated",
+            one_body=True,
+            has_rate=True,
+        ),
+        ExportFormat(
+            "glb",
+            "animated skeleton (glTF)",
+            (".glb",),
+            _by_writer("write_animation"),
+            axes="y-up",
+            gaps="interpolated by viewers",
+            one_body=True,
+        ),
+        ExportFormat(
+            "c3d",
+            "joint centers (C3D)",
+            (".c3d",),
+            _by_writer("write_person_c3d", "array_writers"),
+            _PLACE,
+            one_person=True,
+            units="mm",
+            has_rate=True,
+            numbering=f"C3D {_FROM_1} frame {{number}} of the file",
+        ),
+        ExportFormat(
+            "openpose",
+            "keypoints (OpenPose)",
+            ("_openpose",),
+            _by_writer("write_points", "label_writers"),
+            frozenset(("pixels",)),
+            gaps="left without people",
+            is_folder=True,
+        ),
+        ExportFormat(
+            "masks",
+            "masks of parts (PNG)",
+            ("_masks",),
+            _by_writer("write_masks", "mask_writers"),
+            frozenset(("pixels",)),
+            gaps="left without people",
+            is_folder=True,
+        ),
+        ExportFormat(
+            "movement",
+            "poses (movement, netCDF)",
+            (".nc", "_views.nc"),
+            _by_writer("write_movement", "array_writers"),
+            frozenset(("axes",)),
+            gaps="left as NaN",
+            has_rate=True,
+            holds_provenance=True,
+        ),
+        ExportFormat(
+            "nwb",
+            "poses (NWB, ndx-pose)",
+            (".nwb",),
+            _by_writer("write_poses_nwb", "nwb_writer"),
+            frozenset(("axes",)),
+            gaps="left as NaN",
+            has_rate=True,
+            holds_provenance=True,
+        ),
+        ExportFormat(
+            "npz",
+            "poses and cameras (NPZ)",
+            (".npz",),
+            _by_writer("write_npz", "array_writers"),
+            frozenset(("axes",)),
+            gaps="left as NaN",
+            holds_provenance=True,
+        ),
+        ExportFormat(
+            "dataset",
+            "dataset of pictures and labels",
+            ("_dataset",),
+            _by_writer("write_dataset", "dataset"),
+            frozenset(("keypoints", "pixels", "pictures")),
+            gaps="left without people",
+            is_folder=True,
+        ),
+    )
+}
+FORMATS = Extended(_OWN, "quadrille.exporters", ExportFormat)
+"""All formats by name."""
+
+
+def find_format(name: str | None, out: Path) -> ExportFormat:
+    """Return a format by name, or without one by the suffix of a file.
+
+    Raises:
+        TrackerError: there is no such format.
+    """
+    if name is not None and name in FORMATS:
+        return FORMATS[name]
+    by_suffix = next((f for f in FORMATS.values() if f.suffixes[0] == out.suffix.lower()), None)
+    if name is None and by_suffix is not None:
+        return by_suffix
+    found = f"'{name}'" if name is not None else f"none, and no known suffix in '{out.name}'"
+    raise TrackerError(f"expected a format among {', '.join(FORMATS)}, found {found}", Remedy("name_format"))

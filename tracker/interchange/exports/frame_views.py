@@ -1,0 +1,72 @@
+"""The people of a frame in each view: their points, and the pixels that they cover."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.model import PosedBody, ahead
+from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.keypoints import Keypoints, keypoints_in_views
+from tracker.interchange.exports.motion import ExportedMotion, PersonMotion
+from tracker.interchange.exports.views import view_labels
+
+
+class PersonInView(NamedTuple):
+    """A person whose pose is exported in a view."""
+
+    person: PersonMotion
+    body: PosedBody
+    """At the time of the picture."""
+    keypoints: Keypoints
+
+
+class FrameViews:
+    """The people of a frame in all views."""
+
+    def __init__(self, motion: ExportedMotion, cameras: Sequence[Camera], frame: int) -> None:
+        """Take the frame.
+
+        Args:
+            motion: what is exported.
+            cameras: of all views, in the pixels of the export.
+            frame: of the session.
+        """
+        self._motion, self._cameras, self._frame = motion, cameras, frame
+        self._people = motion.bodies(frame)
+        self._times = [source.clock.ahead(frame) for source in motion.session.cameras]
+
+    def bodies(self, view: int) -> Sequence[PosedBody]:
+        """Return the bodies of all people in the scene at the time of the picture."""
+        return ahead([body for _, body in self._people], self._times[view])
+
+    @cached_property
+    def _keypoints(self) -> list[list[Keypoints]]:
+        if not self._people:
+            return [[] for _ in self._cameras]
+        return keypoints_in_views([body for _, body in self._people], self._cameras, self._times)
+
+    def seen(self, view: int) -> list[PersonInView]:
+        """Return the people whose pose is exported and whose body is in the picture."""
+        rows = zip(self._people, self.bodies(view), self._keypoints[view], strict=True)
+        return [
+            PersonInView(person, body, keypoints)
+            for (person, _), body, keypoints in rows
+            if self._motion.is_exported(person, self._frame) and keypoints.box_px is not None
+        ]
+
+    def labels(self, view: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Label the pixels of a picture.
+
+        Returns:
+            The person in each pixel, (H, W), as an index into the session's people, -1 for none; and the part of that
+            person's body, (H, W), -1 for none.
+        """
+        bodies = self.bodies(view)
+        counts = [len(body.model.parts) for body in bodies]
+        people = np.repeat([person.index for person, _ in self._people], counts)
+        parts = np.concatenate([np.arange(n) for n in counts]) if counts else np.zeros(0, np.int64)
+        found = view_labels(bodies, self._cameras[view])
+        return np.append(-1, people).astype(np.int64)[found], np.append(-1, parts).astype(np.int64)[found]

@@ -1,0 +1,201 @@
+"""Replace points in imported files: key points in pictures and points in space."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.body.model import PosedBody
+from tracker.body.motion.velocity import velocity
+from tracker.errors import FormatError, Remedy, SessionError
+from tracker.formats.bvh_patching import patch_bvh
+from tracker.formats.c3d import patch_c3d
+from tracker.formats.file_axes import axes_matrix
+from tracker.formats.joint_tables.patching import patch_table
+from tracker.formats.keypoints.coco_patching import patch_coco
+from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
+from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
+from tracker.formats.keypoints.openpose import patch_openpose
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.trc import patch_trc
+from tracker.geometry.arrays import Array
+from tracker.interchange.exports.keypoints import project_through_lens
+from tracker.interchange.exports.like.mended_points import MendedPoints
+from tracker.interchange.observations.joints import side_pairs, triangulate_observations
+from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.placing import rescaled
+from tracker.interchange.observations.readers import PICTURE_FORMATS, SPACE_FORMATS
+from tracker.interchange.observations.request import picture_size
+from tracker.interchange.observations.stored import source_path
+from tracker.interchange.observations.stored_files import StoredPictures, stored_pictures
+from tracker.session.session import Session
+
+Files = dict[str, bytes]
+"""Content of files that differ from those that came, by their path."""
+Changes = dict[int, list[tuple[int, Array]]]
+"""Number of a person in the file and x, y, confidence of the points, (n_points, 3), by row."""
+
+
+class ChangedPictures(NamedTuple):
+    """Files of key points that change."""
+
+    files: Files
+    exchanged: tuple[tuple[int, int, int], ...]
+    """Frame, person and view in which left and right were exchanged."""
+
+
+def mended_pictures(
+    session: Session, observations: ObservationSet, mended: Sequence[MendedPoints], exchange_sides: bool = False
+) -> ChangedPictures:
+    """Return the files of key points that change.
+
+    Args:
+        session: its cameras.
+        observations: whose files change.
+        mended: points of each person that are replaced.
+        exchange_sides: exchange left and right where they were found exchanged; points that are replaced stay so.
+    """
+    cameras = [c.camera for c in session.cameras]
+    triangulated, pairs = triangulate_observations(observations, cameras), side_pairs(observations)
+    detections, is_exchanged = triangulated.detections, triangulated.is_exchanged & exchange_sides
+    exchanged: list[tuple[int, int, int]] = []
+    size, names = picture_size(observations.options), [c.name for c in cameras]
+    by_path = {source_path(session, observations.name, s): s.path for s in observations.sources}
+    found: list[tuple[StoredPictures, Changes]] = []
+    for pictures in stored_pictures(session, observations):
+        view = names.index(pictures.camera)
+        changes: Changes = {}
+        for row, frame in enumerate(pictures.frames.tolist()):
+            for k, person in enumerate(mended):
+                detection, values = int(detections[frame, k, view]) if 0 <= frame < len(detections) else -1, None
+                if detection >= 0 and is_exchanged[frame, k, view].any():
+                    exchanged.append((frame, k, view))
+                    of_sides = [
+                        pair for g, group in enumerate(pairs) if is_exchanged[frame, k, view, g] for pair in group
+                    ]
+                    values = _exchanged(pictures.table, row, detection, of_sides)
+                if frame in person.bodies:
+                    placed = _seen(session, view, frame, person)
+                    if size is not None:
+                        placed[:, :2] = rescaled(placed[:, :2], cameras[view].size, size)
+                    if detection < 0 and not (placed[:, 2] > 0).any():
+                        continue  # nobody is added who is not in the picture
+                    values = placed if values is None else np.where(np.isnan(placed[:, 2:]), values, placed)
+                if values is not None:
+                    changes.setdefault(row, []).append((detection, values))
+        if changes:
+            found.append((pictures, changes))
+    files = {by_path[path]: data for path, data in _patch_pictures(observations.format, found).items()}
+    return ChangedPictures(files, tuple(exchanged))
+
+
+def _exchanged(table: PictureTable, row: int, detection: int, pairs: Sequence[tuple[int, int]]) -> Array:
+    """Return x, y, confidence of points whose sides are exchanged, (n_points, 3); NaN for all others."""
+    points, is_found = table.points[row, detection], table.is_found[row, detection]
+    sure = np.where(is_found, np.nan_to_num(points[:, 2], nan=1.0), 0.0)
+    known = np.column_stack([np.where(is_found[:, None], points[:, :2], 0.0), sure])
+    out = np.full(known.shape, np.nan)
+    for left, right in pairs:
+        out[left], out[right] = known[right], known[left]
+    return out
+
+
+def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Changes]]) -> dict[Path, bytes]:
+    out: dict[Path, bytes] = {}
+    if format_name == "openpose":
+        for pictures, changes in found:
+            if len(pictures.files) > len(pictures.table.numbers):
+                raise _not_sent_back("files with one picture each, found several of one")
+            of_row = {pictures.files[row]: c for row, c in changes.items()}
+            out |= {path: patch_openpose(path.read_bytes(), c) for path, c in of_row.items()}
+        return out
+    patch = {"coco": patch_coco, "alphapose": patch_coco, "hdf5": patch_hdf5_apart}
+    if format_name != "deeplabcut" and format_name not in patch:
+        raise _not_sent_back(
+            f"files of a program to which points are sent back, found {PICTURE_FORMATS[format_name].program}"
+        )
+    for path in {pictures.files[0] for pictures, _ in found}:  # a file may hold several cameras
+        of_file = {p.part: changes for p, changes in found if p.files[0] == path}
+        if format_name == "deeplabcut":
+            out[path] = patch_deeplabcut_csv(path, of_file[0])
+        else:
+            out[path] = patch[format_name](path, of_file)
+    return out
+
+
+def _not_sent_back(difference: str) -> FormatError:
+    return FormatError(f"expected {difference}", Remedy("export_other_format"))
+
+
+def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Array:
+    """Return x, y, confidence of a person's points in a view, (n_points, 3); confidence 0 outside of the picture."""
+    source = session.cameras[view]
+    body, ahead = person.bodies[frame], source.clock.ahead(frame)
+    if ahead:
+        near = {f: b.values for f, b in person.all_bodies.items() if abs(f - frame) <= 2 and b.model is body.model}
+        body = PosedBody(body.model, body.values, velocity(body.model, near, frame)).ahead(ahead)
+    points = person.points_world(body)
+    points[~person.replaced[frame]] = np.nan
+    known = np.asarray(np.isfinite(points).all(axis=-1))
+    px = np.full((len(points), 2), np.nan)
+    px[known] = project_through_lens(source.camera, points[known])
+    with np.errstate(invalid="ignore"):
+        inside = np.asarray(((px >= -0.5) & (px <= np.array(source.camera.size) - 0.5)).all(axis=-1))
+    confidence = np.where(known, inside.astype(np.float64), np.nan)
+    return np.column_stack([np.where(inside[:, None], px, 0.0), confidence])
+
+
+def mended_space(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> tuple[Files, float]:
+    """Return the files of points in space that change, and how far a point is from its place at most, metres."""
+    options = dict(observations.options)
+    R_file = axes_matrix(options.get("axes", "x,y,z")).T
+    unit_m = float(options["unit_m"]) if "unit_m" in options else None
+    is_known = np.array([bool(points) for points in observations.counterparts.values()])
+    patch: Mapping[str, Callable[[Path, Mapping[int, Array]], bytes]] = {
+        "trc": patch_trc,
+        "csv": lambda path, changes: patch_table(path, unit_m, changes),
+        "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
+    }
+    out, farthest_m = Files(), 0.0
+    if len(observations.row_frames) != len(mended):
+        raise SessionError(
+            f"expected the rows of each file of {observations.name}, found those of the first; import the files again"
+        )
+    other = SessionError(
+        f"expected one file for each person in TRC, C3D, BVH or a table with a row for each frame, into which points "
+        f"are written back, found other files of {observations.name}; export the poses as TRC or CSV"
+    )
+    if len(observations.sources) != len(mended) or observations.format not in {*patch, "bvh"}:
+        raise other
+    for source, person, row_frames in zip(observations.sources, mended, observations.row_frames, strict=True):
+        changes = _rows(row_frames, person)
+        if changes:
+            in_file = {row: points @ R_file.T for row, points in changes.items()}
+            path = source_path(session, observations.name, source)
+            read = SPACE_FORMATS[observations.format].read([path], unit_m, session.fps)
+            if {len(table.names) for _, table in read} != {len(is_known)} or len(read) > 1:
+                raise other
+            if observations.format == "bvh":
+                out[source.path], distance_m = patch_bvh(path, unit_m, in_file, is_known)
+                farthest_m = max(farthest_m, distance_m)
+            else:
+                out[source.path] = patch[observations.format](path, in_file)
+    return out, farthest_m
+
+
+def _rows(row_frames: Array, person: MendedPoints) -> dict[int, Array]:
+    """Return the points of each row that is nearest to a replaced frame, between two of them interpolated."""
+    out: dict[int, Array] = {}
+    nearest = np.round(row_frames).astype(np.int64)
+    for row, (frame, at) in enumerate(zip(nearest.tolist(), row_frames.tolist(), strict=True)):
+        if frame not in person.bodies:
+            continue
+        points = person.points_world(person.bodies[frame])
+        other = frame + (1 if at > frame else -1)
+        if at != frame and other in person.all_bodies:
+            share = abs(at - frame)
+            points = (1 - share) * points + share * person.points_world(person.all_bodies[other])
+        points[~person.replaced[frame]] = np.nan
+        out[row] = points
+    return out

@@ -1,0 +1,132 @@
+"""The views of an export: their cameras in its pixels, their pictures, and the labels of their pixels."""
+
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.model import PosedBody
+from tracker.errors import RecordingError
+from tracker.evidence.contours.label_image import part_labels
+from tracker.files import write_text_atomic
+from tracker.footage.recording import Recording
+from tracker.formats.anipose import format_calibration
+from tracker.geometry.cameras import BEYOND_PX, MAX_PINHOLE_ANGLE, Camera
+from tracker.geometry.lens_tables import lens_of, undistortion_map
+from tracker.interchange.exports.motion import ExportedMotion
+from tracker.interchange.exports.options import ExportOptions
+
+CALIBRATION = "calibration.toml"
+"""Name of the file of the cameras beside labels in undistorted pixels."""
+IMAGES = "images"
+"""Name of the folder of the pictures, with one of each camera."""
+
+
+def exported_cameras(motion: ExportedMotion, options: ExportOptions) -> tuple[Camera, ...]:
+    """Return the cameras of all views in the pixels of an export."""
+    cameras = (c.camera for c in motion.session.cameras)
+    return tuple(c.pinhole if options.pixels == "undistorted" else c for c in cameras)
+
+
+class Pictures:
+    """Writes the pictures of frames to a folder: `images/CAMERA/000012.jpg` for frame 12 of the footage."""
+
+    def __init__(self, motion: ExportedMotion, cameras: Sequence[Camera], folder: Path) -> None:
+        """Open the footage.
+
+        Args:
+            motion: what is exported.
+            cameras: in the pixels of the pictures.
+            folder: in which `images` appears.
+
+        Raises:
+            RecordingError: the footage cannot be read.
+        """
+        self._sources, self._cameras, self._folder = motion.session.cameras, cameras, folder
+        self._recording = Recording(self._sources)
+        for camera in cameras:
+            (folder / IMAGES / camera.name).mkdir(parents=True)
+
+    def write(self, view: int, frame: int) -> bool:
+        """Write the picture of a view; False if the frame is damaged, and left out.
+
+        Raises:
+            RecordingError: the footage cannot be read.
+            OSError: the picture cannot be written.
+        """
+        source, camera = self._sources[view], self._cameras[view]
+        picture = self._recording.read_view(view, frame)
+        if picture is None:
+            return False
+        if camera.is_pinhole and not source.camera.is_pinhole:
+            picture = source.camera.undistort_image(picture)
+        path = self._folder / IMAGES / camera.name / f"{frame + source.offset:06d}.jpg"
+        coded, data = cv2.imencode(".jpg", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+        if not coded:
+            raise RecordingError(f"camera '{camera.name}': expected a picture of frame {frame}, found none to encode")
+        path.write_bytes(data.tobytes())
+        return True
+
+    def __enter__(self) -> "Pictures":
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self._recording.close()
+
+
+@contextmanager
+def undistorted_pictures(
+    motion: ExportedMotion, options: ExportOptions, folder: Path
+) -> Generator[Pictures | None, None, None]:
+    """Write the cameras of undistorted pixels, and yield the writer of such pictures; None in original pixels.
+
+    Raises:
+        RecordingError: the footage cannot be read.
+        OSError: the cameras cannot be written.
+    """
+    if options.pixels == "original":
+        yield None
+        return
+    cameras = exported_cameras(motion, options)
+    write_text_atomic(folder / CALIBRATION, format_calibration(cameras))
+    with Pictures(motion, cameras, folder) as pictures:
+        yield pictures
+
+
+def view_labels(bodies: Sequence[PosedBody], camera: Camera) -> NDArray[np.uint8]:
+    """Label the pixels of a view that bodies cover, lens distortion included.
+
+    Args:
+        bodies: all bodies in the scene; at most 255 parts in all.
+        camera: of the view.
+
+    Returns:
+        (H, W): 1 + the index of the visible part, counted through all bodies; 0 for none, and for pixels of a fisheye
+        that have no undistorted ones.
+    """
+    if camera.is_pinhole:
+        return part_labels(bodies, camera)
+    columns, rows = undistortion_map(lens_of(camera))
+    wide = _wide_pinhole(camera, columns, rows)
+    shift = (wide.K - camera.pinhole.K)[:2, 2].astype(np.float32)
+    labels = part_labels(bodies, wide)
+    found = cv2.remap(labels, columns + shift[0], rows + shift[1], cv2.INTER_NEAREST)
+    return np.asarray(found, dtype=np.uint8)
+
+
+def _wide_pinhole(camera: Camera, columns: NDArray[np.float32], rows: NDArray[np.float32]) -> Camera:
+    """Return the camera without distortion whose picture holds all that the lens films, up to the widest angle."""
+    pinhole = camera.pinhole
+    if camera.fisheye:
+        return pinhole
+    known = columns != BEYOND_PX
+    reach = np.tan(MAX_PINHOLE_ANGLE) * pinhole.K[(0, 1), (0, 1)]
+    center = pinhole.K[:2, 2]
+    low = [max(float(x[known].min()), c - r) for x, c, r in zip((columns, rows), center, reach, strict=True)]
+    high = [min(float(x[known].max()), c + r) for x, c, r in zip((columns, rows), center, reach, strict=True)]
+    (u0, v0), (u1, v1) = np.floor(low).astype(int).tolist(), (np.ceil(high).astype(int) + 1).tolist()
+    return pinhole.cropped((u0, v0, u1, v1))

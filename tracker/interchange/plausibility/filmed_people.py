@@ -1,0 +1,157 @@
+"""Compare points of people in space with the silhouettes of the people who were filmed."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.errors import TrackerError
+from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
+from tracker.footage.recording import Recording
+from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
+from tracker.geometry.robust_triangulation import INLIER_M
+from tracker.interchange.plausibility.body_likelihood import Places
+from tracker.interchange.plausibility.filmed_motion import FilmedMotion, MotionFinder
+from tracker.session.session import Session
+
+_BELOW = (("elbow", "wrist"), ("knee", "ankle"))
+"""Joints of the parts that move most."""
+
+
+@dataclass(frozen=True, eq=False)
+class FilmedPeople:
+    """Distances from the silhouettes of the people in some frames."""
+
+    cameras: tuple[Camera, ...]
+    """Camera of the pixels of each view, with its lens distortion."""
+    distances_px: tuple[NDArray[np.uint8], ...]
+    """By view, the distance of each pixel from the silhouettes, (F, height, width), whole px, at most 255."""
+    shows_people: Mask
+    """Whether a view shows anybody, (F, n_views)."""
+    motion: FilmedMotion | None = None
+    """How the pictures move; None where that is unknown."""
+    is_filmed: bool = True
+    """Whether they are those of footage; else people may be anywhere in the pictures."""
+    is_whole: bool = True
+    """Whether silhouettes show people whole: against the median of a recording, only what moves is seen."""
+
+    @property
+    def certain(self) -> "FilmedPeople":
+        """Places where people must be: silhouettes that are whole, else anywhere in the pictures."""
+        return self if self.is_whole else _anywhere(self.cameras, len(self.shows_people))
+
+    @property
+    def n_views(self) -> int:
+        """Number of views, each of which shows the limbs."""
+        return len(self.cameras)
+
+    @property
+    def knows_frames(self) -> bool:
+        """Whether there is footage."""
+        return self.is_filmed
+
+    def lag_errors_m(self, places: Places, most: int) -> list[Array]:
+        """Return how far limbs move beside the pictures of other frames, and how far they are from their silhouettes.
+
+        See `readings.KnownPeople` and `FilmedMotion.errors_m`. A pixel is the least distance from a silhouette.
+        """
+        points, lags = _limb_points(places), range(-most, most + 1)
+        views = range(len(self.cameras))
+        apart = [np.concatenate([self._away_m(v, points, lag, 1) for v in views], axis=-1) for lag in lags]
+        return [*([] if self.motion is None else [self.motion.errors_m(places, most)]), np.stack(apart)]
+
+    def costs(self, places: Places) -> Array:
+        """Return how far limbs lie outside of the silhouettes, (F,): mean truncated squares, 0 to 1; NaN if unknown.
+
+        A point that fewer than two views show, or than there are, counts as far outside.
+
+        Args:
+            places: of one person on the frames, metres.
+        """
+        points = _limb_points(places)
+        known = np.isfinite(points).all(axis=-1)
+        away_m = np.stack([self._away_m(v, points) for v in range(len(self.cameras))])
+        squares = np.minimum(away_m / INLIER_M, 1.0) ** 2
+        n_seen, n_views = np.isfinite(squares).sum(axis=0), self.shows_people.sum(axis=1)[:, None]
+        of_points = np.where(n_seen >= np.minimum(2, n_views), np.nansum(squares, axis=0) / np.maximum(n_seen, 1), 1.0)
+        n_known = known.sum(axis=1)
+        out = np.where(known, of_points, 0.0).sum(axis=1) / np.maximum(n_known, 1)
+        return np.where((n_known > 0) & (n_views[:, 0] > 0), out, np.nan)
+
+    def _away_m(self, view: int, points: Array, lag: int = 0, least_px: int = 0) -> Array:
+        """Return the distances of points from the silhouettes of a view, (F, n), metres; NaN where it shows neither.
+
+        Args:
+            view: its index.
+            points: (F, n, 3), metres.
+            lag: rows by which the silhouettes are later.
+            least_px: least distance, px.
+        """
+        camera, distances = self.cameras[view], self.distances_px[view]
+        flat = points.reshape(-1, 3)
+        px, depths = (x.reshape(*points.shape[:2], -1) for x in (camera.project(flat), camera.depths(flat)))
+        shown = np.arange(len(points)) + lag
+        is_row = (shown >= 0) & (shown < len(distances))
+        shown = np.where(is_row, shown, 0)
+        with np.errstate(invalid="ignore"):
+            inside = ((px > -0.5) & (px < np.array(distances.shape[:0:-1]) - 0.5)).all(axis=-1)
+            inside &= (depths[..., 0] > NEAR_PLANE_M) & (is_row & self.shows_people[shown, view])[:, None]
+        u, v = np.moveaxis(np.round(np.where(inside[..., None], px, 0.0)).astype(np.int64), -1, 0)
+        away_px = np.maximum(distances[shown[:, None], v, u], least_px)
+        return np.where(inside, away_px * depths[..., 0] / camera.K[0, 0], np.nan)
+
+
+def film_people(session: Session, frames: IntArray) -> FilmedPeople:
+    """Find the people of some frames by the session's masks, backgrounds, or its own median, and their motion.
+
+    Without readable footage, people may be anywhere in the pictures.
+
+    Args:
+        session: its cameras and footage.
+        frames: at equal steps, (F,).
+    """
+    unknown = _anywhere(tuple(c.camera for c in session.cameras), len(frames))
+    if not len(frames) or not all(c.footage.exists() for c in session.cameras):
+        return unknown
+    try:
+        with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
+            return _filmed(recording, finder, frames)
+    except TrackerError:  # the footage has its own messages
+        return unknown
+
+
+def _filmed(recording: Recording, finder: SilhouetteFinder, frames: IntArray) -> FilmedPeople:
+    step = int(frames[1] - frames[0]) if len(frames) > 1 else 1
+    found, motion = list[tuple[ViewSilhouette, ...]](), MotionFinder(step)
+    for k in range(int(frames[0]), int(frames[-1]) + 1):
+        if (k - frames[0]) % step == 0:
+            found.append(finder.silhouettes(k))
+        shown = [c.clock.nearest(k, recording.n_frames) for c in finder.cameras]
+        motion.add(recording.read_each(shown), [s.camera for s in found[0]])
+    cameras = tuple(s.camera for s in found[0])
+    distances = tuple(np.stack([_distances(s.mask) for s in of_view]) for of_view in zip(*found, strict=True))
+    shows = np.array([[not s.is_empty for s in views] for views in found])
+    is_whole = all(s.source != "recording" for views in found for s in views)
+    return FilmedPeople(cameras, distances, shows, motion.motion(cameras), is_whole=is_whole)
+
+
+def _anywhere(cameras: tuple[Camera, ...], n_frames: int) -> FilmedPeople:
+    distances = tuple(np.broadcast_to(np.uint8(0), (n_frames, c.height, c.width)) for c in cameras)
+    return FilmedPeople(cameras, distances, np.ones((n_frames, len(cameras)), dtype=bool), is_filmed=False)
+
+
+def _distances(mask: Mask) -> NDArray[np.uint8]:
+    found = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
+    return np.minimum(np.round(found), 255).astype(np.uint8)
+
+
+def _limb_points(places: Places) -> Array:
+    """Return the joints of forearms and calves and their middles, (F, n, 3); without these all points."""
+    pairs = [(f"{side}_{a}", f"{side}_{b}") for side in ("left", "right") for a, b in _BELOW]
+    ends: Sequence[tuple[Array, Array]] = [(places[a], places[b]) for a, b in pairs if places.keys() >= {a, b}]
+    points = [p for a, b in ends for p in (a, (a + b) / 2, b)] or [*places.values()]
+    return np.stack(points, axis=1)

@@ -1,6 +1,0 @@
-"""Judge joints that another program found: `judge` compares them with poses tracked from the same footage.
-
-The top room of the library. Contours and colours are evidence that detectors of key points do not use.
-"""
-
-__all__ = ["judge", "verdicts"]

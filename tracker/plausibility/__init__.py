@@ -1,7 +1,0 @@
-"""Whether points are the joints of a person of the recording: bones, posture, and the people in its pictures.
-
-One score in nats compares what a file says with other names, axes, units and frames. Imports the rooms up to
-`acquisition`. Callers use `examine.plan_examined_import` and `examine.examine_joints`.
-"""
-
-__all__ = ["examine", "posed_people", "readings"]

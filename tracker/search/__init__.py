@@ -1,7 +1,0 @@
-"""The robust chamfer cost and best-first search over a decomposed pose space of GD96.
-
-The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use
-`chamfer_cost.ChamferCost`, `search` and `SearchSettings` of `best_first`, and `even_points`.
-"""
-
-__all__ = ["best_first", "chamfer_cost", "even_points"]

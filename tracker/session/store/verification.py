@@ -1,0 +1,91 @@
+"""Check a store when it is opened: sound for SQLite, and as it was written."""
+
+import sqlite3
+
+from tracker.session.store import checksums, rows, schema
+from tracker.session.store.definitions import foreign_definition
+from tracker.session.store.query_limit import EndlessQueryError, limited
+
+_BROKEN = (
+    sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_MISMATCH, sqlite3.SQLITE_TOOBIG,
+)  # fmt: skip
+"""Primary codes of errors that show damage while a store is checked; other errors concern the disk or its users."""
+
+UNDECODABLE = (UnicodeDecodeError, OverflowError, MemoryError)
+"""Errors that Python raises instead of those of SQLite if names, texts or lengths in a damaged file are nonsense."""
+
+
+def damage(db: sqlite3.Connection) -> str | None:
+    """Return what is wrong with a store of this version or an older one; None if it passes.
+
+    Args:
+        db: connection to it, without a transaction.
+
+    Raises:
+        sqlite3.Error: it cannot be read, for example because of its disk or its rights.
+    """
+    checksums.register(db)
+    try:
+        db.execute("BEGIN")  # one state: another program may write meanwhile
+        try:
+            n_bytes = _size(db)
+            with limited(db, lambda: n_bytes):
+                return _damage(db)
+        finally:
+            db.rollback()
+    except EndlessQueryError as error:
+        return str(error)
+    except UNDECODABLE as error:
+        return f"its definitions or rows cannot be decoded ({type(error).__name__})"
+    except sqlite3.Error as error:
+        if primary_code(error) in _BROKEN:
+            return f"SQLite reports: {error}"
+        raise
+
+
+def primary_code(error: sqlite3.Error) -> int:
+    """Return the primary result code of an error; `SQLITE_ERROR` if it has none."""
+    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
+
+
+def _size(db: sqlite3.Connection) -> int:
+    (n_pages,), (page_bytes,) = (db.execute(f"PRAGMA {name}").fetchone() for name in ("page_count", "page_size"))
+    return int(n_pages * page_bytes)
+
+
+def _damage(db: sqlite3.Connection) -> str | None:
+    version = schema.version(db)
+    # Before all else: checks of SQLite run expressions of foreign definitions.
+    if version <= schema.VERSION and (foreign := foreign_definition(db)) is not None:
+        return foreign
+    problems = [text for (text,) in db.execute("PRAGMA integrity_check(3)")]
+    if problems != ["ok"]:
+        return f"SQLite reports: {'; '.join(str(p).strip() for p in problems)}"
+    if version > schema.VERSION:
+        return None  # a newer program knows
+    if version >= checksums.OLDEST_VERSION:
+        return "; ".join(checksums.differences(db, version)) or _out_of_order(db)
+    if db.execute("SELECT count(*) FROM sqlite_master WHERE name = 'contents'").fetchone() != (0,):
+        return f"expected version {schema.VERSION}, found {version}"
+    if version == 0:
+        return "expected tables of annotations, found a file without a version"
+    return _unreadable(db) or _out_of_order(db)
+
+
+def _out_of_order(db: sqlite3.Connection) -> str | None:
+    """Return a change or edit that does not follow an earlier one: such a chain might have no end."""
+    for table, column in (("edits", "parent"), ("pose_changes", "previous"), ("pin_changes", "previous")):
+        row = db.execute(f"SELECT id FROM {table} WHERE {column} >= id LIMIT 1").fetchone()
+        if row is not None:
+            return f"row {row[0]} of '{table}' follows a later one"
+    return None
+
+
+def _unreadable(db: sqlite3.Connection) -> str | None:
+    """Return why a store without checksums cannot be read; None if all of its rows can."""
+    revisions = {revision for (revision,) in db.execute("SELECT id FROM model_revisions")}
+    columns = "person, frame, numbers, sources, model_revision"
+    for person, frame, numbers, sources, revision in db.execute(f"SELECT {columns} FROM pose_changes"):
+        if not rows.is_readable(numbers, sources) or (numbers is not None and revision not in revisions):
+            return f"the pose of {person!r} in frame {frame} cannot be read"
+    return None

@@ -1,8 +1,0 @@
-"""Estimate the poses of all frames of a run together, and say how sure each is.
-
-Sources only propose poses. One likelihood compares them, one path goes through all frames, and one least-squares
-problem moves its poses. Imports `tracker.tracking.estimation` and what that may. Callers use
-`run_estimate.estimate_run` of `RunFrames`, which returns `path_assessment.RunPose`, and `frame_hypotheses.Proposal`.
-"""
-
-__all__ = ["frame_hypotheses", "path_assessment", "run_estimate"]
