@@ -2,11 +2,13 @@
 
 import ast
 import re
+from itertools import groupby
 
 from architecture import (
     FILES,
     FLOOR,
     OF_THE_SCREEN,
+    ONLY_ROOMS,
     PAGE_FLOOR,
     ROOMS,
     ROOT,
@@ -19,6 +21,7 @@ from architecture import (
     page_room,
     room_of,
     trees,
+    wing_of,
 )
 
 
@@ -45,6 +48,14 @@ def test_imports_run_downwards():
         and FLOOR[room_of(m)] >= FLOOR[room_of(module)]
     }
     assert wrong == set()
+
+
+def test_wings_import_one_way():
+    """Rooms run downwards, so that wings do if the rooms of each follow one another in the list."""
+    wings = [wing_of(room) for room in ROOMS if room.startswith("tracker.")]
+    assert len([*groupby(wings)]) == len({*wings}) < 20
+    assert {*wings} - FLOOR.keys() == set()
+    assert {*wings} - {room_of(m) for m in FILES if m not in FLOOR} == ONLY_ROOMS
 
 
 def test_no_circle():

@@ -21,7 +21,8 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
-        ["cli/calibration", "cli/observations", "cli/annotation", "cli/batches"],
+        ["cli/calibration", "cli/observations"],
+        ["cli/annotation", "cli/batches"],
         ["cli", "share"],
         ["bench", "server"],
         ["page", "scene3d"],
@@ -37,35 +38,43 @@ HOUSE = {
         ["state", "runtime"],
     ],
     "tracker/  the library": [
-        ["batch"],
-        ["api", "experiments", "annotation"],
-        ["judging"],
-        ["pipeline", "exports/like"],
-        ["exports", "agreement"],
-        ["simulate", "evaluation", "self_calibration"],
-        ["boards", "posing"],
-        ["calibration", "plausibility"],
-        ["acquisition", "initialization"],
-        ["tracking/chamfer, tracking/contour, tracking/voxel"],
-        ["tracking/runs"],
-        ["tracking/estimation"],
-        ["tracking", "initialization/generators"],
-        ["search", "appearance", "trajectory"],
-        ["fitting", "voxels", "detection"],
-        ["evidence", "observations"],
-        ["contours", "images", "store"],
+        ["batch", "simulate"],
+        ["api", "annotation"],
+        ["evaluation/judging", "evaluation/agreement"],
+        ["evaluation"],
+        ["pipeline"],
+        ["calibration/self_calibration"],
+        ["calibration/boards"],
+        ["calibration/check"],
+        ["interchange/exports/like"],
+        ["interchange/exports", "interchange/plausibility", "interchange/detection"],
+        ["interchange/observations"],
+        ["estimation/posing", "estimation/initialization", "estimation/acquisition"],
+        ["estimation/chamfer", "estimation/contour", "estimation/voxel"],
+        ["estimation/runs"],
+        ["estimation/by_frame"],
+        ["estimation/tracking", "estimation/initialization/generators"],
+        ["estimation/search", "estimation/appearance", "estimation/trajectory"],
+        ["estimation/fitting"],
+        ["evidence/voxels"],
+        ["evidence"],
+        ["evidence/images", "evidence/contours"],
+        ["session/store"],
         ["session"],
-        ["footage", "calibrations", "motion"],
-        ["formats/interchange", "formats/keypoints", "formats/joint_tables"],
+        ["footage"],
+        ["formats/write_only", "formats/keypoints", "formats/joint_tables", "formats/calibrations"],
         ["formats"],
+        ["body/motion"],
         ["body"],
         ["geometry"],
         ["compute", "errors, files"],
     ],
 }
+WINGS = ("evaluation", "calibration", "interchange", "estimation", "evidence", "session", "formats", "body")
+"""Folders of the library with several rooms, whose names stand beside them."""
 COLORS = {"static/  the page": "#d9822b", "app/  the viewer": "#3d8bd4", "tracker/  the library": "#3a9a6b"}
-WIDTH, ROW, GAP, TOP = 960, 34, 6, 64
-WIDTHS = {"static/  the page": 190, "app/  the viewer": 340, "tracker/  the library": 400}
+WIDTH, ROW, GAP, TOP, WING = 960, 34, 6, 64, 92
+WIDTHS = {"static/  the page": 180, "app/  the viewer": 310, "tracker/  the library": 440}
 INK = "#1d2733"
 FONT = "font-family='system-ui, sans-serif'"
 
@@ -84,16 +93,16 @@ def drawing():
             f"<text x='{x + width / 2}' y='34' text-anchor='middle' font-weight='600' fill='{INK}'>{name}</text>"
         )
         base = TOP + (max(len(r) for r in HOUSE.values()) - len(rows)) * (ROW + GAP)
-        for i, row in enumerate(rows):
-            y, w = base + i * (ROW + GAP), (width - GAP * (len(row) - 1)) / len(row)
-            for j, room in enumerate(row):
-                left = x + j * (w + GAP)
-                out.append(
-                    f"<rect x='{left:.1f}' y='{y}' width='{w:.1f}' height='{ROW}' rx='5' fill='{color}' "
-                    f"fill-opacity='{0.16 if i % 2 else 0.24}' stroke='{color}'/>"
-                    f"<text x='{left + w / 2:.1f}' y='{y + ROW / 2 + 4.5}' text-anchor='middle' fill='{INK}'"
-                    f"{size(room, w)}>{escape(room)}</text>"
-                )
+        places = [base + i * (ROW + GAP) for i in range(len(rows))]
+        for wing in WINGS if name.startswith("tracker") else ():
+            own = [y for y, row in zip(places, rows, strict=True) if wing_of(row[0]) == wing]
+            out += box(wing, x, own[0], WING, own[-1] + ROW - own[0], color, 0.34)
+        for i, (y, row) in enumerate(zip(places, rows, strict=True)):
+            inset = WING + GAP if name.startswith("tracker") and wing_of(row[0]) in WINGS else 0
+            w = (width - inset - GAP * (len(row) - 1)) / len(row)
+            for k, room in enumerate(row):
+                text = room.partition("/")[2] if inset and "/" in room else room
+                out += box(text, x + inset + k * (w + GAP), y, w, ROW, color, 0.16 if i % 2 else 0.24)
         x += width + 7
     out.append(
         f"<text x='{WIDTH / 2}' y='{height - 16}' text-anchor='middle' fill='#53606e'>"
@@ -101,6 +110,20 @@ def drawing():
         "page and program talk by the pane socket.</text></svg>"
     )
     return "\n".join(out) + "\n"
+
+
+def wing_of(room):
+    return room.partition("/")[0]
+
+
+def box(text, x, y, width, height, color, opacity):
+    """A room or a wing with its name in the middle."""
+    return [
+        f"<rect x='{x:.1f}' y='{y}' width='{width:.1f}' height='{height}' rx='5' fill='{color}' "
+        f"fill-opacity='{opacity}' stroke='{color}'/>"
+        f"<text x='{x + width / 2:.1f}' y='{y + height / 2 + 4.5}' text-anchor='middle' fill='{INK}'"
+        f"{size(text, width)}>{escape(text)}</text>"
+    ]
 
 
 def size(room, width):
