@@ -297,6 +297,12 @@ def page_text(text: object, remedy: Remedy | None = None) -> str:
     return _sentence(text, remedy, 1)
 
 
+def page_sentence(text: object) -> str:
+    """Return an error as a sentence of the page; empty if there is none."""
+    words = page_text(text)
+    return f"{words[:1].upper()}{words[1:]}." if words else ""
+
+
 def _sentence(text: object, remedy: Remedy | None, column: int) -> str:
     if isinstance(text, TrackerError):
         remedy = remedy or text.remedy

@@ -16,6 +16,10 @@ _POOL = ThreadPoolExecutor(2, thread_name_prefix="job")
 T = TypeVar("T")
 
 
+class StoppedError(Exception):
+    """The user has stopped the work, or nobody waits for it any more."""
+
+
 class Job(Generic[T]):
     """Exhausts a generator of steps in the background.
 

@@ -18,6 +18,7 @@ from urllib.parse import quote
 from aiohttp import web
 
 from app.remedies import page_text
+from app.runtime.jobs import StoppedError
 from app.runtime.temporary_folder import TemporaryFolder
 from app.server import connections
 from tracker.errors import TrackerError
@@ -31,10 +32,6 @@ _LOG = logging.getLogger(__name__)
 _CHUNK_BYTES = 1 << 18
 _POSE_OPTIONS = ("frames", "only", "skip_lost")
 """Options of all formats: which poses are exported."""
-
-
-class _StoppedError(Exception):
-    """The page that asked for an export is gone, or the program ends."""
 
 
 class ExportRoutes:
@@ -110,7 +107,7 @@ class ExportRoutes:
                     made = await asyncio.to_thread(make, folder.path)
                 except TrackerError as error:
                     raise web.HTTPBadRequest(text=page_text(error)) from error
-                except _StoppedError:
+                except StoppedError:
                     raise web.HTTPServiceUnavailable(text="The export was stopped.") from None
                 finally:
                     self._done = self._total = 0
@@ -121,7 +118,7 @@ class ExportRoutes:
 
         Raises:
             TrackerError: an option is wrong, or there is nothing to export.
-            _StoppedError: nobody waits for it any more.
+            StoppedError: nobody waits for it any more.
         """
         from tracker.formats.file_names import identifier
         from tracker.formats.model_toml import PRESETS
@@ -178,7 +175,7 @@ class ExportRoutes:
         def tick() -> None:
             self._done += 1
             if self._is_ending or request.transport is None or request.transport.is_closing():
-                raise _StoppedError
+                raise StoppedError
 
         return tick
 

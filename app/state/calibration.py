@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from app.state.progress import WorkState
 from tracker.body.model import PosedBody
 from tracker.geometry.cameras import Camera
 from tracker.pipeline.calibration_check import CalibrationCheck
@@ -24,18 +25,9 @@ class CorrectedFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class CalibrationState:
+class CalibrationState(WorkState):
     """A check of the cameras, and the poses of an earlier calibration."""
 
-    running: bool = False
-    stage: str = ""
-    """The kind of work, as text for the user."""
-    share: float = 0.0
-    """Share of the work that is done, 0 to 1."""
-    message: str = ""
-    """How the last check or correction ended; else empty."""
-    failed: bool = False
-    """Whether it ended with an error."""
     check: CalibrationCheck | None = None
     """Result of the last check; None before, and after its corrections were applied."""
     n_others: int = 0

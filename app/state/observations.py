@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from app.state.progress import WorkState
 from tracker.evaluation.judging.judge import Judgement
 from tracker.interchange.observations.observed import ObservationSet
 from tracker.interchange.observations.plans import ImportPlan, MaskPlan
@@ -23,7 +24,7 @@ class ObservedSet:
 
 
 @dataclass(frozen=True, eq=False)
-class ObservationsState:
+class ObservationsState(WorkState):
     """Imported observations, and the work on them."""
 
     sets: tuple[ObservedSet, ...] = ()
@@ -31,15 +32,6 @@ class ObservationsState:
     """The set that the views show; None for none."""
     plan: ImportPlan | MaskPlan | None = None
     """An import that is previewed, and is not stored yet."""
-    running: bool = False
-    stage: str = ""
-    """The kind of work, as text for the user."""
-    share: float = 0.0
-    """Share of this work that is done, 0 to 1."""
-    message: str = ""
-    """How the last work ended; else empty."""
-    failed: bool = False
-    """Whether it ended with an error."""
     judged: str = ""
     """Name of the set of the judgements; empty without any."""
     judgements: tuple[Judgement, ...] = ()

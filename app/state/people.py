@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.state.progress import WorkState
 from tracker.body.model import BodyModel
 from tracker.body.motion.keyframe_doubts import RaisedView
 from tracker.body.searches import Search
@@ -166,18 +167,11 @@ class AcquiredSize(NamedTuple):
 
 
 @dataclass(frozen=True)
-class AcquisitionState:
-    """An acquisition of sizes from the footage: its progress, or its result."""
+class AcquisitionState(WorkState):
+    """An acquisition of sizes from the footage. Its message says why there is no result, or what that does not show."""
 
-    running: bool = False
     person: int = 0
     """Index of the person whose sizes are acquired."""
-    stage: str = ""
-    """The kind of work, as text for the user."""
-    share: float = 0.0
-    """Share of the work that is done, 0 to 1."""
-    message: str = ""
-    """Why there is no result, or what a result does not show; else empty."""
     frames: tuple[int, ...] = ()
     """Frames that the sizes were fitted to; empty without a result."""
     cost_before_px: float = 0.0

@@ -14,6 +14,21 @@ TrackStage = Literal["tracking", "back", "solve"]
 """Stages of a run: forward, backward, all frames together."""
 
 
+@dataclass(frozen=True, eq=False)
+class WorkState:
+    """How far work in the background is, or how the last one ended."""
+
+    running: bool = False
+    stage: str = ""
+    """The kind of work, as text for the user."""
+    share: float = 0.0
+    """Share of the work that is done, 0 to 1."""
+    message: str = ""
+    """How the last one ended; else empty."""
+    failed: bool = False
+    """Whether it ended with an error."""
+
+
 @dataclass(frozen=True)
 class TrackState:
     """The tracking run, running or paused."""
@@ -46,20 +61,11 @@ class TrackState:
 
 
 @dataclass(frozen=True)
-class FindState:
-    """The search for people whom nobody has placed: its progress, and how the last one ended."""
+class FindState(WorkState):
+    """The search for people whom nobody has placed; tracking has no share in its progress."""
 
-    running: bool = False
-    stage: str = ""
-    """The kind of work, as text for the user."""
-    share: float = 0.0
-    """Share of the work that is done, 0 to 1, without tracking."""
     notes: tuple[str, ...] = ()
     """Sentences on who was found and how."""
-    message: str = ""
-    """How the last one ended."""
-    failed: bool = False
-    """Whether it ended with an error."""
     tried: int | None = None
     """Frame that is being tried; after a failure the one that the message is about. None otherwise."""
     camera: int | None = None

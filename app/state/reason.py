@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from app.state.progress import WorkState
 from tracker.estimation.by_frame.part_evidence import Contradiction, PartTable
 from tracker.geometry.arrays import Array
 
@@ -34,15 +35,8 @@ class Reason:
 
 
 @dataclass(frozen=True)
-class ReasonState:
-    """The reason for the shown pose, or how far the work on it is."""
+class ReasonState(WorkState):
+    """The reason for the shown pose. Its message says why there is no table."""
 
-    running: bool = False
-    stage: str = ""
-    """The kind of work, as text for the user."""
-    share: float = 0.0
-    """Share of the work that is done, 0 to 1."""
-    message: str = ""
-    """Why there is no table; empty where there is one, and while it is being made."""
     found: Reason | None = None
     """The newest one; see `State.reason`."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.control.session.session_state import SessionState
-from app.remedies import page_text
+from app.remedies import page_sentence
 from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.annotation.expected_error import contradicted_keyframes
@@ -52,20 +52,19 @@ class Proposing:
 
     def _work(self, kind: str) -> None:
         version = self._session_state.state.timeline_version
-        found, text = None, ""
+        found, message = None, ""
         try:
             found = self._propose(1 if kind == _NEW else 0)
         except Exception as error:
             if not isinstance(error, TrackerError):
                 _LOG.exception("no click could be proposed")
-            text = page_text(error)
+            message = page_sentence(error)
         if kind == _GAIN:
             if found is not None and not self._session_state.state.annotation.proposed.running:
                 self._set(after_mm=found.error_mm)
             return
         self._followed = None if found is None else version
         number = self._session_state.state.annotation.proposed.number + 1
-        message = "" if found is not None else f"{text[:1].upper()}{text[1:]}."
         self._set(number=number, running=False, found=found, message=message, after_mm=None)
 
     def _propose(self, n: int) -> Proposals:

@@ -179,6 +179,10 @@ class SessionState:
 
         return unsubscribe
 
+    def set_part(self, part: str, value: object) -> None:
+        """Change the field of that name; its type is the caller's."""
+        self.set(**{part: value})  # pyrefly: ignore[bad-argument-type]
+
     def set(self, **changes: Unpack[StateChanges]) -> None:
         """Change fields of the state and call the views.
 

@@ -1,18 +1,16 @@
 """Check the cameras by the contours of the tracked people, preview the corrections, and apply them."""
 
-import logging
-import threading
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from app.control.session.activities import Activities
+from app.control.session.background_work import BackgroundWork
 from app.control.session.session_state import SessionState
 from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.runtime.jobs import LatestWinsWorker
-from app.state.calibration import CorrectedFrame
+from app.state.calibration import CalibrationState, CorrectedFrame
 from app.state.state import State
 from tracker.body.model import PosedBody
 from tracker.calibration.check.camera_correction import corrected, later_s
@@ -28,14 +26,6 @@ from tracker.pipeline.calibration_check import (
 )
 from tracker.pipeline.posed_recording import PosedRecording
 
-_LOG = logging.getLogger(__name__)
-_STEPS = 100
-"""Progress is shown in so many steps."""
-
-
-class _StoppedError(Exception):
-    """The user has stopped the check."""
-
 
 class Calibrating:
     """At most one check of the cameras at a time. It changes nothing until its corrections are applied."""
@@ -49,8 +39,8 @@ class Calibrating:
             tracking: tracks again what is of an earlier calibration.
         """
         self._session_state, self._activities, self._tracking = session_state, activities, tracking
-        self._thread: threading.Thread | None = None
-        self._stopping = threading.Event()
+        self._work = BackgroundWork(session_state, "calibration", "check of the cameras")
+        self._set = self._work.set
         self._version: tuple[int, int] | None = None
         self._tried: tuple[int, int] | None = None  # the check and the frame of the last preview
         self._previews = LatestWinsWorker(self._refit, "calibration preview")
@@ -64,24 +54,13 @@ class Calibrating:
         Raises:
             TrackerError: another check is at work.
         """
-        with self._session_state.lock:
-            if self._session_state.state.calibration.running:
-                raise TrackerError(
-                    "expected no other check of the cameras at work, found one; stop it or wait for its end"
-                )
-            self._set(
-                running=True, stage="starting", share=0.0, message="", failed=False, check=None, is_previewed=False,
-                preview=None, refused="",
-            )  # fmt: skip
-        self._stopping.clear()
-        self._thread = threading.Thread(target=self._work, name="check cameras", daemon=True)
-        self._thread.start()
+        before = self._session_state.state.calibration
+        begin = CalibrationState(n_changes=before.n_changes, outdated=before.outdated, revision=before.revision)
+        self._work.start(self._check, begin)
 
     def stop(self) -> None:
-        """Stop a check that is at work. The caller must not hold the lock."""
-        self._stopping.set()
-        if self._thread is not None:
-            self._thread.join(30)
+        """Stop the work. The caller must not hold the lock."""
+        self._work.stop()
 
     def close(self) -> None:
         """Stop all work."""
@@ -168,39 +147,19 @@ class Calibrating:
             )
         return check
 
-    def _work(self) -> None:
+    def _check(self) -> dict[str, Any]:
+        recording, report = self._recording(), self._work.report
+        check = check_calibration(recording, report=report)
+        scores = held_out_scores(recording, check, report=report) if check.named else []
+        refused = ""
         try:
-            recording = self._recording()
-            check = check_calibration(recording, report=self._report)
-            scores = held_out_scores(recording, check, report=self._report) if check.named else []
-            refused = ""
-            try:
-                check.require_applicable(scores)
-            except TrackerError as error:
-                refused = page_text(error) if check.named else ""
-            self._set(running=False, check=check, n_others=len(scores), n_better=n_better(scores), refused=refused)
-        except _StoppedError:
-            self._set(running=False, message="Stopped; nothing was changed.")
-        except Exception as error:
-            if not isinstance(error, TrackerError):
-                _LOG.exception("a check of the cameras failed")
-            text = page_text(error)
-            self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
+            check.require_applicable(scores)
+        except TrackerError as error:
+            refused = page_text(error) if check.named else ""
+        return {"check": check, "n_others": len(scores), "n_better": n_better(scores), "refused": refused}
 
     def _recording(self) -> PosedRecording:
         return PosedRecording.of_session(self._session_state.session, self._session_state.frames.observer.in_time())
-
-    def _report(self, stage: str, share: float, text: str = "", /) -> None:
-        if self._stopping.is_set():
-            raise _StoppedError
-        before, share = self._session_state.state.calibration, round(share * _STEPS) / _STEPS
-        if (stage, share) != (before.stage, before.share):
-            self._set(stage=stage, share=share)
-
-    def _set(self, **changes: Any) -> None:
-        with self._session_state.lock:
-            before = self._session_state.state.calibration
-            self._session_state.set(calibration=replace(before, **changes))
 
     def _follow_state(self, state: State) -> None:
         found = state.calibration

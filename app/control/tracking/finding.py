@@ -1,6 +1,5 @@
 """Find people whom nobody has placed, acquire their sizes and track them: one job, and one entry of the history."""
 
-import logging
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,10 +8,11 @@ from typing import Any
 
 from app.control.search.search_runs import SearchRuns
 from app.control.session.activities import Activities
+from app.control.session.background_work import BackgroundWork, failure
 from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
 from app.control.tracking.tracking import Tracking
-from app.remedies import page_text
+from app.runtime.jobs import StoppedError
 from app.state.progress import FindState, Line
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
@@ -30,15 +30,8 @@ from tracker.session.session import Session, save_model
 from tracker.session.store.records import PoseChange, PoseRecord
 from tracker.session.store.stored_poses import StoredPose
 
-_LOG = logging.getLogger(__name__)
-_STEPS = 100
-"""Progress is shown in so many steps."""
-_ENDED: dict[str, Any] = {"running": False, "candidates": {}, "sought": frozenset()}
+_ENDED: dict[str, Any] = {"candidates": {}, "sought": frozenset()}
 """Fields of a search that found nobody."""
-
-
-class _StoppedError(Exception):
-    """The user has stopped the search for people."""
 
 
 class FindingPeople:
@@ -56,8 +49,8 @@ class FindingPeople:
             runs: recorded searches, which end where sizes change.
         """
         self._session_state, self._activities, self._tracking, self._runs = session_state, activities, tracking, runs
-        self._thread: threading.Thread | None = None
-        self._stopping = threading.Event()
+        self._work = BackgroundWork(session_state, "finding", "search for people")
+        self._set = self._work.set
         self._edit: int | None = None
         """Entry of the history with the people who were found; None before."""
         self._shown: int | None = None
@@ -80,10 +73,7 @@ class FindingPeople:
         """
         session_state = self._session_state
         with session_state.lock:
-            if session_state.state.finding.running:
-                raise TrackerError(
-                    "expected no other search for people at work, found one; stop it or wait for its end"
-                )
+            self._work.require_free()
             people = unplaced(self, range(len(session_state.present)))
             if not people and of is None:
                 raise TrackerError(
@@ -91,38 +81,27 @@ class FindingPeople:
                     "person's frames first"
                 )
             before = session_state.state.finding
-            finding = FindState(
-                running=True, stage="starting", sought=frozenset(people), frame=before.frame, axes=before.axes
-            )
-            session_state.set(finding=finding)
             self._shown, self._first_tried, self._edit = session_state.state.frame, None, None
-        self._stopping.clear()
-        settings = track_settings.of_run(session_state.state.settings, session_state.state.run_choices)
-        everybody, frames = tuple(range(len(session_state.present))), range(session_state.session.n_frames)
-        track = TrackPlan(frames, everybody, settings, keypoints=of if as_evidence else None)
-        plan = ChainPlan(track, FindSettings(keypoints=of), people if acquire else ())
-        self._thread = threading.Thread(target=self._work, args=(plan,), name="find people", daemon=True)
-        self._thread.start()
+            settings = track_settings.of_run(session_state.state.settings, session_state.state.run_choices)
+            everybody, frames = tuple(range(len(session_state.present))), range(session_state.session.n_frames)
+            track = TrackPlan(frames, everybody, settings, keypoints=of if as_evidence else None)
+            plan = ChainPlan(track, FindSettings(keypoints=of), people if acquire else ())
+            begin = FindState(sought=frozenset(people), frame=before.frame, axes=before.axes)
+            self._work.start(lambda: self._run(plan), begin)
 
     def stop(self) -> None:
         """Stop the work; what was stored stays. The caller must not hold the lock."""
-        self._stopping.set()
-        if self._session_state.state.finding.running:
-            self._tracking.stop()
-        if self._thread is not None:
-            self._thread.join(30)
+        self._work.stop(before_waiting=self._tracking.stop)
 
-    def _work(self, plan: ChainPlan) -> None:
+    def _run(self, plan: ChainPlan) -> dict[str, Any]:
         try:
             run_chain(plan, self, self)
-            self._set(running=False, message="Done.")
-        except _StoppedError:
+        except StoppedError:
             message = "Stopped; nothing was changed." if self._edit is None else "Stopped; what was found stays."
-            self._set(**_ENDED, message=message, tried=None)
+            return {**_ENDED, "message": message, "tried": None}
         except Exception as error:
-            if not isinstance(error, TrackerError):
-                _LOG.exception("a search for people failed")
-            self._show_failure(error)
+            return self._failed(error)
+        return {"message": "Done."}
 
     @property
     def session(self) -> Session:
@@ -148,13 +127,9 @@ class FindingPeople:
 
     def report(self, stage: str, share: float, text: str = "", /) -> None:
         """See `Sink.report`."""
-        if self._stopping.is_set():
-            raise _StoppedError
-        before = self._session_state.state.finding
-        share = round(share * _STEPS) / _STEPS
-        notes = (*before.notes, text) if text else before.notes
-        if (stage, share, notes) != (before.stage, before.share, before.notes):
-            self._set(stage=stage, share=share, notes=notes)
+        self._work.report(stage, share)
+        if text:
+            self._set(notes=(*self._work.state.notes, text))
 
     def show(self, frame: int, found: FirstPoses | None) -> None:
         """See `Sink.show`: draw the first poses of a frame, and go there unless the user looks or works elsewhere.
@@ -176,29 +151,19 @@ class FindingPeople:
             else:
                 session_state.set(finding=finding)
 
-    def _show_failure(self, error: Exception) -> None:
-        """End with an error, and go to the frame that it is about if the user still watches."""
-        session_state, frame, text = self._session_state, self._first_tried, page_text(error)
-        names = [c.camera.name for c in session_state.session.cameras]
+    def _failed(self, error: Exception) -> dict[str, Any]:
+        """Go to the frame that an error is about if the user still watches."""
+        frame, names = self._first_tried, [c.camera.name for c in self.session.cameras]
         named = error.camera if isinstance(error, TrackerError) else None
-        with session_state.lock:
-            finding = replace(
-                session_state.state.finding, **_ENDED, message=f"{text[:1].upper()}{text[1:]}.", failed=True,
-                tried=frame, camera=names.index(named) if named in names else None,
-            )  # fmt: skip
+        with self._session_state.lock:
             if frame is not None and self._is_watched() and frame != self._shown:
-                session_state.show_frame(frame, finding=finding)
-            else:
-                session_state.set(finding=finding)
+                self._session_state.show_frame(frame)
+        return {**_ENDED, **failure(error), "tried": frame, "camera": names.index(named) if named in names else None}
 
     def _is_watched(self) -> bool:
         """Return whether the user has stayed where the search shows what it does, and is not at work there."""
         state = self._session_state.state
         return state.frame == self._shown and state.drag is None and not state.search.running
-
-    def _set(self, **changes: Any) -> None:
-        with self._session_state.lock:
-            self._session_state.set(finding=replace(self._session_state.state.finding, **changes))
 
     def store_found(self, found: FirstPoses, label: str = "find people") -> None:
         """See `OpenSession.store_found`: store people and bodies as one entry of the history, and show them.
@@ -308,7 +273,7 @@ class FindingPeople:
         self._tracking.start_outward(plan.start, plan.people, self._entry(), on_end, observer=observer)
         ended.wait()
         if not outcome[0]:
-            raise _StoppedError
+            raise StoppedError
         return plan
 
     def take(self, run: TrackSession, step: Step) -> None:

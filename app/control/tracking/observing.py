@@ -1,19 +1,19 @@
 """Imported observations: list and show them, judge them by the footage, take them as poses, and import more."""
 
-import logging
 import threading
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from time import monotonic
-from typing import Any
 
 import numpy as np
 
 from app.control.session.activities import Activities
+from app.control.session.background_work import BackgroundWork
 from app.control.session.session_state import SessionState
 from app.control.tracking.finding import FindingPeople
 from app.remedies import page_text
+from app.runtime.jobs import StoppedError
 from app.state.observations import ObservedSet
 from tracker.compute.progress import Report
 from tracker.errors import TrackerError
@@ -37,17 +37,10 @@ from tracker.pipeline.keypoint_poses import imported_changes, poses_of
 from tracker.pipeline.track_session import EstimateStep, Step, TrackSession
 from tracker.session.session import Session
 
-_LOG = logging.getLogger(__name__)
 _DETECTED = "detected"
 """Name of what is detected here."""
-_STEPS = 100
-"""Progress is shown in so many steps."""
 _SHOWN_EVERY_S = 1.0
 """Time between two frames that are shown while people are detected on them, seconds."""
-
-
-class _StoppedError(Exception):
-    """The user has stopped the work."""
 
 
 class Observing:
@@ -62,8 +55,8 @@ class Observing:
             finding: places people who have no pose yet.
         """
         self._session_state, self._activities, self._finding = session_state, activities, finding
-        self._stopping = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._work = BackgroundWork(session_state, "observations", "work on observations")
+        self._set = self._work.set
         threading.Thread(target=self._list, name="list observations", daemon=True).start()
 
     def show(self, name: str) -> None:
@@ -116,14 +109,12 @@ class Observing:
             TrackerError: other work on observations is under way.
         """
         with self._session_state.lock:
-            self._refuse_if_busy()
+            self._work.require_free()
             self._start(_DETECTED, self._detect_and_track if then_track else self._detect)
 
     def stop(self) -> None:
         """Stop the work; only people who were detected by then are stored. The caller must not hold the lock."""
-        self._stopping.set()
-        if self._thread is not None:
-            self._thread.join(30)
+        self._work.stop()
 
     def plan(self, request: ImportRequest) -> ImportPlan | MaskPlan:
         """Read and check files, and show their points in the views. Nothing is stored.
@@ -175,10 +166,8 @@ class Observing:
             self._start(name, work)
 
     def _start(self, name: str, work: Callable[[str], str]) -> None:
-        self._set(plan=None, running=True, stage="starting", share=0.0, message="", failed=False)
-        self._stopping.clear()
-        self._thread = threading.Thread(target=self._work, args=(name, work), name="observations", daemon=True)
-        self._thread.start()
+        begin = replace(self._work.state, plan=None, share=0.0, message="", failed=False)
+        self._work.start(lambda: {"message": work(name)}, begin)
 
     def _free_to_use(self, name: str) -> ObservationSet:
         """Return a set of which no work is under way.
@@ -186,14 +175,8 @@ class Observing:
         Raises:
             TrackerError: some is, or it cannot be read.
         """
-        self._refuse_if_busy()
+        self._work.require_free()
         return load_observations(self._session_state.session, name)
-
-    def _refuse_if_busy(self) -> None:
-        if self._session_state.state.observations.running:
-            raise TrackerError(
-                "expected no other work on observations under way, found some; stop it or wait for its end"
-            )
 
     def _detect(self, name: str) -> str:
         detector, text = load_detector("blazepose", None, default_folder())
@@ -217,8 +200,8 @@ class Observing:
 
         def report(stage: str, share: float, text: str = "", /) -> None:
             try:
-                self._report(stage, share)
-            except _StoppedError:
+                self._work.report(stage, share)
+            except StoppedError:
                 raise KeyboardInterrupt from None
 
         shown, at_s = self._session_state.state.frame, -inf
@@ -244,20 +227,9 @@ class Observing:
         message = ended + f"Detected people on {n} frames. {' '.join(f'Note: {note}.' for note in found.notes)}"
         return message.strip(), plan.name if found.is_complete else None
 
-    def _work(self, name: str, work: Callable[[str], str]) -> None:
-        try:
-            self._set(running=False, message=work(name))
-        except _StoppedError:
-            self._set(running=False, message="Stopped; nothing was changed.")
-        except Exception as error:
-            if not isinstance(error, TrackerError):
-                _LOG.exception("work on observations failed")
-            text = page_text(error)
-            self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
-
     def _judge(self, name: str) -> str:
         session, observer = self._session_state.session, self._session_state.frames.observer.in_time()
-        found = judge(session, observer, name, TrackSettings(), _ShownProgress(self._report), self._report)
+        found = judge(session, observer, name, TrackSettings(), _ShownProgress(self._work.report), self._work.report)
         self._set(judged=name, judgements=tuple(found))
         return ""
 
@@ -271,8 +243,8 @@ class Observing:
         sized = replace(
             session, people=tuple(replace(p, model=bodies.get(i, p.model)) for i, p in enumerate(session.people))
         )
-        found = poses_of(sized, tuple(known), name, self._report)
-        self._report("storing", 1.0)
+        found = poses_of(sized, tuple(known), name, self._work.report)
+        self._work.report("storing", 1.0)
         label = f"poses of {name}"
         if not any(found.values()):
             raise TrackerError(
@@ -292,18 +264,6 @@ class Observing:
             session_state.show_frame(session_state.state.frame)
         n = len(set().union(*found.values()))
         return f"Stored poses on {n} frames; keyframes stayed. Undo takes them back."
-
-    def _report(self, stage: str, share: float, text: str = "", /) -> None:
-        if self._stopping.is_set():
-            raise _StoppedError
-        before, share = self._session_state.state.observations, round(share * _STEPS) / _STEPS
-        if (stage, share) != (before.stage, before.share):
-            self._set(stage=stage, share=share)
-
-    def _set(self, **changes: Any) -> None:
-        with self._session_state.lock:
-            before = self._session_state.state.observations
-            self._session_state.set(observations=replace(before, **changes))
 
 
 class _ShownProgress:

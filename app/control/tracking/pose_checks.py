@@ -8,7 +8,7 @@ from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
 from app.control.tracking.poses_around import pose_in_run
 from app.remedies import page_text
-from app.runtime.jobs import LatestWinsWorker
+from app.runtime.jobs import LatestWinsWorker, StoppedError
 from app.state.state import State
 from tracker.errors import TrackerError
 from tracker.pipeline.pose_check import checked_pose, compared_pose
@@ -17,10 +17,6 @@ from tracker.session.store.records import AssessmentChange, PoseChange, PoseReco
 _LOG = logging.getLogger(__name__)
 _GIVE_WAY_S = 0.05
 """Time between two looks at whether a drag has ended, which goes first."""
-
-
-class _StoppedError(Exception):
-    """The program ends."""
 
 
 class _Stored(NamedTuple):
@@ -77,7 +73,7 @@ class PoseChecks:
                 session, observer = session_state.session, session_state.frames.observer.in_time()
                 found = compared_pose(session, observer, settings, pose, self._report)
                 self._store(person, stored, checked_pose(session.people[person].model, record, found))
-        except _StoppedError:
+        except StoppedError:
             return
         except TrackerError as error:
             _LOG.info("a pose was not assessed: %s", page_text(error))
@@ -90,7 +86,7 @@ class PoseChecks:
         while not self._closed and _is_busy(self._session_state.state):
             time.sleep(_GIVE_WAY_S)
         if self._closed:
-            raise _StoppedError
+            raise StoppedError
 
     def _store(self, person: int, stored: _Stored, found: PoseRecord) -> None:
         """Store an assessment, unless the pose has changed meanwhile."""

@@ -11,8 +11,8 @@ import numpy as np
 from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
 from app.control.tracking.poses_around import pose_in_run
-from app.remedies import page_text
-from app.runtime.jobs import LatestWinsWorker
+from app.remedies import page_sentence
+from app.runtime.jobs import LatestWinsWorker, StoppedError
 from app.state.identity import Identity
 from app.state.reason import RankedPose, Reason
 from app.state.state import State
@@ -33,10 +33,6 @@ _REST_S = 0.1
 """Minimum time between two reasons; the pose may change faster."""
 _GIVE_WAY_S = 0.05
 """Time between two looks at whether a drag has ended, which goes first."""
-
-
-class _StoppedError(Exception):
-    """The user has stopped the work, or the pose has changed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,13 +110,12 @@ class Reasons:
             found = self._explained(state, run, people)
             self._set(found=found, message="")
             self._set(found=self._with_alternatives(state, found))
-        except _StoppedError:
+        except StoppedError:
             if self._stopping.is_set():
                 self._computed = ()
                 self._set(message="Stopped.")
         except TrackerError as error:
-            text = page_text(error)
-            self._set(message=f"{text[:1].upper()}{text[1:]}.")
+            self._set(message=page_sentence(error))
         except Exception:
             _LOG.exception("a pose could not be explained")
             self._set(message="Expected to explain this pose, found a fault; the log of the program has more.")
@@ -138,7 +133,7 @@ class Reasons:
         while session_state.state.is_dragging and not self._stopping.is_set():
             time.sleep(_GIVE_WAY_S)
         if self._stopping.is_set():
-            raise _StoppedError
+            raise StoppedError
         if session_state.state.track.running:
             raise TrackerError(_TRACKING)
         self._set(stage=stage, share=share)

@@ -175,8 +175,8 @@ def test_one_at_a_time_and_only_where_somebody_is_missing(opened, found, tracked
     begun(controller)
     with pytest.raises(TrackerError, match="no other search for people"):
         controller.finding.start()
-    controller.finding._stopping.set()
-    found.set()
+    threading.Timer(0.2, found.set).start()
+    controller.finding.stop()
     wait_for(lambda: not controller.state.finding.running)
     drag(controller, "left_wrist", (6.0, -9.0))
     with pytest.raises(TrackerError, match="a person without a pose"):
