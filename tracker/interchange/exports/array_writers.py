@@ -14,7 +14,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions, file_from_world
-from tracker.interchange.exports.pose_arrays import pose_arrays
+from tracker.interchange.exports.pose_arrays import pose_arrays, pose_values
 from tracker.interchange.exports.view_arrays import view_arrays
 from tracker.interchange.exports.views import exported_cameras
 
@@ -23,18 +23,17 @@ def write_person_c3d(
     motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
 ) -> None:
     """Write the points of one person as C3D; residuals are the errors that the run expects."""
-    found = pose_arrays(motion, options)
+    found = pose_arrays(motion, options, tick)
     write_c3d(
         paths[0], found.points, found.joints[:, 0], motion.session.fps,
         first_frame=motion.frames[0], residuals=found.errors_m[:, 0], units=options.units,
     )  # fmt: skip
-    for _ in motion.frames:
-        tick()
 
 
 def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]) -> None:
     """Write poses, joint centers, covariances, provenance and cameras as arrays of NumPy; docs/export.md lists them."""
-    found = pose_arrays(motion, options)
+    found, (names, poses) = pose_arrays(motion, options, tick), pose_values(motion)
+    bodies = {p.record.model_revision: p.body.model for one in motion.exported for p in one.poses.values()}
     arrays: dict[str, Any] = {
         "format_version": 1,
         "session": motion.session.name,
@@ -51,33 +50,15 @@ def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Pa
         "point_source": found.point_sources,
         "point_lost": found.point_lost,
         **found.by_pose,
+        "values": names,
+        "poses": poses,
+        "bodies": sorted(bodies),
+        "body_models": [format_model(bodies[r]) for r in sorted(bodies)],
+        **_cameras(motion.session.cameras, exported_cameras(motion, options)),
     }
-    arrays |= _values(motion) | _cameras(motion.session.cameras, exported_cameras(motion, options))
     plain = {name: np.asarray(values) for name, values in arrays.items()}
     assert not any(values.dtype.hasobject for values in plain.values()), "readers refuse pickled objects"
     np.savez_compressed(paths[0], **plain)  # pyrefly: ignore[bad-argument-type]
-    for _ in motion.frames:
-        tick()
-
-
-def _values(motion: ExportedMotion) -> dict[str, Any]:
-    """Return the values of the poses, and the bodies that they belong to."""
-    names = list(dict.fromkeys(v for person in motion.exported for model in person.models for v in model.value_names))
-    poses = np.full((len(motion.frames), len(motion.exported), len(names)), np.nan)
-    bodies = {}
-    for j, person in enumerate(motion.exported):
-        for i, frame in enumerate(motion.frames):
-            if stored := person.poses.get(frame):
-                model = stored.body.model
-                poses[i, j, [names.index(v) for v in model.value_names]] = stored.body.values
-                bodies[stored.record.model_revision] = model
-    revisions = sorted(bodies)
-    return {
-        "values": names,
-        "poses": poses,
-        "bodies": revisions,
-        "body_models": [format_model(bodies[r]) for r in revisions],
-    }
 
 
 def _cameras(sources: Sequence[CameraSource], cameras: Sequence[Camera]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Exported poses as arrays over frames, people and points, for files that are arrays."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,8 +75,8 @@ class PoseArrays:
         return np.where(np.isnan(self.joints[..., 0]), np.nan, 1.0 - np.nan_to_num(self.point_lost))
 
 
-def pose_arrays(motion: ExportedMotion, options: ExportOptions) -> PoseArrays:
-    """Return the exported poses and their provenance as arrays, in the axes of a file."""
+def pose_arrays(motion: ExportedMotion, options: ExportOptions, tick: Callable[[], None] = lambda: None) -> PoseArrays:
+    """Return the exported poses and their provenance as arrays, in the axes of a file; call `tick` after each frame."""
     models = [model for person in motion.exported for model in person.models]
     names = tuple(dict.fromkeys(name for model in models for name in model.point_names))
     bones = tuple(dict.fromkeys(bone for model in models for bone in model.bones))
@@ -110,6 +111,7 @@ def pose_arrays(motion: ExportedMotion, options: ExportOptions) -> PoseArrays:
             out.joints[i, j, columns[body.model]] = rigid.apply(T_file_world, body.joint_centers_world)
             for name, text in _texts(found).items():
                 texts[name][i, j] = text
+        tick()
     out.texts.update({name: found.astype(str) for name, found in texts.items()})
     return out
 
@@ -136,3 +138,14 @@ def _texts(found: PoseProvenance) -> dict[str, str]:
     made = (record.status, found.source, record.author, record.time, record.program, record.remark)
     values = (*made, found.verified_by, found.verified_time)
     return dict(zip(POSE_FIELDS, values, strict=True))
+
+
+def pose_values(motion: ExportedMotion) -> tuple[list[str], Array]:
+    """Return the names of the values of all bodies, and the values of each pose, (F, P, n_values); NaN without one."""
+    names = list(dict.fromkeys(v for person in motion.exported for model in person.models for v in model.value_names))
+    poses = np.full((len(motion.frames), len(motion.exported), len(names)), np.nan)
+    for j, person in enumerate(motion.exported):
+        for i, frame in enumerate(motion.frames):
+            if stored := person.poses.get(frame):
+                poses[i, j, [names.index(v) for v in stored.body.model.value_names]] = stored.body.values
+    return names, poses
