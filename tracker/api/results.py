@@ -46,9 +46,9 @@ def read_poses(session: SessionOrFolder, person: PersonName = None, frames: Sequ
         names=arrays.points,
         joints=arrays.joints[posed, 0],
         covariances=arrays.covariances[posed, 0],
-        statuses=arrays.texts["status"][posed, 0],
-        sources=arrays.texts["source"][posed, 0],
-        keyframes=arrays.keyframe[posed, 0],
+        statuses=arrays.by_pose["status"][posed, 0],
+        sources=arrays.by_pose["source"][posed, 0],
+        keyframes=arrays.by_pose["keyframe"][posed, 0],
     )
 
 

@@ -11,10 +11,7 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions, file_from_world
-from tracker.interchange.exports.provenance import PoseProvenance, pose_provenance
-
-POSE_FIELDS = ("status", "source", "annotator", "edit_time", "program", "remark", "verified_by", "verified_time")
-"""Texts of a pose in `PoseArrays.texts`."""
+from tracker.interchange.exports.provenance import pose_provenance
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,30 +36,8 @@ class PoseArrays:
     """Source of each point, (F, P, n)."""
     point_lost: Array
     """Probability that the limb of each point is lost, (F, P, n); NaN where not assessed."""
-    texts: dict[str, NDArray[np.str_]]
-    """By `POSE_FIELDS`, (F, P)."""
-    keyframe: NDArray[np.bool_]
-    """(F, P)."""
-    reviewed: NDArray[np.bool_]
-    """(F, P)."""
-    body_revision: IntArray
-    """(F, P); 0 without a pose."""
-    calibration_revision: IntArray
-    """(F, P); 0 without a pose."""
-    earlier_calibration: NDArray[np.bool_]
-    """Whether the session has another calibration now, (F, P)."""
-
-    @property
-    def by_pose(self) -> dict[str, NDArray[Any]]:
-        """The values of each pose by name, (F, P)."""
-        return {
-            **self.texts,
-            "keyframe": self.keyframe,
-            "reviewed": self.reviewed,
-            "body_revision": self.body_revision,
-            "calibration_revision": self.calibration_revision,
-            "earlier_calibration": self.earlier_calibration,
-        }
+    by_pose: dict[str, NDArray[Any]]
+    """`PoseProvenance.fields` of each pose by name, (F, P); empty, False or 0 without one."""
 
     @property
     def errors_m(self) -> Array:
@@ -93,51 +68,24 @@ def pose_arrays(motion: ExportedMotion, options: ExportOptions, tick: Callable[[
         covariances=np.full((*shape, len(names), 3, 3), np.nan),
         point_sources=np.full((*shape, len(names)), "", "<U16"),
         point_lost=np.full((*shape, len(names)), np.nan),
-        texts={},
-        keyframe=np.zeros(shape, bool),
-        reviewed=np.zeros(shape, bool),
-        body_revision=np.zeros(shape, np.int64),
-        calibration_revision=np.zeros(shape, np.int64),
-        earlier_calibration=np.zeros(shape, bool),
+        by_pose={},
     )
-    texts = {name: np.full(shape, "", object) for name in POSE_FIELDS}
+    by_pose: dict[str, NDArray[Any]] = {}
     T_file_world = file_from_world(motion.session, options.axes)
     for i, frame in enumerate(motion.frames):
         for j, person in enumerate(people):
             if frame not in person.poses:
                 continue
             body, found = person.poses[frame].body, pose_provenance(motion, person, frame)
-            _set_pose(out, (i, j), columns[body.model], found, T_file_world)
-            out.joints[i, j, columns[body.model]] = rigid.apply(T_file_world, body.joint_centers_world)
-            for name, text in _texts(found).items():
-                texts[name][i, j] = text
+            at = (i, j, columns[body.model])
+            out.joints[at] = rigid.apply(T_file_world, body.joint_centers_world)
+            out.covariances[at] = found.covariances(T_file_world[:3, :3])
+            out.point_sources[at], out.point_lost[at] = found.point_sources, found.point_lost
+            for name, value in found.fields.items():
+                by_pose.setdefault(name, np.full(shape, type(value)(), object))[i, j] = value
         tick()
-    out.texts.update({name: found.astype(str) for name, found in texts.items()})
+    out.by_pose.update({name: found.astype(type(found[0, 0])) for name, found in by_pose.items()})
     return out
-
-
-def _set_pose(
-    out: PoseArrays,
-    at: tuple[int, int],
-    columns: list[int],
-    found: PoseProvenance,
-    T_file_world: Array,
-) -> None:
-    """Write the provenance of a pose into the arrays."""
-    out.covariances[at][columns] = found.covariances(T_file_world[:3, :3])
-    out.point_sources[at][columns] = found.point_sources
-    out.point_lost[at][columns] = found.point_lost
-    out.keyframe[at], out.reviewed[at] = found.record.keyframe, found.is_reviewed
-    out.body_revision[at] = found.record.model_revision
-    out.calibration_revision[at] = found.calibration_revision
-    out.earlier_calibration[at] = found.is_earlier_calibration
-
-
-def _texts(found: PoseProvenance) -> dict[str, str]:
-    record = found.record
-    made = (record.status, found.source, record.author, record.time, record.program, record.remark)
-    values = (*made, found.verified_by, found.verified_time)
-    return dict(zip(POSE_FIELDS, values, strict=True))
 
 
 def pose_values(motion: ExportedMotion) -> tuple[list[str], Array]:

@@ -47,6 +47,26 @@ class PoseProvenance:
         """Whether a person has checked it, or set it."""
         return self.record.reviewed or self.record.keyframe
 
+    @property
+    def fields(self) -> dict[str, str | bool | int]:
+        """Everything that is known of the whole pose, by the name in files; docs/export.md lists it."""
+        record = self.record
+        return {
+            "status": record.status,
+            "source": self.source,
+            "annotator": record.author,
+            "edit_time": record.time,
+            "program": record.program,
+            "remark": record.remark,
+            "verified_by": self.verified_by,
+            "verified_time": self.verified_time,
+            "keyframe": record.keyframe,
+            "reviewed": self.is_reviewed,
+            "body_revision": record.model_revision,
+            "calibration_revision": self.calibration_revision,
+            "earlier_calibration": self.is_earlier_calibration,
+        }
+
     def covariances(self, R_file_world: Array) -> Array:
         """Return the covariance of each point in the axes of a file, (n_points, 3, 3), m^2; NaN where not known."""
         n_points = len(self.point_sources)
@@ -148,19 +168,7 @@ def _pose_document(found: PoseProvenance, R_file_world: Array) -> dict[str, Any]
     covariances = found.covariances(R_file_world)
     upper = covariances[:, (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)]
     return {
-        "status": record.status,
-        "source": found.source,
-        "annotator": record.author,
-        "edit_time": record.time,
-        "program": record.program,
-        "keyframe": record.keyframe,
-        "reviewed": found.is_reviewed,
-        "verified_by": found.verified_by,
-        "verified_time": found.verified_time,
-        "remark": record.remark,
-        "body_revision": record.model_revision,
-        "calibration_revision": found.calibration_revision,
-        "earlier_calibration": found.is_earlier_calibration,
+        **found.fields,
         "point_sources": found.point_sources,
         "point_lost": [None if np.isnan(x) else round(x, 4) for x in found.point_lost.tolist()],
         "covariances_m2": None
