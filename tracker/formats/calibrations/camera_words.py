@@ -4,7 +4,6 @@ OpenCV's words (K, R, t, rvec, ...) mean `X_camera = R X_world + t` and OpenCV's
 change the meaning and are not understood are refused by name, never left out.
 """
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -26,12 +25,11 @@ from tracker.formats.calibrations.lens_words import (
     FISHEYE,
     UnknownLensError,
     is_fisheye,
-    is_fisheye_word,
     is_understood,
     is_unknown,
     names_lens,
-    spelled,
 )
+from tracker.formats.calibrations.words import LISTS, MEANINGS, is_known, is_of, spelled
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import USUAL_SIZES
@@ -40,58 +38,16 @@ from tracker.validation import quoted
 Section: TypeAlias = dict[str, Any]
 """One camera: name, size, matrix, distortions, rotation, translation, fisheye; what is missing is None."""
 
-_KEYS = {
-    "matrix": "matrix k cameramatrix cammatrix intrinsic intrinsics intrinsicmatrix intrinsicsmatrix mtx",
-    "focal": "focallength focallengths focallengthpx focallengthpixels",
-    "principal": "principalpoint principalpointpx principalpointpixels",
-    "projection": "p projectionmatrix projmatrix projmat",
-    "distortions": "distortions distortion dist distcoef distcoefs distcoeff distcoeffs d "
-    "distortioncoefficients distortioncoeffs distortionvector distortionparameters distortionparams coefficients "
-    "coeffs coefs distortioncoefs",
-    "radial": "rdistort radial radialdistortion radialcoefficients radialcoeffs",
-    "tangential": "tdistort tangential tangentialdistortion tangentialcoefficients tangentialcoeffs",
-    "matrix_R": "rotation r rot rotationmatrix rmat",
-    "rodrigues": "rvec rotationvector rodrigues",
-    "quaternion": "quaternion q quat rotationquaternion orientationquaternion",
-    "translation": "translation t tvec translationvector",
-    "T_camera_world": "rt extrinsic extrinsics extrinsicmatrix extrinsicsmatrix worldtocamera worldtocam world2cam "
-    "world2camera w2c tcameraworld tcamworld tcw",
-    "T_world_camera": "cameratoworld camtoworld cam2world camera2world c2w tworldcamera tworldcam twc",
-    "size": "size resolution imagesize imgsize",
-    "width": "width w imagewidth imgwidth",
-    "height": "height h imageheight imgheight",
-    "name": "name cameraname label",
-    "number": "id camid cameraid serial serialnumber",
-    "ignore": "ignore",
-}
-_MEANING = {alias: meaning for meaning, aliases in _KEYS.items() for alias in aliases.split()}
-_NUMBERS = (
-    "fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
-    "qw", "qx", "qy", "qz", "tx", "ty", "tz",
-)  # fmt: skip
 COEFFICIENTS = {False: ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), True: ("k1", "k2", "k3", "k4")}
 """OpenCV's order of the coefficients of a usual lens, and of a fisheye."""
 _POSE = {"matrix_R", "rodrigues", "quaternion", "qw", "translation", "tx", "T_camera_world", "T_world_camera"}
 """Meanings that belong to a pose."""
-_OTHER_POSES = (
-    "pose", "camerapose", "position", "cameraposition", "center", "centre", "cameracenter",
-    "orientation", "euler", "eulerangles", "transform", "transformmatrix", "location", "worldposition", "axisangle",
-    "p", "projectionmatrix", "roll", "pitch", "yaw", "rx", "ry", "rz", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "c",
-)  # fmt: skip
-"""Words of poses whose direction or order programs do not agree on."""
 _FORMS = {3: "rodrigues", 4: "quaternion"}
 """Meanings of a rotation by the count of its numbers, where that is not 9: EasyMocap has both a vector R and a matrix
 Rot, which are equal."""
 _SHORTER = {14: 12, 12: 8, 8: 5}
 """Counts of OpenCV's coefficients, and to how many they are cut where the others are 0."""
-_UNIT = re.compile(r"^(length|translation|world|distance)?units?$|^units?(of)?(length|translation)s?$")
-"""Keys, without case and separators, whose value is the unit of the translations."""
-_OTHER_UNITS = ("px", "pixel", "pixels", "deg", "degree", "degrees", "rad", "radian", "radians")
-_NOTES = ("metadata", "meta", "info", "header", "general", "settings")
-"""Groups beside the cameras that may say something of all of them."""
 _REWRITE = "rewrite the camera to K, distortion, R and t of OpenCV's model, or remove the key if it says nothing"
-_LISTS = ("cameras", "cams", "camera")
-"""Keys under which the cameras of a file may lie."""
 
 
 def camera_groups(data: Any) -> dict[str, Mapping[str, Any]]:
@@ -101,7 +57,7 @@ def camera_groups(data: Any) -> dict[str, Mapping[str, Any]]:
         return {plain_text(known_values(row).get("number", i)): row for i, row in enumerate(rows) if is_camera(row)}
     if not isinstance(data, Mapping):
         return {}
-    for key in _LISTS:
+    for key in LISTS:
         if isinstance(data.get(key), Mapping | list) and (found := camera_groups(data[key])):
             return _with_poses(found, {k: v for k, v in data.items() if k != key})
     if is_camera({key: value for key, value in data.items() if not isinstance(value, Mapping)}):
@@ -118,7 +74,7 @@ def _holds_cameras(group: Mapping[str, Any] | list[Any]) -> bool:
     if isinstance(group, list):
         return any(isinstance(row, Mapping) and is_camera(row) for row in group)
     inner = [v for v in group.values() if isinstance(v, Mapping) and is_camera(v)]
-    return len(inner) > 1 or any(_holds_cameras(group[k]) for k in _LISTS if isinstance(group.get(k), Mapping | list))
+    return len(inner) > 1 or any(_holds_cameras(group[k]) for k in LISTS if isinstance(group.get(k), Mapping | list))
 
 
 def _with_poses(cameras: dict[str, Mapping[str, Any]], others: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
@@ -141,7 +97,7 @@ def _by_suffix(data: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     for key, value in data.items():
         parts = key.split("_")
         for i in range(1, len(parts)):
-            meaning = _MEANING.get("".join(parts[:i]).lower())
+            meaning = MEANINGS.get("".join(parts[:i]).lower())
             if meaning not in (None, "name", "number", "ignore"):
                 found.setdefault("_".join(parts[i:]), {})["_".join(parts[:i])] = value
                 break
@@ -161,9 +117,9 @@ def known_values(group: Mapping[str, Any]) -> dict[str, Any]:
         plain = spelled(key)
         if is_absent(value):
             continue
-        if plain in _NUMBERS:
+        if is_of("numbers", plain):
             found[plain] = value
-        elif (meaning := _MEANING.get(plain)) is not None:
+        elif (meaning := MEANINGS.get(plain)) is not None:
             if meaning == "matrix_R":
                 meaning = _FORMS.get(plain_array(value).size, meaning)
             found[meaning] = value
@@ -172,13 +128,13 @@ def known_values(group: Mapping[str, Any]) -> dict[str, Any]:
 
 def _flat(group: Mapping[str, Any], depth: int = 0) -> Iterator[tuple[str, Any]]:
     """Yield keys and values of a group; those of groups inside come first, so that outer ones replace them."""
-    inner = {k: v for k, v in group.items() if isinstance(v, Mapping) and spelled(k) not in _KEYS["size"].split()}
+    inner = {k: v for k, v in group.items() if isinstance(v, Mapping) and MEANINGS.get(spelled(k)) != "size"}
     if depth < 4:
         for key, value in inner.items():
             found = list(_flat(value, depth + 1))
             # A group of coefficients may say the model by its name alone.
-            has_lens = any(spelled(k) == "k1" or _MEANING.get(spelled(k)) == "distortions" for k, _ in found)
-            if has_lens and is_fisheye_word(key):
+            has_lens = any(spelled(k) == "k1" or MEANINGS.get(spelled(k)) == "distortions" for k, _ in found)
+            if has_lens and is_of("fisheye", key):
                 yield key, FISHEYE
             yield from found
     yield from ((str(k), v) for k, v in group.items() if k not in inner)
@@ -266,12 +222,7 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
         CalibrationError: a key or value that changes the meaning is not understood, or half of the pose is missing.
     """
     known = known_values(group)
-    for key, value in _flat(group):
-        plain = spelled(key)
-        if plain in _MEANING or plain in _NUMBERS or names_lens(key, value) or is_absent(value):
-            continue
-        if is_unknown(key, value):
-            raise refuse(document, camera, "known keys of a lens or a convention", _pair(key, value), _REWRITE)
+    _refuse_unknown(_flat(group), camera, document)
     words = _words_of_file(document)
     words |= {key: value for key, value in _flat(group) if names_lens(key, value)}
     try:
@@ -305,15 +256,15 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
 
 def _stated_unit(values: Iterable[tuple[str, Any]]) -> str | None:
     """Return the word for the unit of the translations; None if there is none."""
-    words = [v.strip().lower() for k, v in values if _UNIT.search(spelled(k)) and isinstance(v, str)]
-    return next((word for word in words if word and word not in _OTHER_UNITS), None)
+    words = [v.strip().lower() for k, v in values if is_of("units", k) and isinstance(v, str)]
+    return next((word for word in words if word and not is_of("other_units", word)), None)
 
 
 def _said_of_all(document: Document) -> dict[str, Any]:
     """Return the values at the top of a file and in its metadata, which hold for all its cameras."""
     if not isinstance(document.data, Mapping):
         return {}
-    notes = {k: v for key, group in document.groups.items() if spelled(key) in _NOTES for k, v in _flat(group)}
+    notes = {k: v for key, group in document.groups.items() if is_of("notes", key) for k, v in _flat(group)}
     return notes | {key: value for key, value in document.data.items() if not isinstance(value, Mapping | list)}
 
 
@@ -324,17 +275,21 @@ def _words_of_file(document: Document) -> dict[str, Any]:
         CalibrationError: a key at its top may change the meaning and is not understood.
     """
     said = _said_of_all(document)
-    for key, value in said.items() if isinstance(document.data, Mapping) else ():
-        if key not in document.data:  # metadata has remarks of any kind
-            continue
-        known = spelled(key) in _MEANING or spelled(key) in _NUMBERS or is_absent(value)
-        if not known and not names_lens(key, value) and is_unknown(key, value):
-            raise refuse(document, None, "known keys of a lens or a convention", _pair(key, value), _REWRITE)
+    # Metadata has remarks of any kind.
+    _refuse_unknown(((k, v) for k, v in said.items() if k in document.data), None, document)
     return {key: value for key, value in said.items() if is_understood(key, value)}
 
 
-def _pair(key: str, value: Any) -> str:
-    return f"{quoted(key)} = {quoted(value)}" if isinstance(value, str) else quoted(key)
+def _refuse_unknown(values: Iterable[tuple[str, Any]], camera: str | None, document: Document) -> None:
+    """Refuse keys and values that may change the meaning of the others, and are not understood.
+
+    Raises:
+        CalibrationError: there is one.
+    """
+    for key, value in values:
+        if not (is_known(key) or names_lens(key, value) or is_absent(value)) and is_unknown(key, value):
+            found = f"{quoted(key)} = {quoted(value)}" if isinstance(value, str) else quoted(key)
+            raise refuse(document, camera, "known keys of a lens or a convention", found, _REWRITE)
 
 
 def _split(known: Mapping[str, Any], matrix: Any, camera: str, document: Document) -> tuple[Any, Any]:
@@ -388,7 +343,7 @@ def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, docum
                 whole = whole if key == "T_camera_world" else rigid.inverse(whole)
                 return whole[:3, :3].tolist(), whole[:3, 3].tolist()
     if rotation is None or translation is None:
-        others = [key for key, value in _flat(group) if spelled(key) in _OTHER_POSES and not is_absent(value)]
+        others = [key for key, value in _flat(group) if is_of("other_poses", key) and not is_absent(value)]
         whole_key = next((key for key in ("T_camera_world", "T_world_camera") if key in known), None)
         if rotation is not None or translation is not None or others or whole_key:
             has = ["the rotation"] * (rotation is not None) + ["the translation"] * (translation is not None)

@@ -1,70 +1,23 @@
-"""Words and numbers by which calibrations name the model of a lens: the two that are read, and all others."""
+"""Model of a lens by the words and numbers of programs: the two that are read, and all others."""
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
+from tracker.formats.calibrations.words import is_of, spelled
 from tracker.validation import quoted
 
 FISHEYE = "fisheye"
 PINHOLE = "pinhole"
-
-_FLAGS = {"fisheye", "isfisheye", "fisheyemodel", "usefisheye", "fisheyelens", "isfisheyelens"}
-"""Keys, without case and separators, whose value is a yes or no."""
-_MODELS = {
-    "cameramodel", "distortionmodel", "lensmodel", "model", "distortiontype", "lenstype", "cameratype",
-    "projectionmodel", "projectiontype", "distmodel", "disttype", "lens", "modeltype", "intrinsicmodel",
-    "lensdistortionmodel", "cameramodeltype",
-}  # fmt: skip
-"""Keys whose value is the name of a model."""
-_YES = {"1", "true", "yes", "y", "on"}
-_NO = {"0", "false", "no", "n", "off", "none", "null", ""}
-_PINHOLE_WORDS = {
-    "pinhole", "radtan", "radialtangential", "radialtan", "plumbbob", "brown", "brownconrady", "opencv", "standard",
-    "perspective", "linear", "rational", "rationalpolynomial", "fullopencv", "pinholeradtan", "thinprism", "tilted",
-    "pinholebrownconrady",
-}  # fmt: skip
-"""OpenCV's model with up to 8 coefficients; those of thin prisms and tilts, which follow, must be 0."""
-_FISHEYE_WORDS = {
-    "fisheye", "equidistant", "equi", "kb", "kb4", "kb8", "kannala", "kannalabrandt", "kannalabrandt4",
-    "kannalabrandt8", "opencvfisheye", "pinholeequidistant", "pinholeequi", "fisheyeopencv", "equidist",
-}  # fmt: skip
-"""OpenCV's equidistant model. The 8 of kb8 counts fx, fy, cx and cy too."""
-_NUMBERS = {"0": PINHOLE, "1": FISHEYE}
-"""MC-Calib's distortion_type: 0 is Brown's model, 1 Kannala's."""
-_SUSPICIOUS = re.compile(
-    r"fisheye|lens|distor|model|omni|^xi$|convention|coordinates?ys|handed|axes|^s[1-4]$|^tau[xy]?$|thinprism|tilt"
-    r"|radial|tangential|coef|^scal(e|ing)|scal(e|ing)(factor)?$|binning"
-)
-"""Parts of keys of a lens, a model or a convention, without case and separators."""
-_SCALE = re.compile("scal(e|ing)|binning")
-"""Keys, without case and separators, of which 0 and 1 change nothing."""
-_HARMLESS = re.compile(r"error|(?<!te)rms|serial|modelname|modelnumber|count|flags|date|^distorted|undistort")
-_OTHER_LENS = re.compile(r"fisheye|equidist|kannala|omnidir")
-"""Words of lenses other than the usual one, in text without case and separators."""
-_FREE_TEXT = re.compile(r"name|label|^id$|serial|path|file|video|image|folder")
-"""Keys without case and separators whose text is chosen freely."""
 
 
 class UnknownLensError(ValueError):
     """A key or value of a lens that is not understood: `expected ..., found ...; advice`."""
 
 
-def spelled(key: str) -> str:
-    """Return a key without case and separators."""
-    return "".join(c for c in key.lower() if c.isalnum())
-
-
-def is_fisheye_word(word: str) -> bool:
-    """Return whether a word names OpenCV's equidistant model."""
-    return spelled(word) in _FISHEYE_WORDS
-
-
 def names_lens(key: str, value: Any) -> bool:
     """Return whether a key names the model of a lens, or its value does under any other key."""
-    plain = spelled(key)
-    is_word = isinstance(value, str) and spelled(value) in _FISHEYE_WORDS and not _FREE_TEXT.search(plain)
-    return plain in _FLAGS or plain in _MODELS or is_word
+    is_word = isinstance(value, str) and is_of("fisheye", value) and not is_of("free_text", key)
+    return is_of("lens_flags", key) or is_of("lens_models", key) or is_word
 
 
 def is_understood(key: str, value: Any) -> bool:
@@ -77,12 +30,11 @@ def is_understood(key: str, value: Any) -> bool:
 
 def is_unknown(key: str, value: Any) -> bool:
     """Return whether a key, or text under it, may change the meaning of the others unheard."""
-    plain = spelled(key)
-    if _SCALE.search(plain) and isinstance(value, int | float) and value in (0, 1):
+    if is_of("scales", key) and isinstance(value, int | float) and value in (0, 1):
         return False
-    if isinstance(value, str) and _OTHER_LENS.search(spelled(value)) and not _FREE_TEXT.search(plain):
+    if isinstance(value, str) and is_of("other_lens", value) and not is_of("free_text", key):
         return True
-    return bool(_SUSPICIOUS.search(plain)) and not _HARMLESS.search(plain)
+    return is_of("suspicious", key) and not is_of("harmless", key)
 
 
 def is_fisheye(words: Mapping[str, Any]) -> bool:
@@ -98,7 +50,7 @@ def is_fisheye(words: Mapping[str, Any]) -> bool:
     # The usual camera with an equidistant lens is a fisheye: Kalibr says both.
     if FISHEYE not in said.values():
         return False
-    if denied := [key for key in said if spelled(key) in _FLAGS and said[key] == PINHOLE]:
+    if denied := [key for key in said if is_of("lens_flags", key) and said[key] == PINHOLE]:
         other = next(key for key in said if said[key] == FISHEYE)
         found = " and ".join(f"{key} = {quoted(words[key])}" for key in (denied[0], other))
         raise UnknownLensError(f"expected one model of the lens, found {found}; correct the wrong one")
@@ -110,18 +62,18 @@ def _model(key: str, value: Any) -> str | None:
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     plain, word = spelled(key), spelled(quoted(value))
-    if plain in _FLAGS:
-        if word in _YES or word in _FISHEYE_WORDS:
+    if is_of("lens_flags", key):
+        if is_of("yes", word) or is_of("fisheye", word):
             return FISHEYE
-        if word in _NO or word in _PINHOLE_WORDS:
+        if not word or is_of("no", word) or is_of("pinhole", word):
             return PINHOLE
     elif word in ("none", "null", "", "no", "nodistortion"):
         return None
-    elif plain.endswith("type") and word in _NUMBERS:
-        return _NUMBERS[word]
-    elif word in _FISHEYE_WORDS or (word == "true" and "fisheye" in plain):
+    elif plain.endswith("type") and word in ("0", "1"):  # MC-Calib's: Brown's model, and Kannala's
+        return (PINHOLE, FISHEYE)[int(word)]
+    elif is_of("fisheye", word) or (word == "true" and "fisheye" in plain):
         return FISHEYE
-    elif word in _PINHOLE_WORDS:
+    elif is_of("pinhole", word):
         return PINHOLE
     raise UnknownLensError(
         f"expected OpenCV's model of a lens (pinhole, with radial and tangential distortion) or its fisheye "

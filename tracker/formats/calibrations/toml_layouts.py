@@ -5,7 +5,8 @@ from typing import Any
 
 from tracker.formats.calibrations.camera_words import Section, is_camera, section_of
 from tracker.formats.calibrations.document import Document, refuse
-from tracker.formats.calibrations.lens_words import is_understood, is_unknown, spelled
+from tracker.formats.calibrations.lens_words import is_understood, is_unknown
+from tracker.formats.calibrations.words import spelled
 from tracker.validation import quoted
 
 _CAMERA_KEYS = {"name", "size", "matrix", "rotation", "translation", "distortions"}
