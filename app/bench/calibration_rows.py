@@ -7,13 +7,13 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 
 from app.bench.rows import Row, Yardstick, in_yardsticks
-from tracker.calibration.check.camera_columns import POSE, camera_difference, moved_camera, n_columns
 from tracker.calibration.check.lens_priors import CALIBRATED, prior_sigmas
 from tracker.calibration.check.point_adjustment import PointProblem, triangulate_all
 from tracker.calibration.check.reprojection import Observations, Prior, Rig
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_columns import POSE, camera_difference, moved_camera, n_columns
 from tracker.geometry.cameras import Camera
 
 _N_CAMERAS, _N_POINTS, _NOISE_PX, _SIGMA_PX = 4, 1200, 0.5, 5.0

@@ -143,7 +143,7 @@ def _call_others(session: Session) -> None:
     They label parts in an image, carve and label voxels, compare bodies with silhouettes, film simulated people, learn
     what is usual in a run, and check its cameras.
     """
-    from tracker.calibration.check.rig_problem import sums_of_pieces
+    from tracker.estimation.acquisition.contour_bundle import sums_of_pieces
     from tracker.estimation.by_frame.part_evidence import learn_run
     from tracker.estimation.fitting.contour_residuals import ContourResiduals
     from tracker.estimation.initialization.generators.silhouette_overlap import SilhouetteOverlap

@@ -9,7 +9,6 @@ from app.bench.rows import Row, Yardstick, in_yardsticks
 from app.bench.sample_frames import BenchFrame, pose_at
 from tracker.body.model import PosedBody
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, ROTATION, corrected
 from tracker.calibration.check.diagnosis import Diagnosis, diagnose
 from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.estimation.acquisition.size_parameters import SizeParameters
@@ -17,6 +16,7 @@ from tracker.estimation.tracking.view_regions import regions
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, corrected
 
 _N_FRAMES, _TURN_DEG = 20, 0.7
 _MUST_MS = 3000

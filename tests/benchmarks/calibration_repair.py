@@ -19,13 +19,13 @@ import numpy as np
 from acquisition import PLAYED, quadrille
 from doc_tables import Conditions, add_write_option, check_places, show, table
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, corrected
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.trc import MarkerTable, read_trc, write_trc
 from tracker.geometry.arrays import Array, Image
+from tracker.geometry.camera_correction import N_CORRECTIONS, corrected
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import so3_exp
 from tracker.pipeline.calibration_check import check_calibration, held_out_scores, n_better

@@ -18,7 +18,6 @@ from acquisition import N_FRAMES, Recording, quadrille, recorded
 from calibration_repair import off
 from doc_tables import Conditions, add_write_option, check_places, show, table
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, ROTATION
 from tracker.calibration.check.diagnosis import fit_fault
 from tracker.calibration.check.fault_search import Fault
 from tracker.estimation.acquisition.size_parameters import SizeParameters
@@ -27,6 +26,7 @@ from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording as OpenRecording
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import so3_exp, so3_log
 from tracker.pipeline.calibration_check import check_calibration

@@ -1,8 +1,8 @@
-"""Derivatives of the images of points by the corrections of a camera, by numpy: the oracle of `rig_kernels`."""
+"""Derivatives of the images of points by the corrections of a camera, by numpy: the oracle of `piece_kernels`."""
 
 import numpy as np
 
-from tracker.calibration.check.camera_correction import FOCAL, POSITION, ROTATION
+from tracker.geometry.camera_correction import FOCAL, POSITION, ROTATION
 from tracker.geometry.rigid import skew, so3_exp
 
 

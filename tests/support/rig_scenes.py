@@ -7,10 +7,10 @@ from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker.body.model import PosedBody
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, corrected, later_s
 from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.formats.model_toml import load_model
+from tracker.geometry.camera_correction import N_CORRECTIONS, corrected, later_s
 
 CAMERAS = cameras_around(4)
 NAMES = [c.name for c in CAMERAS]

@@ -3,8 +3,8 @@
 import numpy as np
 import rigs
 
-from tracker.calibration.check.camera_columns import POSE, moved_camera, n_columns
 from tracker.calibration.check.reprojection import Observations
+from tracker.geometry.camera_columns import POSE, moved_camera, n_columns
 
 DISTORTION = (-0.2, 0.05, 0.001, -0.001, 0.01)
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.calibration.check.camera_correction import KINDS, N_CORRECTIONS, TIME
 from tracker.calibration.check.diagnosis import Diagnosis, diagnose, glance
 from tracker.calibration.check.fault_search import prior_sigmas
 from tracker.calibration.check.findings import CameraFinding, findings, sentence
@@ -19,6 +18,7 @@ from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M
 from tracker.footage.camera_source import LostFrames
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import KINDS, N_CORRECTIONS, TIME
 from tracker.pipeline.posed_recording import MIN_FRAMES, N_FRAMES, PosedRecording
 
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
-from tracker.calibration.check.camera_correction import DRIFT, TIME, corrected
 from tracker.errors import SessionError
 from tracker.files import refuse_links, write_text_atomic
 from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import format_calibration
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import DRIFT, TIME, corrected
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.stored_run import forget_unfinished

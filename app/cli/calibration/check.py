@@ -129,7 +129,7 @@ def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameS
 
 
 def _camera(finding: "CameraFinding", check: "CalibrationCheck") -> dict[str, Any]:
-    from tracker.calibration.check.camera_correction import in_units
+    from tracker.geometry.camera_correction import in_units
 
     return {
         "name": finding.name,

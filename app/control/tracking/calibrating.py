@@ -13,11 +13,11 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.calibration import CalibrationState, CorrectedFrame
 from app.state.state import State
 from tracker.body.model import PosedBody
-from tracker.calibration.check.camera_correction import corrected, later_s
 from tracker.calibration.check.fault_search import prior_sigmas
 from tracker.calibration.check.single_frames import score_frame
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.size_parameters import SizeParameters
+from tracker.geometry.camera_correction import corrected, later_s
 from tracker.pipeline.calibration_check import (
     CalibrationCheck,
     check_calibration,

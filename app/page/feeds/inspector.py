@@ -26,13 +26,13 @@ from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.searches import Search, SearchKind
-from tracker.calibration.check.camera_correction import KINDS, in_units
 from tracker.calibration.check.findings import CameraFinding
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.posing.grab import minor_points
 from tracker.evaluation.judging.judge import Doubt
 from tracker.formats.model_toml import PRESETS
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import KINDS, in_units
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.methods import METHODS
 

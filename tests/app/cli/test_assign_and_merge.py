@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from command_line import assert_refused, stored
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.formats.model_toml import format_model
+from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.pipeline.calibration_revisions import (
     change_calibration,
     follow_history,

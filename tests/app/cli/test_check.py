@@ -10,9 +10,9 @@ from command_line import WITH_POSE, assert_refused
 
 from app.cli.calibration.check import clock_notes
 from app.cli.track_report import format_summary
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, TIME, corrected
 from tracker.footage.start_times import StartTime, time_code_frames
 from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.geometry.camera_correction import N_CORRECTIONS, TIME, corrected
 from tracker.session import footage_clocks, synchronize
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
+from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.pipeline.calibration_revisions import follow_history, with_corrections
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore

@@ -6,8 +6,8 @@ from contextlib import closing
 import numpy as np
 from command_line import WITH_POSE
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.footage.start_times import StartTime, time_code_frames
+from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.session import footage_clocks, synchronize
 from tracker.session.session import load_session

@@ -6,10 +6,10 @@ from rig_scenes import CAMERAS, turned, viewed
 from staging import posed
 
 from app.drawing.misfit_field import misfit_field
-from tracker.calibration.check.camera_correction import FOCAL, N_CORRECTIONS
 from tracker.calibration.check.residual_pieces import residual_pieces
-from tracker.calibration.check.rig_problem import RigState
+from tracker.estimation.acquisition.contour_bundle import RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
+from tracker.geometry.camera_correction import FOCAL, N_CORRECTIONS
 
 OFF = 1
 FRAMES = range(8)

@@ -12,8 +12,8 @@ from gestures import drag, pixel_of
 from app.drawing import overlay_colors
 from app.server import thumbnails
 from app.session.footage_crops import FootageCrops
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, ROTATION, corrected
 from tracker.footage.camera_source import Clock
+from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, corrected
 
 
 @pytest.fixture

@@ -11,11 +11,11 @@ import pytest
 from page_driver import shows, state_of
 from program import ROOT, started, visited
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, ROTATION, corrected
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
+from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, corrected
 from tracker.session.session import load_session, save_cameras
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseChange, PoseRecord

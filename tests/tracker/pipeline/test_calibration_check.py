@@ -7,9 +7,9 @@ import pytest
 from rig_scenes import CAMERAS, FPS, NAMES, nothing_seen, turned, viewed
 
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, TIME
 from tracker.errors import TrackerError
 from tracker.footage.camera_source import LostFrames
+from tracker.geometry.camera_correction import N_CORRECTIONS, TIME
 from tracker.pipeline.calibration_check import check_calibration, contradiction
 
 

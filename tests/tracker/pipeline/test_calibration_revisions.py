@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-from tracker.calibration.check.camera_correction import DRIFT, N_CORRECTIONS, TIME
 from tracker.errors import SessionError
 from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model
+from tracker.geometry.camera_correction import DRIFT, N_CORRECTIONS, TIME
 from tracker.pipeline.calibration_revisions import (
     apply_check,
     change_calibration,

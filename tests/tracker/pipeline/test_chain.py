@@ -13,7 +13,6 @@ from run_poses import Estimate
 
 from tracker.body.dimensions import dimensions_of, with_dimensions
 from tracker.body.model import PosedBody
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition
 from tracker.estimation.chamfer.method import CHAMFER
@@ -22,6 +21,7 @@ from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
 from tracker.formats.model_toml import format_model, load_model
+from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.pipeline import chain, track_session
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, start_frame

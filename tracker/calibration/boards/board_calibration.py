@@ -11,12 +11,12 @@ from tracker.calibration.boards.camera_graph import link_cameras
 from tracker.calibration.boards.lens_fit import TOLD_FOCAL, LensFit, blank_camera, fit_lens
 from tracker.calibration.boards.rig_fit import HELD_OUT_EVERY, RigCalibration, adjust_rig, held_out_errors
 from tracker.calibration.boards.view_choice import MAX_LENS_VIEWS, choose_frames, choose_views, outlines, posed_views
-from tracker.calibration.check.camera_columns import FOCAL
 from tracker.calibration.check.reprojection import column_ends
 from tracker.calibration.check.solvable import check_apart, solvable
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.camera_columns import FOCAL
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lengths import USUAL_SIZES
 

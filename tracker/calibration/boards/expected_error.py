@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.camera_columns import project_with_columns
 from tracker.calibration.check.reprojection import column_ends
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, Mask
+from tracker.geometry.camera_columns import project_with_columns
 from tracker.geometry.cameras import Camera
 
 _QUANTILES = (0.05, 0.5, 0.95)

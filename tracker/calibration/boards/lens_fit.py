@@ -9,12 +9,12 @@ import numpy as np
 from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_problem import BoardProblem, SeenCorners
 from tracker.calibration.boards.pose_choice import best_poses, board_poses
-from tracker.calibration.check.camera_columns import FOCAL
 from tracker.calibration.check.lens_priors import UNKNOWN_LENS, prior_sigmas
 from tracker.calibration.check.reprojection import Prior, Rig, RigFit, fit_rig
 from tracker.compute.sampling import spread_indices
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.geometry.arrays import IntArray
+from tracker.geometry.camera_columns import FOCAL
 from tracker.geometry.cameras import Camera
 
 _FOCAL_STARTS = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)

@@ -1,13 +1,11 @@
 """Is the calibration right, which camera is off, by how much: from contours of bodies and from points (GD96 Sect. 5).
 
 `tracker/formats/calibrations` reads and writes the files of calibrations; this room judges and corrects cameras.
-`camera_columns.project_with_columns` differentiates projections by a camera, and `point_adjustment.adjust_points` fits
-cameras and points to reprojection errors.
+`diagnosis.diagnose` fits cameras to contours, and `point_adjustment.adjust_points` fits cameras and points to
+reprojection errors.
 """
 
 __all__ = [
-    "camera_columns",
-    "camera_correction",
     "diagnosis",
     "fault_search",
     "findings",
@@ -15,7 +13,6 @@ __all__ = [
     "point_adjustment",
     "reprojection",
     "residual_pieces",
-    "rig_problem",
     "single_frames",
     "solvable",
     "viewed_frames",

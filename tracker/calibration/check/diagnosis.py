@@ -11,7 +11,6 @@ from functools import partial
 
 import numpy as np
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.calibration.check.fault_search import (
     EFFORT,
     Fault,
@@ -24,11 +23,12 @@ from tracker.calibration.check.fault_search import (
     further_steps,
     prior_sigmas,
 )
-from tracker.calibration.check.rig_problem import RigState
 from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.compute.progress import Report, unreported
+from tracker.estimation.acquisition.contour_bundle import RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import N_CORRECTIONS
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.calibration.check.camera_correction import KINDS, N_CORRECTIONS, with_step
-from tracker.calibration.check.rig_problem import RigProblem, RigState
 from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
 from tracker.compute.threads import one_blas_thread
+from tracker.estimation.acquisition.contour_bundle import RigProblem, RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.bundle import ArrowEquations, BundleFit, settle_bundle, solve_bundle
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import KINDS, N_CORRECTIONS, with_step
 
 
 class _Prior(NamedTuple):

@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.camera_correction import KINDS, N_CORRECTIONS, corrected, later_s
 from tracker.calibration.check.diagnosis import Diagnosis
 from tracker.calibration.check.fault_search import Fault, is_followed
 from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.footage.camera_source import LostFrames
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import KINDS, N_CORRECTIONS, corrected, later_s
 from tracker.geometry.cameras import Camera
 
 WORDS = {

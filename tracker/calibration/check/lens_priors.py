@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.camera_columns import ASPECT, DISTORTION, FOCAL, PRINCIPAL, ROTATION, SHIFT, n_columns
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_columns import ASPECT, DISTORTION, FOCAL, PRINCIPAL, ROTATION, SHIFT, n_columns
 from tracker.geometry.cameras import Camera
 
 

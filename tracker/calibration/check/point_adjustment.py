@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.camera_columns import FOCAL
 from tracker.calibration.check.lens_priors import CALIBRATED, prior_sigmas
 from tracker.calibration.check.reprojection import (
     Located,
@@ -21,6 +20,7 @@ from tracker.calibration.check.reprojection import (
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.camera_columns import FOCAL
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import MIN_ANGLE_RAD
 

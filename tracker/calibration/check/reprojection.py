@@ -15,9 +15,9 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.calibration.check.camera_columns import camera_difference, moved_camera, n_columns, project_with_columns
 from tracker.estimation.fitting.bundle import ArrowEquations, solve_bundle
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.camera_columns import camera_difference, moved_camera, n_columns, project_with_columns
 from tracker.geometry.cameras import Camera
 
 OUTLIER_SIGMAS = 4.0

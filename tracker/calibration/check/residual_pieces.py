@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.rig_problem import RigState, views_of
 from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
+from tracker.estimation.acquisition.contour_bundle import RigState, views_of
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.geometry.arrays import Array
 

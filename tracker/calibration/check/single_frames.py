@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.calibration.check.fault_search import EFFORT, LEAST_GAIN
-from tracker.calibration.check.rig_problem import RigProblem, RigState
 from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
+from tracker.estimation.acquisition.contour_bundle import RigProblem, RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.camera_correction import N_CORRECTIONS
 
 
 class FrameScore(NamedTuple):

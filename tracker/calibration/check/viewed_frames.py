@@ -7,13 +7,13 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.camera_correction import corrected, later_s
-from tracker.calibration.check.rig_problem import RigState, SeenPerson
+from tracker.estimation.acquisition.contour_bundle import RigState, SeenPerson
 from tracker.estimation.acquisition.from_contours import own_views
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.images.edge_segments import accept_segments
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, with_all_segments, with_segments
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_correction import corrected, later_s
 
 
 class ViewedFrame(NamedTuple):

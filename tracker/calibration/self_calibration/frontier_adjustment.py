@@ -12,7 +12,6 @@ from functools import partial
 
 import numpy as np
 
-from tracker.calibration.check.camera_columns import FOCAL, POSE, camera_difference, moved_camera
 from tracker.calibration.check.lens_priors import UNKNOWN_LENS, prior_sigmas
 from tracker.calibration.check.reprojection import OUTLIER_SIGMAS, column_ends, inverse
 from tracker.calibration.self_calibration.frontier_equations import BORDER, FrontierEquations, frontier_equations
@@ -23,6 +22,7 @@ from tracker.calibration.self_calibration.seen_joints import SeenJoints
 from tracker.errors import CalibrationError
 from tracker.evidence.images.working_view import working_scale
 from tracker.geometry.arrays import Array, Mask
+from tracker.geometry.camera_columns import FOCAL, POSE, camera_difference, moved_camera
 from tracker.geometry.cameras import Camera
 
 

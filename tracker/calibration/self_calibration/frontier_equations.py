@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.camera_columns import project_with_columns
 from tracker.calibration.check.reprojection import column_ends, inverse
 from tracker.calibration.self_calibration.frontier_points import FrontierPoints
 from tracker.calibration.self_calibration.joint_adjustment import AdjustedJoints
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.camera_columns import project_with_columns
 
 
 class BorderErrors(NamedTuple):

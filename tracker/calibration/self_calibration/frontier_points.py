@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.camera_columns import project_with_columns
 from tracker.calibration.self_calibration.seen_joints import SeenJoints
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_columns import project_with_columns
 from tracker.geometry.cameras import Camera
 
 

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.camera_columns import FOCAL, POSE, SHIFT, camera_difference, n_columns
 from tracker.calibration.check.lens_priors import CALIBRATED, UNKNOWN_LENS
 from tracker.calibration.check.point_adjustment import PointProblem, triangulate_all
 from tracker.calibration.check.reprojection import Observations, Prior, Rig, RigFit, column_ends, fit_rig
 from tracker.errors import CalibrationError
 from tracker.estimation.fitting.bundle import ArrowEquations
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.camera_columns import FOCAL, POSE, SHIFT, camera_difference, n_columns
 from tracker.geometry.cameras import ROUNDING_PX2, Camera
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from tracker.calibration.boards.expected_error import MAX_POINTS, VolumeError, expected_error
 from tracker.calibration.boards.lens_fit import TOLD_FOCAL
 from tracker.calibration.boards.rig_fit import PLAIN_PX
-from tracker.calibration.check.camera_columns import n_columns
 from tracker.calibration.check.lens_priors import UNKNOWN_LENS
 from tracker.calibration.check.point_adjustment import NEWS, PointProblem, require_spread, triangulate_all
 from tracker.calibration.check.reprojection import FINAL, Observations, Prior, Rig
@@ -28,6 +27,7 @@ from tracker.errors import CalibrationError
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.camera_columns import n_columns
 from tracker.geometry.cameras import Camera
 from tracker.geometry.robust_triangulation import INLIER_M
 

@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 
 from tracker.calibration.boards.view_choice import MIN_CORNERS
-from tracker.calibration.check.camera_columns import ROTATION
 from tracker.calibration.check.reprojection import column_ends
 from tracker.calibration.self_calibration.joint_adjustment import AdjustedJoints, Gauge, adjust_joints
 from tracker.calibration.self_calibration.seen_joints import SeenJoints
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_columns import ROTATION
 from tracker.geometry.cameras import Camera
 
 

@@ -8,8 +8,8 @@ import pytest
 from gestures import drag, wait_for
 
 from app.control.tracking import calibrating
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.errors import TrackerError
+from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 
 

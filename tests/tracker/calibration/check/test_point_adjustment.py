@@ -6,7 +6,6 @@ from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
 from seen_points import cloud, moved_rig, ring_of, seen_points
 
-from tracker.calibration.check.camera_columns import FOCAL, camera_difference, moved_camera, n_columns
 from tracker.calibration.check.lens_priors import CALIBRATED, prior_sigmas
 from tracker.calibration.check.point_adjustment import (
     KnownLength,
@@ -17,6 +16,7 @@ from tracker.calibration.check.point_adjustment import (
 from tracker.calibration.check.reprojection import Observations, Prior, Rig
 from tracker.errors import CalibrationError
 from tracker.estimation.fitting.bundle import solve_bundle
+from tracker.geometry.camera_columns import FOCAL, camera_difference, moved_camera, n_columns
 
 
 def scipys_minimum(problem, rig):

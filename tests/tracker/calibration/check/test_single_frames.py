@@ -5,11 +5,11 @@ import pytest
 from rig_scenes import FPS
 
 from tracker.body.motion.velocity import velocity
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.calibration.check.fault_search import prior_sigmas
 from tracker.calibration.check.single_frames import FrameScore, find_change
 from tracker.calibration.check.viewed_frames import spread_poses
 from tracker.formats.model_toml import load_model
+from tracker.geometry.camera_correction import N_CORRECTIONS
 
 SIGMAS = prior_sigmas(FPS)
 

@@ -7,12 +7,12 @@ import pytest
 from filmed_people import blanks, dancing, observed, rig
 
 from tracker.calibration.boards.expected_error import expected_error
-from tracker.calibration.check.camera_columns import FOCAL, POSE, SHIFT, moved_camera, n_columns
 from tracker.calibration.check.lens_priors import CALIBRATED
 from tracker.calibration.check.point_adjustment import PointProblem
 from tracker.calibration.check.reprojection import Observations, Prior, Rig, column_ends
 from tracker.calibration.self_calibration.joint_adjustment import AlikeLenses, Gauge, UnknownLenses, adjust_joints
 from tracker.calibration.self_calibration.seen_joints import joints_of_people
+from tracker.geometry.camera_columns import FOCAL, POSE, SHIFT, moved_camera, n_columns
 
 CAMERAS = rig(3)
 

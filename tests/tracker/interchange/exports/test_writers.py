@@ -14,12 +14,12 @@ from pycocotools.coco import COCO
 from staging import cameras_around
 from stored_motions import FPS, distorted_cameras, store_motion
 
-from tracker.calibration.check.camera_correction import N_CORRECTIONS
 from tracker.errors import Remedy, SessionError
 from tracker.evidence.contours.label_image import part_labels
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import read_trc
 from tracker.geometry import rigid
+from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.geometry.ground_plane import GroundPlane
 from tracker.interchange.exports import writers
 from tracker.interchange.exports.keypoints import keypoints_in_views, project_through_lens

@@ -5,14 +5,14 @@ import pytest
 from rig_oracle import columns
 from rig_scenes import CAMERAS, viewed
 
-from tracker.calibration.check.camera_correction import DRIFT, N_CORRECTIONS, ROTATION, TIME, corrected
 from tracker.calibration.check.fault_search import prior_sigmas
-from tracker.calibration.check.rig_kernels import N_PART, OF_CAMERA, OF_PART, _camera_motions
-from tracker.calibration.check.rig_problem import GroupSums, RigProblem, RigState, part_motions, sums_of_pieces
 from tracker.calibration.check.viewed_frames import seen_people
+from tracker.estimation.acquisition.contour_bundle import GroupSums, RigProblem, RigState, part_motions, sums_of_pieces
 from tracker.estimation.acquisition.part_motions import rows_of_pieces
+from tracker.estimation.acquisition.piece_kernels import N_PART, OF_CAMERA, OF_PART, _camera_motions
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
+from tracker.geometry.camera_correction import DRIFT, N_CORRECTIONS, ROTATION, TIME, corrected
 from tracker.geometry.rigid import so3_exp
 
 CORRECTION = np.array([0.004, -0.003, 0.002, 0.01, -0.005, 0.01, 0.003, 0.0, 0.0])

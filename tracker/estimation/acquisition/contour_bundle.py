@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.camera_correction import N_CORRECTIONS, ROTATION, corrected, later_s, with_step
-from tracker.calibration.check.rig_kernels import N_COLUMNS, N_PART, OF_PART, sum_of_camera, sum_pieces
 from tracker.compute.threads import map_parallel
 from tracker.estimation.acquisition.part_motions import motions_by_pose, motions_by_sizes
+from tracker.estimation.acquisition.piece_kernels import N_COLUMNS, N_PART, OF_PART, sum_of_camera, sum_pieces
 from tracker.estimation.acquisition.size_parameters import SizeArrays, SizeParameters
 from tracker.estimation.fitting.bundle import ArrowEquations
 from tracker.estimation.fitting.contour_residuals import ContourResiduals, PieceSums
@@ -28,6 +27,7 @@ from tracker.estimation.fitting.gauss_newton import NormalEquations, PosePrior, 
 from tracker.evidence.contours.surfaces import Surfaces
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, corrected, later_s, with_step
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import so3_exp
 
@@ -280,7 +280,7 @@ class _GroupResiduals(NamedTuple):
 
 
 class PartSums(NamedTuple):
-    """Residuals summed by the columns of the parts, see `rig_kernels`."""
+    """Residuals summed by the columns of the parts, see `piece_kernels`."""
 
     b: Array
     """Gradients, (n_parts, N_COLUMNS)."""

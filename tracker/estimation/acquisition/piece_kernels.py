@@ -7,9 +7,9 @@ the camera, tests compare both.
 
 import numpy as np
 
-from tracker.calibration.check.camera_correction import DRIFT, FOCAL, TIME
 from tracker.compute.jit import njit
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.camera_correction import DRIFT, FOCAL, TIME
 from tracker.geometry.cameras import NEAR_PLANE_M
 
 OF_CAMERA = slice(TIME)

@@ -5,7 +5,7 @@ import pytest
 from rig_oracle import columns
 from staging import camera_at
 
-from tracker.calibration.check.camera_correction import (
+from tracker.geometry.camera_correction import (
     FOCAL,
     N_CORRECTIONS,
     POSITION,

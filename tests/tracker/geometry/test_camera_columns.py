@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import rigs
 
-from tracker.calibration.check.camera_columns import camera_difference, moved_camera, n_columns, project_with_columns
+from tracker.geometry.camera_columns import camera_difference, moved_camera, n_columns, project_with_columns
 from tracker.geometry.cameras import Camera
 
 LENSES = [

@@ -9,8 +9,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tracker.calibration.check.camera_columns import moved_camera, n_columns
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_columns import moved_camera, n_columns
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import so3_exp, so3_log
 
