@@ -143,7 +143,8 @@ def _call_others(session: Session) -> None:
     They label parts in an image, carve and label voxels, compare bodies with silhouettes, film simulated people, learn
     what is usual in a run, and check its cameras.
     """
-    from tracker.estimation.acquisition.contour_bundle import sums_of_pieces
+    from tracker.estimation.acquisition.part_motions import N_MOTIONS
+    from tracker.estimation.acquisition.piece_sums import sums_of_views
     from tracker.estimation.by_frame.part_evidence import learn_run
     from tracker.estimation.fitting.contour_residuals import ContourResiduals
     from tracker.estimation.initialization.generators.silhouette_overlap import SilhouetteOverlap
@@ -177,7 +178,7 @@ def _call_others(session: Session) -> None:
         learn_run(observer, frames)
         (view, *_) = observer.evidence(_FRAME)
     _, pieces = ContourResiduals([view], [body]).piece_sums(body.kinematics)
-    sums_of_pieces(pieces, model, body.kinematics, view.camera, np.array([s.half_axes for s in model.shapes]))
+    sums_of_views([(view.camera, pieces)], model, body.kinematics, N_MOTIONS)
 
 
 def _track(

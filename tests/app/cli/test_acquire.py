@@ -76,7 +76,7 @@ def test_an_acquired_body_goes_to_the_next_session(run, placed, quick, tmp_path)
 
 
 def test_a_fit_that_is_stopped_leaves_the_session_as_it_was(run, placed, monkeypatch, tmp_path):
-    before, steps, linearize = files_of(placed), [], size_fit._Problem.linearize
+    before, steps, linearize = files_of(placed), [], size_fit.ContourBundle.linearize
 
     def stopped(problem, state, *below):
         steps.append(linearize(problem, state))
@@ -84,7 +84,7 @@ def test_a_fit_that_is_stopped_leaves_the_session_as_it_was(run, placed, monkeyp
             signal.raise_signal(signal.SIGINT)  # as Ctrl+C does
         return steps[-1]
 
-    monkeypatch.setattr(size_fit._Problem, "linearize", stopped)
+    monkeypatch.setattr(size_fit.ContourBundle, "linearize", stopped)
     words = ("acquire", placed, "--frames", "20:23", "--n-frames", "2", "--out", tmp_path / "b.toml", "--json")
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
     try:

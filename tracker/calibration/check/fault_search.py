@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
 from tracker.compute.threads import one_blas_thread
-from tracker.estimation.acquisition.contour_bundle import RigProblem, RigState
+from tracker.estimation.acquisition.contour_bundle import ContourBundle, RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.bundle import ArrowEquations, BundleFit, settle_bundle, solve_bundle
 from tracker.geometry.arrays import Array
@@ -113,7 +113,7 @@ def as_tracked(frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameter
 class FittedRig(NamedTuple):
     """A rig that was fitted."""
 
-    problem: RigProblem
+    problem: ContourBundle
     state: RigState
     equations: ArrowEquations
     """Normal equations there; they are the same whatever is free."""
@@ -171,7 +171,7 @@ class FaultSearch:
             kept.append(found[0])
             state = found[1].state
 
-    def total(self, problem: RigProblem, selection: Selection) -> float:
+    def total(self, problem: ContourBundle, selection: Selection) -> float:
         """Return the cost of a selection on the evidence of a problem, with the worth that its faults need."""
         faults = [k.fault for k in selection.kept]
         return self._solved(problem, selection.fit.state, faults).cost + sum(map(_needed, faults))
@@ -182,10 +182,10 @@ class FaultSearch:
         """Fit poses, sizes and chosen corrections, on the evidence that the state accepts or on all."""
         return self._solved(self._problem(state, chosen, accepts), state, chosen, steps)
 
-    def _problem(self, state: RigState, chosen: Collection[Fault], accepts: bool = True) -> RigProblem:
+    def _problem(self, state: RigState, chosen: Collection[Fault], accepts: bool = True) -> ContourBundle:
         """Return the problem of the evidence that a state accepts, or of all, in which chosen corrections are free."""
         seen = seen_people(self._frames, state if accepts else None)
-        return RigProblem(seen, self._parameters, self._sigmas, state.corrections).with_free(_columns(chosen))
+        return ContourBundle(seen, self._parameters, state.corrections, self._sigmas).with_free(_columns(chosen))
 
     def settled(self, selection: Selection) -> Selection:
         """Fit the faults of a selection to where the gradient vanishes, on the evidence that its state accepts."""
@@ -201,7 +201,7 @@ class FaultSearch:
         return self._solved(fit.problem, fit.state, chosen, steps, fit.equations)
 
     def _solved(
-        self, problem: RigProblem, state: RigState, chosen: Collection[Fault], steps: int = EFFORT.steps,
+        self, problem: ContourBundle, state: RigState, chosen: Collection[Fault], steps: int = EFFORT.steps,
         known: ArrowEquations | None = None,
     ) -> FittedRig:  # fmt: skip
         problem = problem.with_free(_columns(chosen))
@@ -266,7 +266,7 @@ def _columns(faults: Collection[Fault]) -> NDArray[np.int64]:
     return np.concatenate([np.zeros(0, np.int64), *(h.columns for h in faults)])
 
 
-def _fitted(problem: RigProblem, found: BundleFit[RigState]) -> FittedRig:
+def _fitted(problem: ContourBundle, found: BundleFit[RigState]) -> FittedRig:
     shared, own = problem.free(found.state, found.equations)
     n = found.state.corrections.size
     every = np.concatenate([np.ones(n, np.bool_), shared[n:]])

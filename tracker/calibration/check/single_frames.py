@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.calibration.check.fault_search import EFFORT, LEAST_GAIN
 from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
-from tracker.estimation.acquisition.contour_bundle import RigProblem, RigState
+from tracker.estimation.acquisition.contour_bundle import ContourBundle, RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS
@@ -42,7 +42,7 @@ def score_frame(
         sigmas: standard deviations of corrections in their prior, (N_CORRECTIONS,).
     """
     state = RigState(corrections, tuple(sizes), tuple(b.values for b in frame.bodies))
-    problem = RigProblem(seen_people([frame]), parameters, sigmas, corrections, with_sizes=False)
+    problem = ContourBundle(seen_people([frame]), parameters, corrections, sigmas, kinds=())
     found = solve_bundle(problem, state, EFFORT.steps, least_gain=LEAST_GAIN)
     n = corrections.size
     cameras = np.arange(len(found.equations.gradient)) < n

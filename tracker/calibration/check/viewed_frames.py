@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.body.motion.pose_path import PosePath
-from tracker.estimation.acquisition.contour_bundle import RigState, SeenPerson
+from tracker.estimation.acquisition.contour_bundle import RigState, SeenPerson, later
 from tracker.estimation.acquisition.from_contours import own_views
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.images.edge_segments import accept_segments
@@ -47,18 +47,13 @@ def seen_people(frames: Sequence[ViewedFrame], state: RigState | None = None) ->
         else:
             bodies = tuple(PosedBody(b.model, next(poses)) for b in seen.bodies)
             views = [
-                _accepted(view, _then(bodies, seen.paths, ahead_s + later_s(c, seen.time_s)), c)
+                _accepted(view, later(bodies, seen.paths, ahead_s + later_s(c, seen.time_s)), c)
                 for view, ahead_s, c in zip(seen.views, seen.ahead_s, state.corrections, strict=True)
             ]
-        for person, path in enumerate(seen.paths):
+        for person in range(len(bodies)):
             own = own_views(views, bodies, person) if len(bodies) > 1 else views
-            out.append(SeenPerson(seen.frame, person, own, bodies, path, seen.time_s, seen.ahead_s))
+            out.append(SeenPerson(person, own, bodies, seen.paths, seen.time_s, seen.ahead_s))
     return out
-
-
-def _then(bodies: Sequence[PosedBody], paths: Sequence[PosePath], delay_s: float) -> list[PosedBody]:
-    """Return people as they are some time later."""
-    return [PosedBody(b.model, b.model.retract(b.values, p.step(delay_s))) for b, p in zip(bodies, paths, strict=True)]
 
 
 def _accepted(view: ViewEvidence, bodies: Sequence[PosedBody], correction: Array) -> ViewEvidence:

@@ -12,6 +12,7 @@ __all__ = [
     "from_keypoints",
     "from_voxels",
     "part_motions",
+    "piece_sums",
     "segment_lengths",
     "size_fit",
     "size_parameters",

@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody, parts_of
-from tracker.estimation.acquisition.part_motions import motions_by_unknowns, sum_motions, to_unknowns
+from tracker.estimation.acquisition.part_motions import motions_by_unknowns
+from tracker.estimation.acquisition.piece_sums import GroupSums, sums_of_views
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.contour_residuals import MatchSettings, PieceSums
 from tracker.evidence.contours import occluding_contours
@@ -55,11 +56,13 @@ def _information(
 ) -> Array:
     """Return the information matrix of the sizes by the visible contours of a frame, (n_sizes, n_sizes)."""
     body, (model, kinematics) = bodies[person], (bodies[person].model, bodies[person].kinematics)
-    first = parts_of([b.model for b in bodies], person).start
-    pieces = [(c, _visible_pieces(occluding_contours.trace(bodies, c), first, body, c)) for c in cameras]
-    b, M = sum_motions(pieces, model, kinematics)
-    by_sizes = parameters.derivatives(np.zeros(len(parameters.names)))
-    H, n = to_unknowns(motions_by_unknowns(model, kinematics, by_sizes), b, M)[1], len(parameters.names)
+    first, n = parts_of([b.model for b in bodies], person).start, len(parameters.names)
+    J = motions_by_unknowns(model, kinematics, parameters.derivatives(np.zeros(n)))
+    contours = [occluding_contours.trace(bodies, c) for c in cameras]
+    views = [(c, _visible_pieces(contour, first, body, c)) for c, contour in zip(cameras, contours, strict=True)]
+    sums = GroupSums.zeros(0, J.shape[2])
+    sums.add_body(sums_of_views(views, model, kinematics, J.shape[1]), J, np.zeros((0, J[:, :, 0].size)))
+    H = sums.hessian
     by_pose = H[n:, n:] + np.eye(model.n_dofs) * _POSE_WEIGHT
     return np.asarray(H[:n, :n] - H[:n, n:] @ np.linalg.solve(by_pose, H[n:, :n]))
 
@@ -78,5 +81,5 @@ def _visible_pieces(contour: occluding_contours.Contour, first: int, body: Posed
     local = np.einsum("nji,nj->ni", T[:, :3, :3], contour.points_world[own] - T[:, :3, 3])
     unit_points = (local - model.centers_part[parts]) / np.array([s.half_axes for s in model.shapes])[parts]
     weights = MatchSettings().information_per_px * lengths
-    squares = weights[:, None, None] * normals[:, :, None] * normals[:, None, :]
+    squares = np.asarray(weights[:, None, None] * normals[:, :, None] * normals[:, None, :], np.float64)
     return PieceSums(parts, middles[own].astype(np.float64), unit_points, np.zeros((len(parts), 2)), squares)

@@ -8,103 +8,19 @@ These are the part's `N_MOTIONS` motions: a spatial rotation and translation, th
 Residuals are summed by the motions of each part first, and then converted to all unknowns.
 """
 
-import itertools
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.estimation.acquisition.size_parameters import DIFFERENCE, SizeArrays
-from tracker.estimation.fitting.contour_residuals import PieceSums
 from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.cameras import Camera, project_with_jacobian
 from tracker.geometry.rigid import skew
 from tracker.geometry.shapes import EllipticalCone, Shape, TaperedSuperquadric
 
 N_MOTIONS = 13
 """Number of motions of a part: 3 of rotation, 3 of translation, 3 half-axes, 2 tapers, 2 exponents."""
-
-
-def sum_motions(
-    views: Sequence[tuple[Camera, PieceSums]], body: BodyModel, kinematics: Kinematics, with_shapes: bool = True
-) -> tuple[Array, Array]:
-    """Sum the residuals of pieces by the motions of the parts.
-
-    Args:
-        views: camera of each view, in the pixels of its residuals, and these.
-        body: the body at its present sizes.
-        kinematics: of its pose.
-        with_shapes: whether tapers and exponents are among the motions; else those columns stay 0.
-
-    Returns:
-        Gradients, (n_parts, N_MOTIONS), and normal matrices, (n_parts, N_MOTIONS, N_MOTIONS).
-    """
-    rows = rows_of_pieces(views, body, kinematics, with_shapes)
-    return rows.sums(len(body.parts))
-
-
-class PieceRows(NamedTuple):
-    """Residuals at pieces of contour of several views, with derivatives of their images."""
-
-    parts: IntArray
-    """Index of the part of each piece, (N,)."""
-    points_world: Array
-    """Middle of each piece, (N, 3), metres."""
-    px_by_point: Array
-    """Derivative of its image by it, (N, 2, 3), px per metre."""
-    gradients: Array
-    """Derivative of the cost by the image, (N, 2), per px."""
-    hessians: Array
-    """Second derivative by it, (N, 2, 2), per px^2."""
-    rows: Array
-    """Derivative of the image by k motions, (N, 2, k)."""
-
-    def sums(self, n_parts: int) -> tuple[Array, Array]:
-        """Sum the residuals by part: gradients, (n_parts, k), and normal matrices, (n_parts, k, k)."""
-        k = self.rows.shape[2]
-        b, M = np.zeros((n_parts, k)), np.zeros((n_parts, k, k))
-        order = np.argsort(self.parts, kind="stable")
-        bounds = np.searchsorted(self.parts[order], np.arange(n_parts + 1))
-        rows = self.rows[order]
-        pulls = np.einsum("ni,nik->nk", self.gradients[order], rows)
-        weighted = (self.hessians[order] @ rows).reshape(-1, k)
-        rows = rows.reshape(-1, k)
-        for part, (first, last) in enumerate(itertools.pairwise(bounds)):
-            if first < last:
-                b[part] = pulls[first:last].sum(axis=0)
-                M[part] = rows[2 * first : 2 * last].T @ weighted[2 * first : 2 * last]
-        return b, M
-
-
-def rows_of_pieces(
-    views: Sequence[tuple[Camera, PieceSums]], body: BodyModel, kinematics: Kinematics, with_shapes: bool = True
-) -> PieceRows:
-    """Differentiate the images of pieces by the motions of their parts; arguments as in `sum_motions`."""
-    sums = [s.pulled for _, s in views]
-    parts, _, unit_points, gradients, hessians = (np.concatenate(fields) for fields in zip(*sums, strict=True))
-    half_axes, Ts = np.array([s.half_axes for s in body.shapes]), kinematics.Ts_world_part[parts]
-    local = body.centers_part[parts] + unit_points * half_axes[parts]
-    points = np.einsum("nij,nj->ni", Ts[:, :3, :3], local) + Ts[:, :3, 3]
-    firsts = np.cumsum([0] + [len(s.parts) for s in sums])
-    px_by_point = np.concatenate(
-        [
-            project_with_jacobian(camera.T_camera_world, camera.K, points[i:k])[1]
-            for (camera, _), i, k in zip(views, firsts[:-1], firsts[1:], strict=True)
-        ]
-    )
-    moved = motions_of_points(body.shapes, parts, Ts, points, unit_points, with_shapes)
-    return PieceRows(parts, points, px_by_point, gradients, hessians, px_by_point @ moved)
-
-
-def to_unknowns(J: Array, b: Array, M: Array) -> tuple[Array, Array]:
-    """Convert sums over the motions of all parts, by the derivatives (n_parts, N_MOTIONS, n), to n unknowns.
-
-    Returns:
-        Gradient, (n,), and normal matrix, (n, n).
-    """
-    return np.einsum("pik,pi->k", J, b), np.sum(J.transpose(0, 2, 1) @ M @ J, axis=0)
 
 
 def points_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
@@ -114,17 +30,23 @@ def points_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArra
     return np.concatenate([origins, landmarks])
 
 
-def motions_by_unknowns(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
-    """Differentiate the motions of all parts by the sizes and then the pose, (n_parts, N_MOTIONS, n_sizes + n_dofs)."""
-    return np.concatenate([motions_by_sizes(model, kinematics, by_sizes), motions_by_pose(model, kinematics)], axis=2)
+def motions_by_unknowns(
+    model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays, with_shapes: bool = True
+) -> Array:
+    """Differentiate the motions of all parts by the sizes and then the pose, (n_parts, N_MOTIONS, n_sizes + n_dofs).
+
+    Without shapes, tapers and exponents are left out of the motions.
+    """
+    own = motions_by_sizes(model, kinematics, by_sizes, with_shapes)
+    return np.concatenate([own, motions_by_pose(model, kinematics)[:, : own.shape[1]]], axis=2)
 
 
-def motions_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
-    """Differentiate the motions of all parts by the sizes, (n_parts, N_MOTIONS, n_sizes)."""
+def motions_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays, with_shapes: bool = True) -> Array:
+    """Differentiate the motions of all parts by the sizes, (n_parts, N_MOTIONS, n_sizes); see `motions_by_unknowns`."""
     Rs, origins = kinematics.Ts_world_part[:, :3, :3], _origins_by_sizes(model, kinematics, by_sizes)
     still = np.zeros_like(origins)
-    parts = [still, origins + Rs @ by_sizes.centers, by_sizes.half_axes, by_sizes.tapers, by_sizes.exponents]
-    return np.concatenate(parts, axis=1)
+    shapes = [by_sizes.tapers, by_sizes.exponents] if with_shapes else []
+    return np.concatenate([still, origins + Rs @ by_sizes.centers, by_sizes.half_axes, *shapes], axis=1)
 
 
 def motions_by_pose(model: BodyModel, kinematics: Kinematics) -> Array:
@@ -138,31 +60,21 @@ def motions_by_pose(model: BodyModel, kinematics: Kinematics) -> Array:
     return out
 
 
-def motions_of_points(
-    shapes: Sequence[Shape], parts: IntArray, Ts_world_part: Array, points_world: Array, unit_points: Array,
-    with_shapes: bool = True,
-) -> Array:  # fmt: skip
-    """Differentiate points on the surface of parts by the motions of their part.
+def shape_derivatives(shapes: Sequence[Shape], parts: IntArray, unit_points: Array, with_shapes: bool = True) -> Array:
+    """Differentiate points on the surface of parts by tapers and exponents, in the frame of their part.
 
     Args:
         shapes: of all parts.
         parts: index of the part of each point, (N,).
-        Ts_world_part: pose of the part of each point, (N, 4, 4).
-        points_world: the points, (N, 3), metres.
-        unit_points: the same in the unit coordinates of their part, (N, 3).
-        with_shapes: whether to differentiate by tapers and exponents; else these are 0.
+        unit_points: the points in the unit coordinates of their part, (N, 3).
+        with_shapes: whether to differentiate; else there is no column.
 
     Returns:
-        (N, 3, N_MOTIONS), metres per radian, metre, or 1.
+        (N, 3, 4), metres per 1; (N, 3, 0) without shapes.
     """
-    out, Rs = np.zeros((len(points_world), 3, N_MOTIONS)), Ts_world_part[:, :3, :3]
-    out[:, :, :3] = -skew(points_world)  # omega x X
-    out[:, :, 3:6] = np.eye(3)
-    out[:, :, 6:9] = Rs * unit_points[:, None, :]
-    if with_shapes:
-        for part in np.unique(parts):
-            at = parts == part
-            out[at, :, 9:] = Rs[at] @ _shape_derivatives(shapes[part], unit_points[at])
+    out = np.zeros((len(parts), 3, 4 if with_shapes else 0))
+    for part in np.unique(parts) if with_shapes else ():
+        out[parts == part] = _shape_derivatives(shapes[part], unit_points[parts == part])
     return out
 
 

@@ -100,6 +100,11 @@ class PointTargets:
         r = (points_world - self.targets_world) * self.weights[:, None]
         return normal_equations(r.ravel(), J.reshape(-1, model.n_dofs))
 
+    def residuals(self, model: BodyModel, kinematics: Kinematics) -> tuple[Array, Array]:
+        """Return the weighted residuals, (N, 3), and their derivatives by the points, (N, 3, 3), per metre."""
+        r = (model.points_at(kinematics, self.points) - self.targets_world) * self.weights[:, None]
+        return r, self.weights[:, None, None] * np.eye(3)
+
 
 @dataclass(frozen=True, eq=False)
 class PosePrior:

@@ -1,18 +1,20 @@
-"""The fit of a rig: sums of a kernel against those of numpy, and the derivatives of its cost."""
+"""The fit of people and cameras: sums of a kernel against those of numpy, and the derivatives of its cost."""
 
 import numpy as np
 import pytest
-from rig_oracle import columns
+from rig_oracle import columns, motions_of_points, sums_of_rows
 from rig_scenes import CAMERAS, viewed
 
 from tracker.calibration.check.fault_search import prior_sigmas
 from tracker.calibration.check.viewed_frames import seen_people
-from tracker.estimation.acquisition.contour_bundle import GroupSums, RigProblem, RigState, part_motions, sums_of_pieces
-from tracker.estimation.acquisition.part_motions import rows_of_pieces
-from tracker.estimation.acquisition.piece_kernels import N_PART, OF_CAMERA, OF_PART, _camera_motions
+from tracker.estimation.acquisition.contour_bundle import ContourBundle, RigState
+from tracker.estimation.acquisition.part_motions import N_MOTIONS, motions_by_unknowns
+from tracker.estimation.acquisition.piece_kernels import OF_CAMERA, OF_PART, _camera_motions
+from tracker.estimation.acquisition.piece_sums import GroupSums, SeenPieces, sums_of_views
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.geometry.camera_correction import DRIFT, N_CORRECTIONS, ROTATION, TIME, corrected
+from tracker.geometry.cameras import project_with_jacobian
 from tracker.geometry.rigid import so3_exp
 
 CORRECTION = np.array([0.004, -0.003, 0.002, 0.01, -0.005, 0.01, 0.003, 0.0, 0.0])
@@ -26,44 +28,50 @@ def pieces():
     return ContourResiduals([frame.views[0]], frame.bodies).piece_sums(body.kinematics, camera=camera)[1], body, camera
 
 
-def summed(pieces):
+def summed(pieces, with_shapes):
     """The pieces summed by the kernel, and all of their columns: those of the part and then of its camera, by ours."""
     sums, body, camera = pieces
-    half_axes = np.array([s.half_axes for s in body.model.shapes])
-    found, all_columns = sums_of_pieces(sums, body.model, body.kinematics, camera, half_axes), np.zeros((16, 10))
-    all_columns[:N_PART, OF_PART] = np.eye(N_PART)
-    all_columns[N_PART:, OF_CAMERA] = _camera_motions(camera.T_camera_world, so3_exp(CORRECTION[ROTATION]))
+    n = N_MOTIONS if with_shapes else 9
+    (found,), all_columns = sums_of_views([(camera, sums)], body.model, body.kinematics, n), np.zeros((n + TIME, n + 1))
+    all_columns[:n, OF_PART] = np.eye(n)
+    all_columns[n:, OF_CAMERA] = _camera_motions(camera.T_camera_world, so3_exp(CORRECTION[ROTATION]))
     return found, all_columns
 
 
-def test_the_kernel_sums_as_numpy_does(pieces):
+@pytest.mark.parametrize("with_shapes", [False, True])
+def test_the_kernel_sums_as_numpy_does(pieces, with_shapes):
     sums, body, camera = pieces
-    (b, M), columns_of = summed(pieces)
-    rows = rows_of_pieces([(camera, sums)], body.model, body.kinematics, with_shapes=False)
-    of_camera = columns(camera, CORRECTION, rows.points_world, rows.px_by_point)
-    rows = rows._replace(rows=np.concatenate([rows.rows[:, :, :N_PART], of_camera], axis=2))
-    expected_b, expected_M = rows.sums(len(body.model.parts))
+    (b, M), columns_of = summed(pieces, with_shapes)
+    Ts, shapes = body.kinematics.Ts_world_part[sums.parts], body.model.shapes
+    local = body.model.centers_part[sums.parts] + sums.unit_points * np.array([s.half_axes for s in shapes])[sums.parts]
+    points = np.einsum("nij,nj->ni", Ts[:, :3, :3], local) + Ts[:, :3, 3]
+    px_by_point = project_with_jacobian(camera.T_camera_world, camera.K, points)[1]
+    of_part = px_by_point @ motions_of_points(shapes, sums.parts, Ts, points, sums.unit_points, with_shapes)
+    rows = np.concatenate([of_part, columns(camera, CORRECTION, points, px_by_point)], axis=2)
+    expected_b, expected_M = sums_of_rows(sums, rows, len(shapes))
     np.testing.assert_allclose(b @ columns_of.T, expected_b, rtol=1e-9, atol=1e-9 * np.abs(expected_b).max())
     found_M = columns_of @ M @ columns_of.T
     np.testing.assert_allclose(found_M, expected_M, rtol=1e-9, atol=1e-9 * np.abs(expected_M).max())
 
 
-def test_sums_are_converted_as_all_columns_at_once(pieces):
+@pytest.mark.parametrize("with_shapes", [False, True])
+def test_sums_are_converted_as_all_columns_at_once(pieces, with_shapes):
     _, body, camera = pieces
     parameters, velocity = SizeParameters(body.model), np.random.default_rng(1).normal(size=body.model.n_dofs)
     by_sizes = parameters.derivatives(np.zeros(len(parameters.names)))
-    J = part_motions(body.model, body.kinematics, by_sizes)
-    sums, columns_of = summed(pieces)
+    J = motions_by_unknowns(body.model, body.kinematics, by_sizes, with_shapes)
+    sums, columns_of = summed(pieces, with_shapes)
     moving = J[:, :, -len(velocity) :] @ velocity
-    found = GroupSums.zeros(2 * N_CORRECTIONS, J.shape[2], len(J))
-    found.add_camera(1, sums, camera, CORRECTION, moving, 0.7)
-    found.add_body(sums, J)
-    n_parts, n = len(J), 2 * N_CORRECTIONS + J.shape[2]
+    found = GroupSums.zeros(2 * N_CORRECTIONS, J.shape[2])
+    by_parts = np.zeros((2 * N_CORRECTIONS, J.shape[0] * J.shape[1]))
+    found.add_camera(SeenPieces(1, camera, 0.0, pieces[0]), sums, CORRECTION, moving, 0.7, by_parts)
+    found.add_body([sums], J, by_parts)
+    n_parts, n_motions, n = len(J), J.shape[1], 2 * N_CORRECTIONS + J.shape[2]
     whole = np.zeros((n_parts, len(columns_of), n))
-    whole[:, :N_PART, 2 * N_CORRECTIONS :] = J
-    whole[:, N_PART:, N_CORRECTIONS : N_CORRECTIONS + TIME] = np.eye(TIME)
-    whole[:, :N_PART, N_CORRECTIONS + TIME] = moving
-    whole[:, :N_PART, N_CORRECTIONS + DRIFT] = 0.7 * moving
+    whole[:, :n_motions, 2 * N_CORRECTIONS :] = J
+    whole[:, n_motions:, N_CORRECTIONS : N_CORRECTIONS + TIME] = np.eye(TIME)
+    whole[:, :n_motions, N_CORRECTIONS + TIME] = moving
+    whole[:, :n_motions, N_CORRECTIONS + DRIFT] = 0.7 * moving
     whole = columns_of.T @ whole
     equations = found.equations(0.0)
     np.testing.assert_allclose(equations.gradient, np.einsum("pik,pi->k", whole, sums.b), atol=1e-6)
@@ -78,7 +86,7 @@ def test_the_gradient_by_a_correction_is_the_slope_of_the_cost(column):
     state = RigState(
         np.zeros((4, N_CORRECTIONS)), (np.zeros(len(parameters[0].names)),), tuple(f.bodies[0].values for f in frames)
     )
-    problem = RigProblem(seen_people(frames), parameters, prior_sigmas(30.0), state.corrections)
+    problem = ContourBundle(seen_people(frames), parameters, state.corrections, prior_sigmas(30.0))
 
     def cost(h):
         step = np.zeros(problem.n_shared)
@@ -93,7 +101,7 @@ def test_where_the_cost_is_not_low_enough_it_is_all_that_is_found():
     frames = viewed({}, [0])
     parameters = [SizeParameters(frames[0].bodies[0].model)]
     state = RigState(np.zeros((4, N_CORRECTIONS)), (np.zeros(len(parameters[0].names)),), (frames[0].bodies[0].values,))
-    problem = RigProblem(seen_people(frames), parameters, prior_sigmas(30.0), state.corrections)
+    problem = ContourBundle(seen_people(frames), parameters, state.corrections, prior_sigmas(30.0))
     whole = problem.linearize(state)
     dear, cheap = (problem.linearize(state, below) for below in (whole.cost, whole.cost + 1e-6))
     assert dear.cost == cheap.cost == whole.cost

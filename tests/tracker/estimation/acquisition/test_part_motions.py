@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from rig_oracle import motions_of_points
 from staging import posed
 
 from tracker.estimation.acquisition.part_motions import (
     motions_by_pose,
     motions_by_sizes,
-    motions_of_points,
     points_by_sizes,
 )
 from tracker.estimation.acquisition.size_parameters import SizeParameters
