@@ -15,7 +15,6 @@ from tracker.geometry.camera_correction import (
     in_units,
     with_step,
 )
-from tracker.geometry.cameras import project_with_jacobian
 from tracker.geometry.rigid import so3_exp
 
 CAMERA = camera_at("A", (4.0, 0.5, 1.0))
@@ -39,8 +38,7 @@ def test_nothing_is_corrected_by_nothing():
 
 def test_columns_are_the_differences_of_a_further_step():
     camera = corrected(CAMERA, CORRECTION)
-    px_by_point = project_with_jacobian(camera.T_camera_world, camera.K, POINTS)[1]
-    found = columns(camera, CORRECTION, POINTS, px_by_point)
+    found = columns(camera, CORRECTION, POINTS)
     for i, step in enumerate(1e-6 * np.eye(N_CORRECTIONS)[:TIME]):
         after, before = (corrected(CAMERA, with_step(CORRECTION, s * step)).project(POINTS) for s in (1, -1))
         np.testing.assert_allclose(found[:, :, i], (after - before) / 2e-6, rtol=1e-4, atol=1e-3)

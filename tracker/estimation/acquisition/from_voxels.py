@@ -20,6 +20,7 @@ from tracker.estimation.acquisition.figure_motions import TIPS, FigureSizes, fig
 from tracker.estimation.acquisition.part_motions import points_by_sizes
 from tracker.estimation.acquisition.size_fit import SizeStart
 from tracker.estimation.acquisition.size_parameters import SizeArrays, SizeParameters
+from tracker.estimation.fitting.bundle import ArrowEquations
 from tracker.estimation.fitting.gauss_newton import NormalEquations, PosePrior
 from tracker.estimation.voxel.body_pose import state_of
 from tracker.estimation.voxel.frame_voxels import FrameVoxels, carve_around
@@ -30,7 +31,7 @@ from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.estimation.voxel.state import FilterState
 from tracker.evidence.contours.body_silhouette import body_silhouette
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.geometry.arrays import Array, intersection_over_union
+from tracker.geometry.arrays import Array, Mask, intersection_over_union
 
 _KINDS = ("height", "build", "length", "girth", "free_end")
 """Kinds of sizes that voxels show; the places of joints in the flesh are left to the contours."""
@@ -105,7 +106,7 @@ def fit_sizes_to_voxels(
         TrackerError: the body lacks the joints of ten parts, or no frame shows voxels near it.
     """
     sizes, poses = np.zeros(len(parameters.names)), [f.bodies[0].values for f in frames]
-    free, overlaps, covariance = np.flatnonzero(parameters.of_kinds(*_KINDS)), list[float](), np.eye(len(sizes))
+    free, overlaps, covariance = parameters.of_kinds(*_KINDS), list[float](), np.eye(len(sizes))
     by_figure = figure_by_sizes(parameters, sizes)  # hardly changes with the sizes
     for number in range(settings.rounds + 1):
         report(number / (settings.rounds + 1))
@@ -135,24 +136,22 @@ def _linearized(problems: Sequence["_Frame"], by_sizes: SizeArrays, by_figure: F
 
 
 def _step(
-    parameters: SizeParameters, sizes: Array, free: NDArray[np.int64], frames: Sequence[NormalEquations]
-) -> tuple[Array, list[Array], Array]:
+    parameters: SizeParameters, sizes: Array, free: Mask, frames: Sequence[NormalEquations]
+) -> tuple[Array, Array, Array]:
     """Solve for the sizes that are free with the poses eliminated.
 
     Returns:
-        The step of the sizes, (n_sizes,), that of each pose, (n_dofs,), and the covariance, (n_sizes, n_sizes).
+        The step of the sizes, (n_sizes,), that of each pose, (F, n_dofs), and the covariance, (n_sizes, n_sizes).
     """
     n, precision = len(sizes), 1 / parameters.sigmas**2
-    H, g, eliminated = np.diag(precision), -precision * sizes, list[Array]()
-    for f in frames:
-        solved = np.linalg.solve(f.hessian[n:, n:], np.column_stack([f.hessian[n:, :n], -f.gradient[n:]]))
-        H += f.hessian[:n, :n] - f.hessian[:n, n:] @ solved[:, :n]
-        g -= f.gradient[:n] + f.hessian[:n, n:] @ solved[:, n]
-        eliminated.append(np.asarray(solved, dtype=np.float64))
-    step, covariance = np.zeros(n), np.diag(1 / precision)
-    own = np.asarray(np.linalg.inv(H[np.ix_(free, free)]), dtype=np.float64)
-    step[free], covariance[np.ix_(free, free)] = own @ g[free], own
-    return step, [s[:, n] - s[:, :n] @ step for s in eliminated], covariance
+    equations = ArrowEquations.zeros(n, len(frames), parameters.base.n_dofs)
+    equations.gradient[:], equations.hessian[:] = precision * sizes, np.diag(precision)
+    for i, of_frame in enumerate(frames):
+        equations.add(i, of_frame)
+    held = equations.held(free, np.ones(equations.own_gradients.shape, np.bool_))
+    covariance, at = np.diag(1 / precision), np.ix_(free, free)
+    covariance[at] = np.linalg.inv(held.reduced()[1][at])
+    return *held.step(0.0), covariance
 
 
 class _FrameEquations(NamedTuple):

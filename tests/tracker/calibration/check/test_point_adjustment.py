@@ -7,12 +7,7 @@ from scipy.sparse import lil_matrix
 from seen_points import cloud, moved_rig, ring_of, seen_points
 
 from tracker.calibration.check.lens_priors import CALIBRATED, prior_sigmas
-from tracker.calibration.check.point_adjustment import (
-    KnownLength,
-    PointProblem,
-    adjust_points,
-    triangulate_all,
-)
+from tracker.calibration.check.point_adjustment import KnownLength, PointProblem, adjust_points, triangulate_all
 from tracker.calibration.check.reprojection import Observations, Prior, Rig
 from tracker.errors import CalibrationError
 from tracker.estimation.fitting.bundle import solve_bundle

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from rig_scenes import FPS
 
-from tracker.body.motion.velocity import velocity
 from tracker.calibration.check.fault_search import prior_sigmas
 from tracker.calibration.check.single_frames import FrameScore, find_change
 from tracker.calibration.check.viewed_frames import spread_poses
-from tracker.formats.model_toml import load_model
 from tracker.geometry.camera_correction import N_CORRECTIONS
 
 SIGMAS = prior_sigmas(FPS)
@@ -61,10 +59,3 @@ def test_poses_are_as_different_as_possible():
     assert spread_poses(joints, 50) == [*range(12)]
     assert len(spread_poses(joints, 50, apart_m=0.1)) == 4
     assert len(spread_poses(joints, 50, apart_m=0.1, fewest=6)) == 6
-
-
-def test_a_velocity_is_that_of_an_even_motion():
-    model = load_model("gavrila22", 1.7)
-    step = np.random.default_rng(0).normal(scale=0.02, size=model.n_dofs)
-    poses = {i: model.retract(model.neutral(), i * step) for i in range(5)}
-    np.testing.assert_allclose(25.0 * velocity(model, poses, 2), 25.0 * step, atol=1e-2)

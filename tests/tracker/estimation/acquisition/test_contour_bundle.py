@@ -5,16 +5,16 @@ import pytest
 from rig_oracle import columns, motions_of_points, sums_of_rows
 from rig_scenes import CAMERAS, viewed
 
-from tracker.calibration.check.fault_search import prior_sigmas
+from tracker.calibration.check.fault_search import as_tracked, prior_sigmas
 from tracker.calibration.check.viewed_frames import seen_people
-from tracker.estimation.acquisition.contour_bundle import ContourBundle, RigState
+from tracker.estimation.acquisition.contour_bundle import ContourBundle
 from tracker.estimation.acquisition.part_motions import N_MOTIONS, motions_by_unknowns
 from tracker.estimation.acquisition.piece_kernels import OF_CAMERA, OF_PART, _camera_motions
 from tracker.estimation.acquisition.piece_sums import GroupSums, SeenPieces, sums_of_views
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
+from tracker.geometry.camera_columns import project_with_columns
 from tracker.geometry.camera_correction import DRIFT, N_CORRECTIONS, ROTATION, TIME, corrected
-from tracker.geometry.cameras import project_with_jacobian
 from tracker.geometry.rigid import so3_exp
 
 CORRECTION = np.array([0.004, -0.003, 0.002, 0.01, -0.005, 0.01, 0.003, 0.0, 0.0])
@@ -43,11 +43,12 @@ def test_the_kernel_sums_as_numpy_does(pieces, with_shapes):
     sums, body, camera = pieces
     (b, M), columns_of = summed(pieces, with_shapes)
     Ts, shapes = body.kinematics.Ts_world_part[sums.parts], body.model.shapes
-    local = body.model.centers_part[sums.parts] + sums.unit_points * np.array([s.half_axes for s in shapes])[sums.parts]
+    half_axes = np.array([s.half_axes for s in shapes])[sums.parts]
+    local = body.model.centers_part[sums.parts] + sums.unit_points * half_axes
     points = np.einsum("nij,nj->ni", Ts[:, :3, :3], local) + Ts[:, :3, 3]
-    px_by_point = project_with_jacobian(camera.T_camera_world, camera.K, points)[1]
-    of_part = px_by_point @ motions_of_points(shapes, sums.parts, Ts, points, sums.unit_points, with_shapes)
-    rows = np.concatenate([of_part, columns(camera, CORRECTION, points, px_by_point)], axis=2)
+    of_part = motions_of_points(shapes, sums.parts, Ts, points, sums.unit_points, with_shapes)
+    by_point = project_with_columns(camera, points).by_point
+    rows = np.concatenate([by_point @ of_part, columns(camera, CORRECTION, points)], axis=2)
     expected_b, expected_M = sums_of_rows(sums, rows, len(shapes))
     np.testing.assert_allclose(b @ columns_of.T, expected_b, rtol=1e-9, atol=1e-9 * np.abs(expected_b).max())
     found_M = columns_of @ M @ columns_of.T
@@ -83,9 +84,7 @@ def test_sums_are_converted_as_all_columns_at_once(pieces, with_shapes):
 def test_the_gradient_by_a_correction_is_the_slope_of_the_cost(column):
     frames = viewed({1: CORRECTION}, [0, 1])
     parameters = [SizeParameters(frames[0].bodies[0].model)]
-    state = RigState(
-        np.zeros((4, N_CORRECTIONS)), (np.zeros(len(parameters[0].names)),), tuple(f.bodies[0].values for f in frames)
-    )
+    state = as_tracked(frames, parameters)
     problem = ContourBundle(seen_people(frames), parameters, state.corrections, prior_sigmas(30.0))
 
     def cost(h):
@@ -100,7 +99,7 @@ def test_the_gradient_by_a_correction_is_the_slope_of_the_cost(column):
 def test_where_the_cost_is_not_low_enough_it_is_all_that_is_found():
     frames = viewed({}, [0])
     parameters = [SizeParameters(frames[0].bodies[0].model)]
-    state = RigState(np.zeros((4, N_CORRECTIONS)), (np.zeros(len(parameters[0].names)),), (frames[0].bodies[0].values,))
+    state = as_tracked(frames, parameters)
     problem = ContourBundle(seen_people(frames), parameters, state.corrections, prior_sigmas(30.0))
     whole = problem.linearize(state)
     dear, cheap = (problem.linearize(state, below) for below in (whole.cost, whole.cost + 1e-6))
