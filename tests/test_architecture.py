@@ -145,6 +145,30 @@ def test_no_folder_is_crowded():
     assert {name: n for name, n in crowded.items() if n > (5 if name in ("tracker", "app") else 22)} == {}
 
 
+def test_rooms_look_up_their_own_markup():
+    """A script finds elements of its room, of index.html, and of rooms that it may import; no id is declared twice."""
+    declared = [
+        (identifier, path.relative_to(STATIC).parts[0])
+        for path in STATIC.rglob("*.html")
+        if path.name != "share.html"
+        for identifier in re.findall(r'\sid="([^"]+)"', path.read_text("utf-8"))
+    ]
+    room_of_id = dict(declared)
+    assert len(room_of_id) == len(declared)
+    looked_up = {
+        (script, identifier)
+        for script, text in SCRIPTS.items()
+        if page_room(script) != "share"
+        for identifier in re.findall(r'\b(?:byId|button)\("([^"]+)"', text)
+    }
+    higher = {
+        f"{script}: {identifier}"
+        for script, identifier in looked_up
+        if (room := room_of_id[identifier]) != "index.html" and PAGE_FLOOR[room] > PAGE_FLOOR[page_room(script)]
+    }
+    assert higher == set()
+
+
 def test_the_page_mounts_rooms():
     """main.js puts rooms together and knows no widget of theirs."""
     imported_by_main = page_imports("main.js")

@@ -56,7 +56,7 @@ PROSE = [
     *sorted(ROOT.glob("*.md")),
     *sorted((ROOT / "docs").glob("*.md")),
     *(STATIC / script for script in SCRIPTS),
-    STATIC / "index.html",
+    *sorted(STATIC.rglob("*.html")),
 ]
 
 

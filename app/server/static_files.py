@@ -7,7 +7,7 @@ import hashlib
 import re
 from pathlib import Path
 
-from app.server.page_bundle import bundle_script, bundle_styles
+from app.server.page_bundle import bundle_markup, bundle_script, bundle_styles
 from tracker.errors import TrackerError
 
 PREFIX = "static/"
@@ -90,12 +90,12 @@ class PageFiles:
 
     def _read(self) -> None:
         """Read and join the files, unless none has changed: they change while the page is developed."""
-        paths = [path for path in sorted(self._folder.rglob("*")) if path.suffix in _TYPES or path.name == _INDEX]
+        paths = [path for path in sorted(self._folder.rglob("*")) if path.suffix in (*_TYPES, ".html")]
         changed = {path: path.stat().st_mtime_ns for path in paths}
         if changed == self._changed:
             return
         files = {path.relative_to(self._folder).as_posix(): path.read_text("utf-8") for path in paths}
-        self._page = files[_INDEX]
+        self._page = bundle_markup(_INDEX, files)
         named = _NAMED.findall(self._page)
         joined = {
             name: bundle_script(name, files, named) if name.endswith(".js") else bundle_styles(name, files)

@@ -59,7 +59,6 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
     inspector.reveal("find"); // which offers a network first where only what moves shows the people
     if (context.store.facts.session?.has_outlines) context.send({ type: "find_people", action: "start" });
   };
-  button("first-find", findPeople);
   button("show-reason", () => inspector.reveal("reason"));
   const bindings = inArea("Inspector", [
     {
@@ -114,5 +113,5 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
       run: () => context.themes.choose(choice),
     })),
   ]);
-  return { inspector, bindings };
+  return { inspector, findPeople, bindings };
 }

@@ -1,6 +1,6 @@
 /** Popover of all layers, and switches of the most important ones in the top bar. */
 
-import { button, byId } from "../widgets/elements.js";
+import { byId } from "../widgets/elements.js";
 import { BY_KEY, LAYERS } from "../model/layers.js";
 import { opensPopover, slider, togglePopover } from "../widgets/popovers.js";
 
@@ -131,9 +131,9 @@ export class LayersMenu {
     reset.id = "reset-layers";
     reset.textContent = "Reset layers";
     reset.title = "Restore the default layers and opacities";
+    reset.addEventListener("click", () => this.#layers.reset());
     foot.append(hint, reset);
     this.#panel.append(foot);
-    button("reset-layers", () => this.#layers.reset());
   }
 }
 

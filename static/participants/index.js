@@ -9,6 +9,7 @@ import { alt, inArea } from "../widgets/key_matching.js";
 import { Here } from "./here.js";
 import { joinForm } from "./join_form.js";
 import { PlaceMarks } from "./place_marks.js";
+import { showRole } from "./role_badge.js";
 
 /** @typedef {ReturnType<typeof mount>} ParticipantsRoom */
 
@@ -18,6 +19,7 @@ import { PlaceMarks } from "./place_marks.js";
  * @param {import("../model/index.js").Context} context
  */
 export function mount(context) {
+  showRole(context.store);
   const here = new Here(context, joinForm(context, "panel"));
   new PlaceMarks(byId("timeline", HTMLElement), context.store);
   const bar = byId("join-bar", HTMLElement);

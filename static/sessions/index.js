@@ -4,7 +4,6 @@
  * The room imports `widgets` and types of `model`.
  */
 
-import { button } from "../widgets/elements.js";
 import { control, inArea } from "../widgets/key_matching.js";
 import { Sessions } from "./sessions.js";
 
@@ -17,7 +16,7 @@ import { Sessions } from "./sessions.js";
  */
 export function mount({ store, notify }) {
   const sessions = new Sessions(store, notify);
-  button("first-new-session", () => void sessions.showNew());
+  const showNew = () => void sessions.showNew();
   const bindings = inArea("History and help", [
     {
       keys: ["Ctrl O"],
@@ -32,8 +31,8 @@ export function mount({ store, notify }) {
       label: "New session from videos and a calibration",
       words: "new session… create recording footage form cameras",
       matches: () => false,
-      run: () => void sessions.showNew(),
+      run: showNew,
     },
   ]);
-  return { bindings, completes: (/** @type {HTMLInputElement} */ input) => sessions.completes(input) };
+  return { bindings, showNew, completes: (/** @type {HTMLInputElement} */ input) => sessions.completes(input) };
 }

@@ -24,9 +24,15 @@ export class FirstSteps {
   /** Whether the last state had a tracking run; null before the first state. */
   #wasTracking = /** @type {boolean | null} */ (null);
 
-  /** @param {import("../model/store.js").Store} store */
-  constructor(store) {
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {() => void} findPeople
+   * @param {() => void} newSession opens the form
+   */
+  constructor(store, findPeople, newSession) {
     this.#store = store;
+    button("first-find", findPeople);
+    button("first-new-session", newSession);
     button("close-first-steps", () => this.#close());
     this.#row.addEventListener("keydown", (event) => {
       if (event.key !== "Escape") return;

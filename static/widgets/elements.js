@@ -8,7 +8,7 @@
  */
 export function byId(id, kind) {
   const element = document.getElementById(id);
-  if (!(element instanceof kind)) throw new Error(`index.html has no ${kind.name} with id '${id}'`);
+  if (!(element instanceof kind)) throw new Error(`the page has no ${kind.name} with id '${id}'`);
   return element;
 }
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.server.page_bundle import bundle_script, bundle_styles
+from app.server.page_bundle import bundle_markup, bundle_script, bundle_styles
 from app.server.static_files import static_folder
 from tracker.errors import TrackerError
 
@@ -84,3 +84,14 @@ def test_no_style_sheet_of_the_page_is_left_to_be_imported():
     folder = static_folder()
     sheets = {p.relative_to(folder).as_posix(): p.read_text("utf-8") for p in folder.rglob("*.css")}
     assert "@import" not in bundle_styles("styles/index.css", sheets)
+
+
+def test_markup_of_rooms_stands_where_the_page_names_it():
+    files = {
+        "index.html": "<body>\n  <!-- a comment -->\n  <!-- rooms/bar.html -->\n</body>\n",
+        "rooms/bar.html": "<p>\n  <!-- rooms/inner.html -->\n</p>",
+        "rooms/inner.html": "<b>bold</b>",
+    }
+    assert bundle_markup("index.html", files) == "<body>\n  <!-- a comment -->\n<p>\n<b>bold</b>\n</p>\n</body>\n"
+    with pytest.raises(TrackerError, match=r"expected the page's file static/rooms/inner.html"):
+        bundle_markup("index.html", {name: text for name, text in files.items() if name != "rooms/inner.html"})
