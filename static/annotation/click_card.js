@@ -1,8 +1,7 @@
 /** The next best click: asked for, gone to, with its reason and its gain in words. */
 
-import { textButton } from "../inspector/rows.js";
+import { make, textButton } from "../widgets/elements.js";
 import { capital } from "../widgets/text.js";
-import { make } from "./parts.js";
 
 /** @typedef {import("../model/protocol.js").ClickProposal} Proposal */
 
@@ -23,10 +22,8 @@ export function clickCard({ store, send }, visits) {
   };
   const button = textButton("Next best click", "Go to the frame and limb where a correction lowers the expected error most (Alt+C)", ask);
   const again = textButton("Show it", "Go to the proposed limb again", () => visit());
-  const buttons = make("div", "plan-buttons click-card");
-  buttons.append(button, again);
-  const text = make("p", "section-note click-card");
-  text.setAttribute("role", "status");
+  const buttons = make("div", "plan-buttons click-card", button, again);
+  const text = make("p", { className: "section-note click-card", role: "status" });
 
   const visit = () => {
     const click = proposal()?.click;

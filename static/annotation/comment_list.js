@@ -1,7 +1,7 @@
 /** Comments: written at the selected limb, listed, gone to, and resolved. */
 
-import { textButton } from "../inspector/rows.js";
-import { lineForm, make } from "./parts.js";
+import { make, textButton } from "../widgets/elements.js";
+import { lineForm } from "./parts.js";
 
 /** @typedef {import("../model/protocol.js").CommentInfo} Comment */
 
@@ -38,8 +38,7 @@ export function commentList({ store, send }, review, visits) {
     const people = store.facts.session?.people ?? [];
     const where = [people.length > 1 ? people[comment.person]?.name : "", comment.limb].filter(Boolean).join(", ");
     const go = textButton("", `Go to frame ${comment.frame}`, () => visits.go(comment));
-    const words = make("span", "", `${where ? `${where}: ` : ""}${comment.text}`);
-    words.append(make("span", "quiet", comment.author ? ` ${comment.author}` : ""));
+    const words = make("span", {}, `${where ? `${where}: ` : ""}${comment.text}`, make("span", "quiet", comment.author ? ` ${comment.author}` : ""));
     go.append(make("span", "observed-frame", String(comment.frame)), words);
     go.dataset.noCommand = "";
     const done = textButton(comment.resolved ? "Reopen" : "Resolve", comment.resolved ? "Open this comment again" : "This comment is done", () =>

@@ -1,15 +1,6 @@
 /** Small pieces that the parts of the section share. */
 
-/**
- * @template {keyof HTMLElementTagNameMap} K
- * @param {K} tag
- * @param {string} className
- * @param {string} [text]
- * @returns {HTMLElementTagNameMap[K]}
- */
-export function make(tag, className, text = "") {
-  return Object.assign(document.createElement(tag), { className, textContent: text });
-}
+import { make } from "../widgets/elements.js";
 
 /**
  * Line that opens a form below it, with its content.
@@ -19,11 +10,7 @@ export function make(tag, className, text = "") {
  * @param {HTMLElement[]} content
  */
 export function fold(title, hint, ...content) {
-  const element = make("details", "plan-fold");
-  const head = make("summary", "", title);
-  head.title = hint;
-  element.append(head, ...content);
-  return element;
+  return make("details", "plan-fold", make("summary", { title: hint }, title), ...content);
 }
 
 /**
@@ -35,10 +22,9 @@ export function fold(title, hint, ...content) {
  */
 export function lineForm(name, action, send) {
   const form = make("form", "plan-line");
-  const input = Object.assign(make("input", "query-field"), { type: "text", placeholder: name, autocomplete: "off", maxLength: 2000 });
-  input.setAttribute("aria-label", name);
-  const button = Object.assign(make("button", "", action), { type: "submit", title: `${action}: ${name}` });
-  const offered = make("datalist", "");
+  const input = make("input", { className: "query-field", type: "text", placeholder: name, autocomplete: "off", maxLength: 2000, "aria-label": name });
+  const button = make("button", { type: "submit", title: `${action}: ${name}` }, action);
+  const offered = make("datalist");
   offered.id = `offered-${action.toLowerCase()}`;
   input.setAttribute("list", offered.id);
   form.append(input, button, offered);

@@ -1,6 +1,7 @@
 /** The form that plans frames: which, of whom, and for whom. */
 
-import { fold, make } from "./parts.js";
+import { make } from "../widgets/elements.js";
+import { fold } from "./parts.js";
 
 /** @type {[string, string][]} */
 const WAYS = [
@@ -18,11 +19,9 @@ export function planForm({ store, send, notify }) {
   const frames = field("List", "0,40,100:110", "Frames and ranges; the end of a range is not included");
   const person = select("Of", []);
   const to = field("To", "anybody", "Names of the annotators, with commas; the frames are dealt out in turns");
-  const each = Object.assign(make("input", ""), { type: "checkbox" });
-  const eachLabel = make("label", "plan-check");
-  eachLabel.title = "Give all frames to each annotator instead";
-  eachLabel.append(each, "all frames to each");
-  const plan = Object.assign(make("button", "is-primary", "Plan"), { type: "submit", title: "Add these frames to the plan; tasks that are there already stay" });
+  const each = make("input", { type: "checkbox" });
+  const eachLabel = make("label", { className: "plan-check", title: "Give all frames to each annotator instead" }, each, "all frames to each");
+  const plan = make("button", { className: "is-primary", type: "submit", title: "Add these frames to the plan; tasks that are there already stay" }, "Plan");
   form.append(way.label, number.label, frames.label, person.label, to.label, eachLabel, plan);
   number.input.inputMode = "numeric";
 
@@ -69,9 +68,7 @@ export function planForm({ store, send, notify }) {
  */
 function select(text, options) {
   const label = make("label", "plan-field");
-  const input = make("select", "");
-  input.setAttribute("aria-label", text);
-  input.append(...options.map(([value, words]) => new Option(words, value)));
+  const input = make("select", { "aria-label": text }, ...options.map(([value, words]) => new Option(words, value)));
   label.append(make("span", "", text), input);
   return { label, input };
 }
@@ -82,8 +79,8 @@ function select(text, options) {
  * @param {string} title
  */
 function field(text, placeholder, title) {
-  const label = Object.assign(make("label", "plan-field"), { title });
-  const input = Object.assign(make("input", "query-field"), { type: "text", placeholder, autocomplete: "off", spellcheck: false });
+  const label = make("label", { className: "plan-field", title });
+  const input = make("input", { className: "query-field", type: "text", placeholder, autocomplete: "off", spellcheck: false });
   label.append(make("span", "", text), input);
   return { label, input };
 }

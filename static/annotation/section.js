@@ -1,10 +1,10 @@
 /** Annotation: the plan, its tasks and verdicts, the next best click, comments, and speed. */
 
-import { textButton } from "../inspector/rows.js";
+import { make, textButton } from "../widgets/elements.js";
 import { capital } from "../widgets/text.js";
 import { clickCard } from "./click_card.js";
 import { commentList } from "./comment_list.js";
-import { lineForm, make } from "./parts.js";
+import { lineForm } from "./parts.js";
 import { planForm } from "./plan_form.js";
 import { speedTable } from "./speed_table.js";
 import { taskList } from "./task_list.js";
@@ -26,8 +26,7 @@ export function annotationSection(context, review, visits) {
   const refuse = textButton("Reject …", "Reject the pose here, and say what is to be corrected (Alt+R)", () => askReason());
   const leave = textButton("Withdraw", "Take this frame out of the plan", () => review.withdraw());
   leave.id = "plan-withdraw";
-  const buttons = make("div", "plan-buttons");
-  buttons.append(next, accept, refuse, leave);
+  const buttons = make("div", "plan-buttons", next, accept, refuse, leave);
   const here = make("p", "section-note");
   const reason = lineForm("What is to be corrected", "Reject", (text) => {
     reason.form.hidden = true;

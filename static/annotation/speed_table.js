@@ -1,15 +1,13 @@
 /** Seconds and edits per verified frame, by annotator. */
 
-import { fold, make } from "./parts.js";
+import { make } from "../widgets/elements.js";
+import { fold } from "./parts.js";
 
 /** @param {import("../model/store.js").Store} store */
 export function speedTable(store) {
   const table = make("table", "plan-speed");
-  const head = make("thead", "");
-  const titles = make("tr", "");
-  titles.append(...["name", "verified", "s each", "edits each", "reviewed", "s each"].map((text) => make("th", "", text)));
-  head.append(titles);
-  const body = make("tbody", "");
+  const head = make("thead", {}, make("tr", {}, ...["name", "verified", "s each", "edits each", "reviewed", "s each"].map((text) => make("th", "", text))));
+  const body = make("tbody");
   table.append(head, body);
   const element = fold("Speed", "From the history; pauses over 60 s do not count", table);
   const number = (/** @type {number | null} */ value) => (value === null ? "–" : value.toFixed(1));
@@ -20,10 +18,9 @@ export function speedTable(store) {
       element.hidden = speeds.length === 0;
       body.replaceChildren(
         ...speeds.map((one) => {
-          const row = make("tr", "");
+          const row = make("tr");
           const cells = [one.verified, number(one.seconds_per_verified), number(one.edits_per_verified), one.decisions, number(one.seconds_per_decision)];
-          const name = make("th", "", one.name || "nobody named");
-          row.append(name, ...cells.map((value) => make("td", "", String(value))));
+          row.append(make("th", "", one.name || "nobody named"), ...cells.map((value) => make("td", "", String(value))));
           return row;
         }),
       );

@@ -1,9 +1,8 @@
 /** The counter, the strip of states, and the list of tasks with its filter. */
 
-import { textButton } from "../inspector/rows.js";
+import { make, textButton } from "../widgets/elements.js";
 import { TASK_STATES, countStates } from "../model/tasks.js";
 import { capital, count } from "../widgets/text.js";
-import { make } from "./parts.js";
 
 /**
  * @typedef {import("../model/tasks.js").Task} Task
@@ -29,12 +28,8 @@ const FILTERS = [
  */
 export function taskList(store, review, visits) {
   const counter = make("p", "plan-counter");
-  const strip = make("div", "plan-strip");
-  strip.setAttribute("role", "img");
-  const filter = make("select", "");
-  filter.setAttribute("aria-label", "Tasks to list and to go through");
-  filter.title = "Tasks to list and to go through";
-  filter.append(...FILTERS.map(([value, text]) => new Option(text, value)));
+  const strip = make("div", { className: "plan-strip", role: "img" });
+  const filter = make("select", { "aria-label": "Tasks to list and to go through", title: "Tasks to list and to go through" }, ...FILTERS.map(([value, text]) => new Option(text, value)));
   filter.addEventListener("change", () => {
     review.filter = /** @type {Filter} */ (filter.value);
     listed = FEW_LISTED;
@@ -80,13 +75,12 @@ export function taskList(store, review, visits) {
    * @param {boolean} isHere
    */
   const entry = (task, isHere) => {
-    const row = make("li", "");
+    const row = make("li");
     const people = store.facts.session?.people ?? [];
     const who = [people.length > 1 ? people[task.person]?.name : "", task.annotator || "anybody"].filter(Boolean).join(", ");
     const words = `${who}${task.is_disagreement ? ", two copies disagree" : ""}${task.comment ? `: ${task.comment}${task.by ? ` (${task.by})` : ""}` : ""}`;
     const go = textButton("", `Go to frame ${task.frame}`, () => visits.go(task));
-    const state = make("span", `plan-state is-${task.state}`, task.state);
-    go.append(make("span", "observed-frame", String(task.frame)), make("span", "", words), state);
+    go.append(make("span", "observed-frame", String(task.frame)), make("span", "", words), make("span", `plan-state is-${task.state}`, task.state));
     go.dataset.noCommand = "";
     if (isHere) go.setAttribute("aria-current", "true");
     row.append(go);

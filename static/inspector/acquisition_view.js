@@ -1,7 +1,8 @@
 /** Sizes from the footage: start and stop an acquisition, its progress, and the body before and after. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { capital } from "../widgets/text.js";
-import { choiceRow, textButton } from "./rows.js";
+import { choiceRow } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").AcquisitionMessage} Acquisition
@@ -19,8 +20,7 @@ const LISTED = 8;
  * @returns {{element: HTMLElement, update: (person: number) => void}}
  */
 export function acquisitionView({ store, send }) {
-  const element = document.createElement("div");
-  element.className = "acquisition";
+  const element = make("div", "acquisition");
   let person = 0;
   /** @type {Method} */
   let method = "contours";
@@ -39,14 +39,14 @@ export function acquisitionView({ store, send }) {
     change: (/** @type {Method} */ value) => (method = value),
   });
   const stop = textButton("Stop", "Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }));
-  const progress = document.createElement("progress");
-  const status = document.createElement("span");
+  const progress = make("progress");
+  const status = make("span");
   status.className = "acquisition-status";
   status.setAttribute("aria-live", "polite");
-  const work = document.createElement("div");
+  const work = make("div");
   work.className = "acquisition-work";
   work.append(progress, stop);
-  const result = document.createElement("div");
+  const result = make("div");
   element.append(choice.element, start, work, status, result);
   /** @type {Result | null} */
   let drawn = null;
@@ -75,17 +75,14 @@ export function acquisitionView({ store, send }) {
 /** @param {Result} result */
 function describe(result) {
   const { frames, cost_before_px: before, cost_after_px: after } = result;
-  const summary = document.createElement("p");
-  summary.className = "section-note";
-  summary.textContent = `Frames ${frames.join(", ")}: ${before.toFixed(2)} → ${after.toFixed(2)} px`;
-  summary.title = "Frames that the sizes were fitted to, and their mean cost with the body before and after";
-  const pictures = document.createElement("div");
+  const summary = make("p", { className: "section-note", title: "Frames that the sizes were fitted to, and their mean cost with the body before and after" }, `Frames ${frames.join(", ")}: ${before.toFixed(2)} → ${after.toFixed(2)} px`);
+  const pictures = make("div");
   pictures.className = "acquisition-pictures";
   pictures.append(picture(result, result.front, "Front"), picture(result, result.side, "Side"));
-  const legend = document.createElement("p");
+  const legend = make("p");
   legend.className = "section-note acquisition-legend";
   for (const kind of ["before", "after"]) {
-    legend.append(Object.assign(document.createElement("span"), { textContent: kind, className: `is-${kind}` }));
+    legend.append(make("span", `is-${kind}`, kind));
   }
   return [summary, pictures, legend, table(result)];
 }
@@ -109,25 +106,20 @@ function picture({ size_px: [width, height] }, { before, after }, name) {
     path.setAttribute("d", lines.map(([x0, y0, x1, y1]) => `M${x0} ${y0}L${x1} ${y1}`).join(""));
     svg.append(path);
   }
-  const figure = document.createElement("figure");
-  const caption = document.createElement("figcaption");
-  caption.textContent = name;
-  figure.append(svg, caption);
-  return figure;
+  return make("figure", {}, svg, make("figcaption", {}, name));
 }
 
 /** @param {Result} result */
 function table({ sizes }) {
-  const element = document.createElement("table");
-  element.className = "acquisition-sizes";
+  const element = make("table", "acquisition-sizes");
   const head = element.createTHead().insertRow();
   for (const text of ["Changed most, cm", "before", "after", "±"]) {
-    head.append(Object.assign(document.createElement("th"), { textContent: text, scope: "col" }));
+    head.append(make("th", { scope: "col" }, text));
   }
   const body = element.createTBody();
   for (const { name, before_m, after_m, sigma_m } of sizes.slice(0, LISTED)) {
     const row = body.insertRow();
-    row.append(Object.assign(document.createElement("th"), { textContent: capital(name), scope: "row", title: capital(name) }));
+    row.append(make("th", { scope: "row", title: capital(name) }, capital(name)));
     for (const metres of [before_m, after_m, sigma_m]) row.insertCell().textContent = (100 * metres).toFixed(1);
     row.cells[3].title = "Standard deviation of the size after the acquisition";
   }

@@ -1,8 +1,9 @@
 /** Body sizes of the active person: first a draft that the views outline, then the body, as an entry of the history. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { capital, displayName } from "../widgets/text.js";
 import { acquisitionView } from "./acquisition_view.js";
-import { boundedField, checkRow, choiceRow, numberRow, textButton } from "./rows.js";
+import { boundedField, checkRow, choiceRow, numberRow } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").BodySizesMessage} BodySizes
@@ -23,20 +24,20 @@ export class BodySection {
   id = "body";
   title = "Body sizes";
   hint = "Lengths and girths of the active person; acquire them from the footage";
-  body = document.createElement("div");
+  body = make("div");
   #store;
   #send;
   #refuse;
-  #person = document.createElement("p");
+  #person = make("p", "person-name");
   #model;
   #height;
   #alike;
-  #table = document.createElement("div");
+  #table = make("div", "size-table");
   #keyframes;
   #apply;
   #discard;
   #former;
-  #note = document.createElement("p");
+  #note = make("p", { className: "section-note", role: "status" });
   #acquisition;
   /** @type {{field: Field, read: (sizes: BodySizes) => number | undefined, factor: number}[]} */
   #fields = [];
@@ -49,7 +50,6 @@ export class BodySection {
     this.#store = store;
     this.#send = send;
     this.#refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
-    this.#person.className = "person-name";
     this.#model = choiceRow({
       label: "Body",
       title:
@@ -73,7 +73,6 @@ export class BodySection {
       title: "Change left and right together",
       change: (on) => send({ type: "body_sizes", action: "couple", on }),
     });
-    this.#table.className = "size-table";
     this.#keyframes = choiceRow({
       label: "Keyframes",
       title:
@@ -93,12 +92,10 @@ export class BodySection {
     this.#former = textButton("Previous", "Enter the sizes before the present ones; Apply sets them", () =>
       this.#edit({ action: "previous" }),
     );
-    const buttons = document.createElement("div");
+    const buttons = make("div");
     buttons.className = "section-buttons";
     buttons.append(this.#apply, this.#discard, this.#former);
-    this.#note.className = "section-note";
-    this.#note.setAttribute("role", "status");
-    const foot = document.createElement("div");
+    const foot = make("div");
     foot.className = "section-foot";
     foot.append(this.#keyframes.element, this.#note, buttons);
     this.body.append(this.#person, this.#model.element, this.#height.element, this.#alike.element, this.#acquisition.element, this.#table, foot);
@@ -232,5 +229,5 @@ function tenths(cm) {
  * @param {string} title
  */
 function cell(text, title) {
-  return Object.assign(document.createElement("span"), { textContent: text, title, className: "size-label" });
+  return make("span", { title, className: "size-label" }, text);
 }

@@ -1,9 +1,9 @@
 /** Calibration: check the cameras by the tracked people, preview the corrections, apply them, and track again. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { KEYFRAME } from "../model/cells.js";
 import { earlierCalibration, hasTrack } from "../model/selectors.js";
 import { count } from "../widgets/text.js";
-import { textButton } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").CameraCheck} CameraCheck
@@ -39,13 +39,13 @@ export function calibrationSection({ store, send, notify }) {
   const start = textButton("Check the cameras", "Compare contours of the tracked people with the calibration; changes nothing", () => act("start"));
   start.className = "is-primary";
   const stop = textButton("Stop", "Stop the check; nothing is changed", () => act("stop"));
-  const progress = document.createElement("progress");
-  const work = document.createElement("div");
+  const progress = make("progress");
+  const work = make("div");
   work.className = "acquisition-work";
   work.append(progress, stop);
   const status = note();
   status.setAttribute("role", "status");
-  const result = document.createElement("div");
+  const result = make("div");
   const preview = textButton("Preview", "Show the people and cameras as corrected, on the shown frame", () =>
     act(store.facts.calibration?.is_previewed ? "leave" : "preview"),
   );
@@ -53,15 +53,11 @@ export function calibrationSection({ store, send, notify }) {
   const misfits = textButton("Misfits", "Show in each view how the edges lie off the contours, magnified: all one way for a turned camera, round for a rolled one, outwards or inwards for a zoomed one", () =>
     store.set({ showsMisfits: !store.facts.showsMisfits }),
   ); // prettier-ignore
-  const buttons = document.createElement("div");
-  buttons.className = "acquisition-work";
-  buttons.append(misfits, preview, apply);
+  const buttons = make("div", "acquisition-work", misfits, preview, apply);
   const fit = note();
   const outdated = note();
   const again = textButton("Track again", "Track the frames of an earlier calibration with the present one; keyframes stay", () => act("track_again"));
-  const body = document.createElement("div");
-  body.className = "acquisition";
-  body.append(start, work, status, result, buttons, fit, outdated, again);
+  const body = make("div", "acquisition", start, work, status, result, buttons, fit, outdated, again);
 
   let wasCurrent = true;
   const isNamed = () => !!store.facts.calibration?.cameras.some(({ kinds }) => kinds.length);
@@ -178,8 +174,7 @@ function fitText(found, frame) {
 function describe(found) {
   const said = found.sentences.length ? found.sentences.map(capital) : ["No camera is off: the contours agree with the calibration."];
   const notes = said.map((text) => Object.assign(note(), { textContent: text }));
-  const table = document.createElement("table");
-  table.className = "calibration-cameras";
+  const table = make("table", "calibration-cameras");
   const head = table.createTHead().insertRow();
   for (const [text, title] of [
     ["Camera", "Cameras of the session"],
@@ -187,18 +182,18 @@ function describe(found) {
     ["mm", "The same at the body"],
     ["Mended by", "Correction with its standard deviation"],
   ]) {
-    head.append(Object.assign(document.createElement("th"), { textContent: text, title, scope: "col" }));
+    head.append(make("th", { title, scope: "col" }, text));
   }
   const rows = table.createTBody();
   for (const camera of found.cameras) {
     const row = rows.insertRow();
     row.classList.toggle("is-off", camera.kinds.length > 0);
-    row.append(Object.assign(document.createElement("th"), { textContent: camera.name, scope: "row" }));
+    row.append(make("th", { scope: "row" }, camera.name));
     row.insertCell().textContent = camera.is_seen ? camera.misfit_px.toFixed(1) : "–";
     row.insertCell().textContent = camera.is_seen ? camera.misfit_mm.toFixed(0) : "–";
     const cell = row.insertCell();
     const lines = mended(camera);
-    cell.replaceChildren(...lines.map(({ text, title }) => Object.assign(document.createElement("div"), { textContent: text, title })));
+    cell.replaceChildren(...lines.map(({ text, title }) => make("div", { title }, text)));
   }
   const used = Object.assign(note(), { textContent: `Frames used: ${found.frames.join(", ")}` });
   return [...notes, table, used];
@@ -248,9 +243,7 @@ function signed(value, digits) {
 }
 
 function note() {
-  const element = document.createElement("p");
-  element.className = "section-note";
-  return element;
+  return make("p", "section-note");
 }
 
 /** @param {string} text */

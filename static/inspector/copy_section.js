@@ -1,8 +1,9 @@
 /** Other copy: the poses of another annotator's copy of the session beside the own ones, and the choice between them. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
-import { numberRow, sectionNote, textButton } from "./rows.js";
+import { numberRow, sectionNote } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").UseCopy["action"]} Action
@@ -24,13 +25,11 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
     const { state } = store.facts;
     if (state) send({ type: "other_copy", action, person: state.person, frame: state.frame });
   };
-  const form = Object.assign(document.createElement("form"), { className: "copy-form" });
-  const label = Object.assign(document.createElement("label"), { className: "import-field", title: "Folder of another annotator's copy of this session, on the machine of the program" });
-  const input = Object.assign(document.createElement("input"), { type: "text", className: "query-field", name: "copy", id: "copy-folder" });
-  const holder = Object.assign(document.createElement("span"), { className: "path-field" });
-  holder.append(input);
-  label.append(Object.assign(document.createElement("span"), { textContent: "Folder" }), holder);
-  const open = Object.assign(document.createElement("button"), { type: "submit", textContent: "Compare", title: "Read the poses of this copy, and show where both differ; nothing is changed" });
+  const form = make("form", "copy-form");
+  const label = make("label", { className: "import-field", title: "Folder of another annotator's copy of this session, on the machine of the program" });
+  const input = make("input", { type: "text", className: "query-field", name: "copy", id: "copy-folder" });
+  label.append(make("span", {}, "Folder"), make("span", "path-field", input));
+  const open = make("button", { type: "submit", title: "Read the poses of this copy, and show where both differ; nothing is changed" }, "Compare");
   const answer = sectionNote();
   answer.setAttribute("role", "status");
   form.append(label, open);
@@ -57,19 +56,14 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
   const next = textButton("Next", "Next frame where the copies differ (Alt+S)", () => step(1));
   const leave = textButton("End", "End the comparison; nothing is changed", () => send({ type: "other_copy", action: "leave", person: 0, frame: 0 }));
   const ways = group(previous, next, leave);
-  const worst = Object.assign(document.createElement("ol"), { className: "observed-worst" });
-  worst.setAttribute("aria-label", "Differences, largest first");
+  const worst = make("ol", { className: "observed-worst", "aria-label": "Differences, largest first" });
   const more = textButton("More", "List smaller differences too", () => {
     limit = Infinity;
     listed = "";
     show();
   });
-  const compared = document.createElement("div");
-  compared.className = "acquisition";
-  compared.append(summary, tolerance.element, ways, here, buttons, worst, more);
-  const body = document.createElement("div");
-  body.className = "acquisition";
-  body.append(form, answer, compared);
+  const compared = make("div", "acquisition", summary, tolerance.element, ways, here, buttons, worst, more);
+  const body = make("div", "acquisition", form, answer, compared);
 
   let isBusy = false;
   let limit = FEW_LISTED;
@@ -195,12 +189,12 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
  * @param {() => void} visit
  */
 function differenceRow({ frame, joint, distance_mm }, who, isHere, visit) {
-  const row = document.createElement("li");
+  const row = make("li");
   const go = textButton("", `Go to frame ${frame} and select the ${displayName(joint)}`, visit);
   go.append(
-    Object.assign(document.createElement("span"), { className: "observed-frame", textContent: String(frame) }),
-    Object.assign(document.createElement("span"), { textContent: `${who && `${who}, `}${displayName(joint)}` }),
-    Object.assign(document.createElement("span"), { className: "quiet", textContent: `${Math.round(distance_mm)} mm` }),
+    make("span", "observed-frame", String(frame)),
+    make("span", {}, `${who && `${who}, `}${displayName(joint)}`),
+    make("span", "quiet", `${Math.round(distance_mm)} mm`),
   );
   go.dataset.noCommand = "";
   if (isHere) go.setAttribute("aria-current", "true");
@@ -210,7 +204,5 @@ function differenceRow({ frame, joint, distance_mm }, who, isHere, visit) {
 
 /** @param {HTMLElement[]} parts */
 function group(...parts) {
-  const element = Object.assign(document.createElement("div"), { className: "acquisition-work" });
-  element.append(...parts);
-  return element;
+  return make("div", "acquisition-work", ...parts);
 }

@@ -1,8 +1,8 @@
 /** Picture of the cost over two degrees of freedom around the shown pose. A click or Enter takes the pose there. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { prepare } from "../panes/drawing.js";
 import { displayName } from "../widgets/text.js";
-import { textButton } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").CostMapMessage} CostMap
@@ -20,16 +20,13 @@ const STEPS = new Map([["ArrowLeft", [-1, 0]], ["ArrowRight", [1, 0]], ["ArrowUp
  * @param {import("../posing/posing.js").Posing} posing
  */
 export function costMap({ store, send }, posing) {
-  const element = Object.assign(document.createElement("div"), { className: "cost-map" });
+  const element = make("div", "cost-map");
   const open = textButton("Cost over two angles", "Show the cost around this pose over two angles of the joint, in nats", () => toggle(true));
   const close = textButton("Hide", "Hide the cost over two angles", () => toggle(false));
   const [across, up] = ["Horizontal angle", "Vertical angle"].map((label) => axisChoice(label, () => ask()));
-  const canvas = document.createElement("canvas");
-  canvas.tabIndex = 0;
-  canvas.setAttribute("role", "application");
-  const read = Object.assign(document.createElement("output"), { className: "section-note" });
-  const axes = Object.assign(document.createElement("div"), { className: "cost-map-axes" });
-  axes.append(across, "×", up, close);
+  const canvas = make("canvas", { tabIndex: 0, role: "application" });
+  const read = make("output", "section-note");
+  const axes = make("div", "cost-map-axes", across, "×", up, close);
   element.append(open, axes, canvas, read);
   let isOpen = false;
   let isAsking = false;
@@ -146,10 +143,7 @@ function nameOf({ joint, name }, isOfJoint) {
  * @param {() => void} change
  */
 function axisChoice(label, change) {
-  const choice = Object.assign(document.createElement("select"), { title: label });
-  choice.setAttribute("aria-label", label);
-  choice.addEventListener("change", change);
-  return choice;
+  return make("select", { title: label, "aria-label": label, onchange: change });
 }
 
 /**

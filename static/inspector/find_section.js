@@ -1,6 +1,7 @@
 /** Find people: one button from a new recording to a tracked one, its progress, and what was found. */
 
-import { sectionNote, textButton } from "./rows.js";
+import { make, textButton } from "../widgets/elements.js";
+import { sectionNote } from "./rows.js";
 
 /** Number of the latest sentences that are shown. */
 const SHOWN = 8;
@@ -22,19 +23,16 @@ export function findSection({ store, send, layers }) {
   });
   const offer = sectionNote("No camera has a background or masks: let a network find the people, or find them by what moves.");
   const stop = textButton("Stop", "Stop; what was found and tracked stays", () => (store.facts.finding?.running ? find("stop") : network("stop")));
-  const progress = document.createElement("progress");
-  const work = document.createElement("div");
+  const progress = make("progress");
+  const work = make("div");
   work.className = "acquisition-work";
   work.append(progress, stop);
   const status = sectionNote();
   status.setAttribute("role", "status");
-  const notes = document.createElement("ul");
+  const notes = make("ul");
   notes.className = "find-notes";
-  const details = document.createElement("details");
-  details.append(Object.assign(document.createElement("summary"), { textContent: "Details", title: "Each frame that was tried, and who was found" }), notes);
-  const body = document.createElement("div");
-  body.className = "acquisition";
-  body.append(offer, detect, start, work, status, details);
+  const details = make("details", {}, make("summary", { title: "Each frame that was tried, and who was found" }, "Details"), notes);
+  const body = make("div", "acquisition", offer, detect, start, work, status, details);
 
   /** Whether the last work that was begun here is that of a network. */
   let isDetecting = false;
@@ -57,9 +55,7 @@ export function findSection({ store, send, layers }) {
     details.hidden = !finding?.notes.length;
     if (running !== wasRunning) details.open = !running && !finding?.failed; // sentences on the people who were found
     wasRunning = running;
-    notes.replaceChildren(
-      ...(finding?.notes ?? []).slice(-SHOWN).map((text) => Object.assign(document.createElement("li"), { textContent: text })),
-    );
+    notes.replaceChildren(...(finding?.notes ?? []).slice(-SHOWN).map((text) => make("li", {}, text)));
   };
   show();
   return {

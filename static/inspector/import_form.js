@@ -1,7 +1,7 @@
 /** Form that imports results of other programs: paths are read and checked, shown over the pictures, then stored. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { capital, count } from "../widgets/text.js";
-import { textButton } from "./rows.js";
 
 /**
  * @typedef {{completes: (input: HTMLInputElement) => void}} PathFields gives fields of paths completion and a picker
@@ -28,10 +28,9 @@ function offsetsOf(text) {
  * @param {() => void} discard forgets what was read
  */
 export function importForm(store, paths, discard) {
-  const fold = document.createElement("details");
-  fold.className = "import-form";
-  const head = Object.assign(document.createElement("summary"), { textContent: "Import…", title: "Bring key points, joints or masks of another program into the session" });
-  const form = document.createElement("form");
+  const fold = make("details", "import-form");
+  const head = make("summary", { title: "Bring key points, joints or masks of another program into the session" }, "Import…");
+  const form = make("form");
   const path = field("paths", "Files or folder", "Folder or files on the machine of the program, of one format; several are separated by semicolons");
   path.input.dataset.takes = "files";
   const name = field("name", "Name", "Name of the observations in the session");
@@ -42,23 +41,19 @@ export function importForm(store, paths, discard) {
   const skeleton = field("names_of_points", "Names of points", "A known skeleton by whose names, or in whose order, the points are, such as BODY_25B; guessed if empty");
   const axes = field("axes", "Axes", "Joints in space: axes of the file that are the session's x, y and z, such as x,-z,y; x,y,z if empty");
   const units = field("units", "Units", "Joints in space: unit of a file that states none: m, cm, mm, in or ft");
-  const unusual = Object.assign(document.createElement("label"), { className: "import-field", title: "Keep points also where they fit no person of the recording, or fit one better in another way" });
-  const keep = Object.assign(document.createElement("input"), { type: "checkbox", name: "unusual" });
+  const unusual = make("label", { className: "import-field", title: "Keep points also where they fit no person of the recording, or fit one better in another way" });
+  const keep = make("input", { type: "checkbox", name: "unusual" });
   unusual.append(span("Keep unusual points"), keep);
-  const people = Object.assign(document.createElement("label"), { className: "import-field", title: "Person of whom they are" });
-  const person = Object.assign(document.createElement("select"), { name: "person" });
+  const people = make("label", { className: "import-field", title: "Person of whom they are" });
+  const person = make("select", { name: "person" });
   people.append(span("Person"), person);
-  const check = Object.assign(document.createElement("button"), { type: "submit", textContent: "Check", title: "Read and check the files, and show their points over the pictures; nothing is stored" });
+  const check = make("button", { type: "submit", title: "Read and check the files, and show their points over the pictures; nothing is stored" }, "Check");
   const take = textButton("Import", "Store these files with the session", () => void store_());
   take.className = "is-primary";
   const cancel = textButton("Cancel", "Forget these files", () => reset());
-  const buttons = Object.assign(document.createElement("div"), { className: "acquisition-work" });
-  buttons.append(check, take, cancel);
-  const result = Object.assign(document.createElement("div"), { className: "import-result" });
-  result.setAttribute("role", "status");
-  const further = document.createElement("details");
-  further.append(Object.assign(document.createElement("summary"), { textContent: "Where the files do not tell", title: "First frame, offsets, size of the pictures, confidence, names, axes and unit" }), first.label, late.label, size.label, confidence.label, skeleton.label, axes.label, units.label, unusual);
-  form.append(path.label, name.label, people, further, buttons, result);
+  const result = make("div", { className: "import-result", role: "status" });
+  const further = make("details", {}, make("summary", { title: "First frame, offsets, size of the pictures, confidence, names, axes and unit" }, "Where the files do not tell"), first.label, late.label, size.label, confidence.label, skeleton.label, axes.label, units.label, unusual);
+  form.append(path.label, name.label, people, further, make("div", "acquisition-work", check, take, cancel), result);
   fold.append(head, form);
   paths.completes(path.input);
 
@@ -168,13 +163,13 @@ export function importForm(store, paths, discard) {
 function describe(plan) {
   const matched = Object.entries(plan.points).filter(([, own]) => own.length);
   const others = Object.entries(plan.points).filter(([, own]) => !own.length).map(([point]) => point); // prettier-ignore
-  const list = document.createElement("ul");
+  const list = make("ul");
   for (const view of plan.views) {
     const what = plan.are_masks ? "people" : "points";
     const frames = view.frames ? `${what} in frames ${view.frames[0]} to ${view.frames[1]}` : `no ${what}`;
     const more = [view.share === null ? "" : `${(100 * view.share).toFixed(1)} % of the picture`, view.most_people > 1 ? `up to ${view.most_people} people` : "", view.confidence === null ? "" : `median confidence ${view.confidence.toFixed(2)}`];
     const words = view.place === null ? ["no files"] : [`${count(view.rows)} ${plan.are_masks ? "masks" : "rows"}`, frames, ...more];
-    list.append(Object.assign(document.createElement("li"), { textContent: `${view.view}: ${words.filter(Boolean).join(", ")}`, title: view.place ?? "" }));
+    list.append(make("li", { title: view.place ?? "" }, `${view.view}: ${words.filter(Boolean).join(", ")}`));
   }
   const points = line(`${matched.length} points as ${plan.skeleton} names them${others.length ? `; without a joint of the body: ${others.join(", ")}` : ""}.`);
   points.title = matched.map(([point, own]) => `${point} = ${own.join(" and ")}`).join("\n");
@@ -194,11 +189,9 @@ function describe(plan) {
  * @param {string} title
  */
 function field(name, text, title) {
-  const label = Object.assign(document.createElement("label"), { className: "import-field", title });
-  const input = Object.assign(document.createElement("input"), { type: "text", className: "query-field", name, autocomplete: "off", spellcheck: false, id: `import-${name}` });
-  const holder = Object.assign(document.createElement("span"), { className: "path-field" });
-  holder.append(input);
-  label.append(span(text), holder);
+  const label = make("label", { className: "import-field", title });
+  const input = make("input", { type: "text", className: "query-field", name, autocomplete: "off", spellcheck: false, id: `import-${name}` });
+  label.append(span(text), make("span", "path-field", input));
   return { label, input };
 }
 
@@ -207,12 +200,12 @@ function field(name, text, title) {
  * @param {string} [more] class
  */
 function line(text, more) {
-  const element = Object.assign(document.createElement("p"), { className: "section-note", textContent: text });
+  const element = make("p", "section-note", text);
   if (more) element.classList.add(more);
   return element;
 }
 
 /** @param {string} text */
 function span(text) {
-  return Object.assign(document.createElement("span"), { textContent: text });
+  return make("span", {}, text);
 }

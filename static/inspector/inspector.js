@@ -1,6 +1,6 @@
 /** Inspector: a column with collapsible sections beside the views. Open sections are stored. */
 
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 
 const STORED = "quadrille.inspector";
 
@@ -74,13 +74,8 @@ export class Inspector {
    * @param {string} [before] the section that it stands above; at the end without one
    */
   add(section, before) {
-    const fold = document.createElement("details");
-    fold.className = "section";
-    fold.dataset.section = section.id;
-    fold.open = this.#stored.sections.includes(section.id);
-    const head = document.createElement("summary");
-    head.textContent = section.title;
-    head.title = section.hint;
+    const fold = make("details", { className: "section", "data-section": section.id, open: this.#stored.sections.includes(section.id) });
+    const head = make("summary", { title: section.hint }, section.title);
     section.body.classList.add("section-body");
     fold.append(head, section.body);
     fold.addEventListener("toggle", () => this.#keep());

@@ -1,5 +1,6 @@
 /** Degrees of freedom of the selected joint, with sliders over their limits. */
 
+import { make } from "../widgets/elements.js";
 import { ofDof } from "../model/observability.js";
 import { meaning } from "../posing/dof_names.js";
 import { capital, displayName } from "../widgets/text.js";
@@ -21,11 +22,8 @@ const SHOWN_FACTS = /** @type {const} */ (["state", "session", "observability", 
  */
 export function jointSection(context, { posing }) {
   const { store, notify } = context;
-  const body = document.createElement("div");
-  const expectedError = Object.assign(document.createElement("p"), {
-    className: "section-note",
-    title: "Root mean square error of the joint that tracking expects. The layer Error ellipses draws it in the views",
-  });
+  const body = make("div");
+  const expectedError = make("p", { className: "section-note", title: "Root mean square error of the joint that tracking expects. The layer Error ellipses draws it in the views" });
   const map = costMap(context, posing);
   /** @type {Row[]} */
   let rows = [];
@@ -38,13 +36,12 @@ export function jointSection(context, { posing }) {
    * @returns {Row}
    */
   const makeRow = (info, dof) => {
-    const element = document.createElement("label");
-    element.className = "row is-joint";
+    const element = make("label", "row is-joint");
     const unit = UNITS[info.unit];
     const limits = info.low === null || info.high === null ? "no limits" : `from ${info.low} to ${info.high} ${unit}`;
     const effect = meaning(info);
     const title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}; ${limits}`;
-    const head = Object.assign(document.createElement("span"), { className: "row-label", textContent: capital(info.name) });
+    const head = make("span", "row-label", capital(info.name));
     const [low, high] = info.unit === "cm" ? [-MAX_CM, MAX_CM] : [info.low ?? -360, info.high ?? 360];
     const field = boundedField({
       name: `${displayName(info.joint)} ${info.name}, ${unit}`,
@@ -54,8 +51,8 @@ export function jointSection(context, { posing }) {
       change: (value) => value !== null && posing.set(dof, value),
       refuse,
     });
-    element.append(head, field.element, Object.assign(document.createElement("span"), { className: "row-unit", textContent: unit }));
-    const slider = info.unit === "deg" ? document.createElement("input") : null;
+    element.append(head, field.element, make("span", "row-unit", unit));
+    const slider = info.unit === "deg" ? make("input") : null;
     if (slider) {
       const range = info.low === null || info.high === null ? FULL_TURN : { low: info.low, high: info.high };
       Object.assign(slider, { type: "range", min: String(range.low), max: String(range.high), step: "0.5" });
@@ -73,9 +70,7 @@ export function jointSection(context, { posing }) {
     const shape = JSON.stringify([state.person, point, dofs]);
     if (shape !== built) {
       built = shape;
-      const title = document.createElement("p");
-      title.className = "section-note";
-      title.textContent = dofs.length ? capital(displayName(point)) : `The ${displayName(point)} has no angles of its own; drag it in a view.`;
+      const title = make("p", "section-note", dofs.length ? capital(displayName(point)) : `The ${displayName(point)} has no angles of its own; drag it in a view.`);
       rows = dofs.map((dof) => makeRow(person.dofs[dof], dof));
       body.replaceChildren(title, expectedError, ...rows.map(({ element }) => element), map.element);
     }

@@ -1,10 +1,11 @@
 /** Observations: results of other programs, shown over the pictures, judged by the footage, and taken as poses. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { download } from "../widgets/downloads.js";
 import { alt } from "../widgets/key_matching.js";
 import { capital, count, displayName, percent } from "../widgets/text.js";
 import { importForm } from "./import_form.js";
-import { sectionNote, textButton } from "./rows.js";
+import { sectionNote } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").ObservationsMessage} Observations
@@ -32,7 +33,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     layers.toggle(["imported"], true);
   };
 
-  const list = Object.assign(document.createElement("ul"), { className: "observed-sets" });
+  const list = make("ul", "observed-sets");
   const none = sectionNote("Key points and joints of other programs: import them, see where they are wrong, and mend that.");
   const judge = textButton("Judge", "Track the people from these observations in the background, and say where the footage contradicts them", () => act("judge", current()));
   judge.className = "is-primary";
@@ -44,27 +45,22 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   });
   const detecting = group(detect);
   const buttons = group(judge, take, report);
-  const evidence = document.createElement("select");
-  evidence.title = "Evidence of the run. For poses by the key points alone, take them as poses";
-  evidence.setAttribute("aria-label", "Evidence");
-  evidence.append(new Option("contours and points", "track"), new Option("contours alone", "track_contours"));
+  const evidence = make("select", { title: "Evidence of the run. For poses by the key points alone, take them as poses", "aria-label": "Evidence" }, new Option("contours and points", "track"), new Option("contours alone", "track_contours"));
   const track = textButton("Track by", "Find who has no pose by these points, acquire their sizes, and track everybody on all frames; one step to undo", () => startTrack());
   const tracking = group(track, evidence);
   const stop = textButton("Stop", "Stop this work", () => (found()?.running ? act("stop") : send({ type: "find_people", action: "stop" })));
-  const progress = document.createElement("progress");
+  const progress = make("progress");
   const work = group(progress, stop);
   const status = sectionNote();
   status.setAttribute("role", "status");
-  const verdict = document.createElement("div");
-  const worst = Object.assign(document.createElement("ol"), { className: "observed-worst" });
+  const verdict = make("div");
+  const worst = make("ol", "observed-worst");
   const more = textButton("More", "List less severe entries too", () => {
     listed = Infinity;
     showWorst();
   });
   const form = importForm(store, sessions, () => act("discard"));
-  const body = document.createElement("div");
-  body.className = "acquisition";
-  body.append(none, list, detecting, buttons, tracking, work, status, verdict, worst, more, form.element);
+  const body = make("div", "acquisition", none, list, detecting, buttons, tracking, work, status, verdict, worst, more, form.element);
 
   /** Whether the last search for people was begun here. */
   let isTracking = false;
@@ -131,10 +127,9 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     none.hidden = sets.length > 0;
     list.replaceChildren(
       ...sets.map((set) => {
-        const row = document.createElement("li");
+        const row = make("li");
         const what = set.problem || `${set.format}, ${set.is_in_space ? "joints" : "key points"} of ${set.people.join(", ")}, ${count(set.frames)} frames`;
-        const text = document.createElement("span");
-        text.append(Object.assign(document.createElement("b"), { textContent: set.name }), sectionNote(what));
+        const text = make("span", {}, make("b", {}, set.name), sectionNote(what));
         text.lastElementChild?.classList.toggle("is-failed", !!set.problem);
         const toggle = textButton("Show", `Draw the points of ${set.name} over the pictures (toggle)`, () => show(set.name));
         toggle.setAttribute("aria-pressed", String(set.name === shown));
@@ -165,13 +160,13 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     const several = (store.facts.session?.people.length ?? 1) > 1;
     worst.replaceChildren(
       ...all.slice(0, listed).map((entry, rank) => {
-        const row = document.createElement("li");
+        const row = make("li");
         const who = several ? `${store.facts.session?.people[entry.person]?.name}, ` : "";
         const go = textButton("", `Go to frame ${entry.frame} and select the ${displayName(entry.joint)}`, () => visit(rank));
         go.append(
-          Object.assign(document.createElement("span"), { className: "observed-frame", textContent: String(entry.frame) }),
-          Object.assign(document.createElement("span"), { textContent: `${who}${entry.reason}` }),
-          Object.assign(document.createElement("span"), { className: "quiet", textContent: percent(entry.probability) }),
+          make("span", "observed-frame", String(entry.frame)),
+          make("span", {}, `${who}${entry.reason}`),
+          make("span", "quiet", percent(entry.probability)),
         );
         go.dataset.noCommand = "";
         if (rank === at) go.setAttribute("aria-current", "true");
@@ -265,7 +260,5 @@ function describe({ name, share_in_order, frames, sentences }, { people, judged,
 
 /** @param {HTMLElement[]} parts */
 function group(...parts) {
-  const element = Object.assign(document.createElement("div"), { className: "acquisition-work" });
-  element.append(...parts);
-  return element;
+  return make("div", "acquisition-work", ...parts);
 }

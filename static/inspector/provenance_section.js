@@ -1,9 +1,10 @@
 /** Provenance: where the selected person's pose and each of its joints come from, and the timeline's filter by it. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { KINDS, annotatorName, pointPhrases, poseLines } from "../model/provenance.js";
 import { tasksAt } from "../model/tasks.js";
 import { capital, count, displayName } from "../widgets/text.js";
-import { choiceRow, textButton } from "./rows.js";
+import { choiceRow, sectionNote } from "./rows.js";
 
 /** @typedef {import("../model/provenance.js").Filter} Filter */
 
@@ -26,14 +27,11 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
   const step = (/** @type {1 | -1} */ way) => jumps.go("chosen", way);
   const previous = textButton("Previous", "Go to the previous frame of this kind (Alt+Shift+Q)", () => step(-1));
   const next = textButton("Next", "Go to the next frame of this kind (Alt+Q)", () => step(1));
-  const number = Object.assign(document.createElement("span"), { className: "section-note" });
-  const steps = Object.assign(document.createElement("div"), { className: "acquisition-work" });
-  steps.append(previous, next, number);
-  const pose = document.createElement("div");
-  const list = Object.assign(document.createElement("ul"), { className: "provenance-joints" });
-  list.setAttribute("aria-label", "Joints");
-  const body = document.createElement("div");
-  body.append(filter.element, steps, pose, list);
+  const number = make("span", "section-note");
+  const steps = make("div", "acquisition-work", previous, next, number);
+  const pose = make("div");
+  const list = make("ul", { className: "provenance-joints", "aria-label": "Joints" });
+  const body = make("div", {}, filter.element, steps, pose, list);
 
   /** @param {Filter | null} wanted */
   const choose = (wanted) => {
@@ -88,7 +86,7 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
     const news = JSON.stringify([lines, joints, state.point]);
     if (news === listed) return;
     listed = news;
-    pose.replaceChildren(...lines.map((textContent) => Object.assign(document.createElement("p"), { className: "section-note", textContent })));
+    pose.replaceChildren(...lines.map(sectionNote));
     list.replaceChildren(...joints.map(([text, points]) => originRow(text, points, state.point, (point) => actions.selectPerson(state.person, point))));
     list.hidden = joints.length === 0;
   };
@@ -148,16 +146,14 @@ function grouped(pose) {
  * @param {(point: string) => void} select
  */
 function originRow(text, points, selected, select) {
-  const row = document.createElement("li");
+  const row = make("li");
   const names = points.map((point) => {
     const name = textButton(displayName(point), `Select the ${displayName(point)}`, () => select(point));
     name.dataset.noCommand = "";
     if (point === selected) name.setAttribute("aria-current", "true");
     return name;
   });
-  const joints = Object.assign(document.createElement("span"), { className: "provenance-points" });
-  joints.append(...names);
-  row.append(Object.assign(document.createElement("span"), { textContent: capital(text) }), joints);
+  row.append(make("span", {}, capital(text)), make("span", "provenance-points", ...names));
   return row;
 }
 

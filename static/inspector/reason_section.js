@@ -1,9 +1,9 @@
 /** Reason for a doubt: what each view shows of each part of the shown pose, as a table whose cells zoom to the part. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { alternativesOf } from "../model/selectors.js";
 import { capital } from "../widgets/text.js";
 import { MEASURES, reasonTable } from "./reason_table.js";
-import { textButton } from "./rows.js";
 import { triedTable } from "./tried_table.js";
 
 /** @typedef {import("./reason_table.js").Measure} Measure */
@@ -18,18 +18,15 @@ const SHOWN_FACTS = /** @type {const} */ (["reason", "session", "state", "connec
  * @returns {import("./inspector.js").Section}
  */
 export function reasonSection({ store, send }, { grid }, { posing }) {
-  const body = document.createElement("div");
-  body.className = "reason";
-  const sentence = Object.assign(document.createElement("p"), { className: "reason-sentence" });
-  sentence.setAttribute("aria-live", "polite");
-  const progress = document.createElement("progress");
+  const body = make("div", "reason");
+  const sentence = make("p", { className: "reason-sentence", "aria-live": "polite" });
+  const progress = make("progress");
   const stop = textButton("Stop", "Stop learning what is usual in this run; nothing changes", () => send({ type: "reason", action: "stop" }));
-  const stage = Object.assign(document.createElement("span"), { className: "section-note" });
-  const work = Object.assign(document.createElement("div"), { className: "acquisition-work" });
-  work.append(progress, stop);
-  const message = Object.assign(document.createElement("p"), { className: "section-note" });
+  const stage = make("span", "section-note");
+  const work = make("div", "acquisition-work", progress, stop);
+  const message = make("p", "section-note");
   const again = textButton("Explain this pose", "Learn what is usual in this run, and compare this pose with it", () => ask());
-  const notes = Object.assign(document.createElement("p"), { className: "section-note" });
+  const notes = make("p", "section-note");
   let measure = MEASURES.find(({ id }) => id === localStorage.getItem(STORED)) ?? MEASURES[0];
   const choice = measureChoice(measure, (chosen) => {
     measure = chosen;
@@ -40,8 +37,7 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
     point: (cell) => store.set({ hoverPart: cell }),
     zoom: (cell) => grid.framePart(cell),
   });
-  const others = Object.assign(document.createElement("ol"), { className: "reason-others" });
-  others.setAttribute("aria-label", "Alternative poses");
+  const others = make("ol", { className: "reason-others", "aria-label": "Alternative poses" });
   let listed = "";
   const tried = triedTable();
   body.append(sentence, stage, work, others, message, again, choice, table.element, notes, tried.element);
@@ -111,11 +107,11 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
  * @param {() => void} take
  */
 function alternativeRow({ nats, limbs }, rank, take) {
-  const row = document.createElement("li");
+  const row = make("li");
   const where = limbs.length ? `${limbs.join(", ")} elsewhere` : "body elsewhere";
   const cost = `${Math.abs(nats).toFixed(Math.abs(nats) < 10 ? 1 : 0)} nats ${nats < 0 ? "better" : "worse"}`;
   const title = `Take this pose, drawn blue with the number ${rank + 1} (Alt+${rank + 1}). Can be undone`;
-  row.append(textButton(`Take ${rank + 1}`, title, take), Object.assign(document.createElement("span"), { textContent: `${where}: ${cost}` }));
+  row.append(textButton(`Take ${rank + 1}`, title, take), make("span", {}, `${where}: ${cost}`));
   return row;
 }
 
@@ -130,13 +126,11 @@ function noContradiction(status) {
  * @param {(measure: Measure) => void} change
  */
 function measureChoice(chosen, change) {
-  const element = Object.assign(document.createElement("fieldset"), { className: "segmented" });
-  element.setAttribute("aria-label", "Measure");
+  const element = make("fieldset", { className: "segmented", "aria-label": "Measure" });
   for (const measure of MEASURES) {
-    const label = Object.assign(document.createElement("label"), { title: measure.title });
-    const input = Object.assign(document.createElement("input"), { type: "radio", name: "reason-measure", checked: measure === chosen });
-    input.addEventListener("change", () => change(measure));
-    label.append(input, Object.assign(document.createElement("span"), { textContent: measure.label }));
+    const label = make("label", { title: measure.title });
+    const input = make("input", { type: "radio", name: "reason-measure", checked: measure === chosen, onchange: () => change(measure) });
+    label.append(input, make("span", {}, measure.label));
     element.append(label);
   }
   return element;

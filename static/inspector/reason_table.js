@@ -1,5 +1,6 @@
 /** Table of parts by views. Arrow keys move among its cells, Enter or a click zooms the view to the part. */
 
+import { make } from "../widgets/elements.js";
 import { displayName } from "../widgets/text.js";
 
 /**
@@ -58,8 +59,8 @@ export const MEASURES = [
  *   about, until null
  */
 export function reasonTable({ point, zoom }) {
-  const element = Object.assign(document.createElement("div"), { className: "reason-scroll" });
-  const table = document.createElement("table");
+  const element = make("div", "reason-scroll");
+  const table = make("table");
   table.className = "reason-table";
   table.setAttribute("role", "grid");
   table.setAttribute("aria-label", "Parts by views");
@@ -170,11 +171,8 @@ const STEPS = new Map([
  * @param {string[]} texts
  */
 function line(kind, name, texts) {
-  const row = document.createElement("tr");
-  const head = document.createElement("th");
-  head.scope = "row";
-  head.textContent = name;
-  row.append(head, ...texts.map((text) => Object.assign(document.createElement(kind), { textContent: text, title: text })));
+  const row = make("tr");
+  row.append(make("th", { scope: "row" }, name), ...texts.map((text) => make(kind, { title: text }, text)));
   return row;
 }
 

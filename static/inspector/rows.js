@@ -1,5 +1,6 @@
 /** Rows of the inspector: a label, a control and a unit. Each shows the program's value unless the user is typing. */
 
+import { make } from "../widgets/elements.js";
 import { slider } from "../widgets/popovers.js";
 import { numberField } from "../widgets/number_field.js";
 
@@ -20,10 +21,7 @@ export function numberRow({ label, title, unit = "", low, high, step, auto, chan
   const { element, head } = row("label", label, title);
   const field = boundedField({ name: `${label}${unit && `, ${unit}`}`, low, high, step, allowsNone: auto !== undefined, change, refuse });
   if (auto !== undefined) field.element.placeholder = auto;
-  const end = document.createElement("span");
-  end.className = "row-unit";
-  end.textContent = unit;
-  element.append(field.element, end);
+  element.append(field.element, make("span", "row-unit", unit));
   return {
     element,
     limits: field.limits,
@@ -105,8 +103,7 @@ export function textRow({ label, title, take, refuse }) {
 /** @param {{label: string, title: string, change: (on: boolean) => void}} options */
 export function checkRow({ label, title, change }) {
   const { element, head } = row("label", label, title);
-  const input = document.createElement("input");
-  input.type = "checkbox";
+  const input = make("input", { type: "checkbox" });
   input.addEventListener("change", () => change(input.checked));
   element.append(input);
   return {
@@ -128,7 +125,7 @@ export function checkRow({ label, title, change }) {
  */
 export function choiceRow({ label, title, options, change }) {
   const { element, head } = row("label", label, title);
-  const select = document.createElement("select");
+  const select = make("select");
   const fill = (/** @type {[string, string][]} */ choices) => select.replaceChildren(...choices.map(([value, text]) => new Option(text, value)));
   fill(options);
   select.addEventListener("change", () => change(/** @type {T} */ (select.value)));
@@ -168,21 +165,6 @@ export function sliderRow({ label, title, min, max, step, format, change }) {
 }
 
 /**
- * @param {string} text
- * @param {string} title
- * @param {() => void} run
- */
-export function textButton(text, title, run) {
-  const element = document.createElement("button");
-  Object.assign(element, { type: "button", textContent: text, title });
-  element.addEventListener("click", (event) => {
-    if (event.detail > 0) element.blur();
-    run();
-  });
-  return element;
-}
-
-/**
  * Text with few digits: no trailing zeros, no rounding errors of converted units.
  *
  * @param {number} value
@@ -197,12 +179,8 @@ export function tidy(value) {
  * @param {string} title
  */
 function row(kind, label, title) {
-  const element = document.createElement(kind);
-  element.className = "row";
-  element.title = title;
-  const head = document.createElement("span");
-  head.className = "row-label";
-  head.textContent = label;
+  const element = make(kind, { className: "row", title });
+  const head = make("span", "row-label", label);
   element.append(head);
   return { element, head };
 }
@@ -233,5 +211,5 @@ function throttled(change) {
 
 /** A paragraph of a section. */
 export function sectionNote(text = "") {
-  return Object.assign(document.createElement("p"), { className: "section-note", textContent: text });
+  return make("p", "section-note", text);
 }

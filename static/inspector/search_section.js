@@ -1,6 +1,7 @@
 /** Settings of the search that hold for all stages. The search drawer has those of single stages. */
 
-import { checkRow, choiceRow, numberRow, textButton, textRow } from "./rows.js";
+import { make, textButton } from "../widgets/elements.js";
+import { checkRow, choiceRow, numberRow, textRow } from "./rows.js";
 
 /** @typedef {import("../model/protocol.js").SearchValues} SearchValues */
 
@@ -96,11 +97,10 @@ export function searchSection({ store, send, notify }) {
     const { settings } = store.facts;
     if (settings) set(settings.search_default);
   });
-  const note = document.createElement("p");
+  const note = make("p");
   note.className = "section-note";
   note.textContent = "The search drawer (B) has bounds and steps of single stages.";
-  const body = document.createElement("div");
-  body.append(...numbers.map(({ row }) => row.element), passes.element, theta.element, outliers.element, apart.element, note, reset);
+  const body = make("div", {}, ...numbers.map(({ row }) => row.element), passes.element, theta.element, outliers.element, apart.element, note, reset);
 
   const show = () => {
     const { settings } = store.facts;

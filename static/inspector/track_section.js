@@ -1,6 +1,7 @@
 /** Settings of the tracker. */
 
-import { checkRow, choiceRow, numberRow, textButton } from "./rows.js";
+import { make, textButton } from "../widgets/elements.js";
+import { checkRow, choiceRow, numberRow } from "./rows.js";
 
 /** @typedef {import("../model/protocol.js").TrackChanges} TrackChanges */
 /** @typedef {import("../model/protocol.js").OptionInfo} OptionInfo */
@@ -15,8 +16,8 @@ import { checkRow, choiceRow, numberRow, textButton } from "./rows.js";
 export function trackSection({ store, send, notify }) {
   const set = (/** @type {TrackChanges} */ changes) => send({ type: "track_settings", changes });
   const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
-  const choices = document.createElement("div");
-  const options = document.createElement("div");
+  const choices = make("div");
+  const options = make("div");
   /** @type {ReturnType<typeof choiceRow> | null} */
   let method = null;
   let shown = "";
@@ -38,8 +39,7 @@ export function trackSection({ store, send, notify }) {
     const { method: name, stride: every, cameras: all } = settings.track_default;
     set({ method: name, stride: every, cameras: all, options: Object.fromEntries([...rows.keys()].map((key) => [key, null])) });
   });
-  const body = document.createElement("div");
-  body.append(choices, stride.element, cameras.element, options, reset);
+  const body = make("div", {}, choices, stride.element, cameras.element, options, reset);
 
   /** @param {MethodInfo[]} methods */
   const build = (methods) => {
@@ -112,15 +112,9 @@ function optionRow({ label, help, kind, choices, limits, step }, change, refuse)
  * @param {(text: string) => void} refuse
  */
 function cameraChoices(change, refuse) {
-  const element = document.createElement("div");
-  element.title = "Cameras to track with. The others are still shown";
-  element.setAttribute("role", "group");
-  element.setAttribute("aria-label", "Cameras to track with");
-  const head = document.createElement("span");
-  head.className = "row-label";
-  head.textContent = "Cameras";
-  const list = document.createElement("div");
-  list.className = "camera-choices";
+  const element = make("div", { title: "Cameras to track with. The others are still shown", role: "group", "aria-label": "Cameras to track with" });
+  const head = make("span", "row-label", "Cameras");
+  const list = make("div", "camera-choices");
   element.append(head, list);
   const boxes = () => [...list.querySelectorAll("input")];
   let built = "";
@@ -152,9 +146,5 @@ function cameraChoices(change, refuse) {
 
 /** @param {string} name */
 function cameraBox(name) {
-  const label = document.createElement("label");
-  const box = document.createElement("input");
-  Object.assign(box, { type: "checkbox", value: name });
-  label.append(box, name);
-  return label;
+  return make("label", {}, make("input", { type: "checkbox", value: name }), name);
 }

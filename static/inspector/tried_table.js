@@ -1,5 +1,6 @@
 /** Table of what the tracker searched on the frame, from the store. */
 
+import { make } from "../widgets/elements.js";
 import { capital } from "../widgets/text.js";
 
 /** @typedef {import("../model/protocol.js").TriedSearch} TriedSearch */
@@ -8,11 +9,10 @@ const COSTS = "Costs in nats, comparable within a line: 3 nats less are 20 times
 
 /** @returns {{element: HTMLElement, show: (tried: readonly TriedSearch[] | null | undefined) => void}} */
 export function triedTable() {
-  const element = Object.assign(document.createElement("div"), { className: "tried" });
-  const heading = Object.assign(document.createElement("h4"), { textContent: "Searched by the tracker on this frame" });
-  const sentence = Object.assign(document.createElement("p"), { className: "section-note" });
-  const table = Object.assign(document.createElement("table"), { className: "tried-table" });
-  element.append(heading, sentence, table);
+  const element = make("div", "tried");
+  const sentence = make("p", "section-note");
+  const table = make("table", "tried-table");
+  element.append(make("h4", {}, "Searched by the tracker on this frame"), sentence, table);
   let shown = "";
   return {
     element,
@@ -46,10 +46,7 @@ function row({ what, before_nats, after_nats, taken }) {
  * @param {string[]} texts
  */
 function line(kind, texts) {
-  const element = document.createElement("tr");
-  element.append(...texts.map((textContent) => Object.assign(document.createElement(kind), { textContent })));
-  element.title = COSTS;
-  return element;
+  return make("tr", { title: COSTS }, ...texts.map((textContent) => make(kind, {}, textContent)));
 }
 
 /** @param {number} cost */

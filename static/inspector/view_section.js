@@ -1,7 +1,8 @@
 /** Theme of the page, error ellipses, and what the 3-D view shows: layers, the camera to look through, the floor and trails. */
 
+import { make, textButton } from "../widgets/elements.js";
 import { displayName } from "../widgets/text.js";
-import { checkRow, choiceRow, sliderRow, textButton } from "./rows.js";
+import { checkRow, choiceRow, sliderRow } from "./rows.js";
 
 const FREE = "free";
 const MAX_TRAIL_FRAMES = 250;
@@ -102,12 +103,12 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
     format: String,
     change: (value) => set({ trail_frames: value }),
   });
-  const points = document.createElement("div");
+  const points = make("div");
   points.className = "trail-points";
   points.setAttribute("role", "group");
   points.setAttribute("aria-label", "Points with a trail");
   const noTrails = textButton("No trails", "Remove all trails", () => set({ trail_points: [] }));
-  const body = document.createElement("div");
+  const body = make("div");
   const [bodies, ...others] = layers.map(({ row }) => row.element);
   body.append(
     theme.element, link.element, ellipses.element, noErrors, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction, character.element,
@@ -170,14 +171,10 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
  * @param {(on: boolean) => void} change
  */
 function pointChoice(name, change) {
-  const label = document.createElement("label");
-  label.title = `Trail of the ${displayName(name)}`;
-  const input = document.createElement("input");
-  Object.assign(input, { type: "checkbox", value: name });
+  const label = make("label", { title: `Trail of the ${displayName(name)}` });
+  const input = make("input", { type: "checkbox", value: name });
   input.addEventListener("change", () => change(input.checked));
-  const text = document.createElement("span");
-  text.textContent = displayName(name);
-  label.append(input, text);
+  label.append(input, make("span", {}, displayName(name)));
   return label;
 }
 
@@ -189,21 +186,14 @@ function describe({ up, tilt_deg, height_m, origin }) {
 
 /** @param {string} text */
 function heading(text) {
-  const element = document.createElement("h4");
-  element.textContent = text;
-  return element;
+  return make("h4", {}, text);
 }
 
 function note() {
-  const element = document.createElement("p");
-  element.className = "section-note";
-  return element;
+  return make("p", "section-note");
 }
 
 /** @param {HTMLElement[]} all */
 function buttons(...all) {
-  const element = document.createElement("div");
-  element.className = "section-buttons";
-  element.append(...all);
-  return element;
+  return make("div", "section-buttons", ...all);
 }

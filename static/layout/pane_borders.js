@@ -1,5 +1,6 @@
 /** Borders between the panes, moved by pointer or arrow keys. A corner moves all borders that meet there. */
 
+import { make } from "../widgets/elements.js";
 import { makeSeparator, onDrag, showPosition } from "../widgets/separator.js";
 
 /**
@@ -64,7 +65,7 @@ export class PaneBorders {
       this.#grid.append(...(known.bar.isConnected ? [] : [known.bar]));
       return known.bar;
     }
-    const bar = document.createElement("div");
+    const bar = make("div");
     const shown = { bar, border };
     this.#shown.set(keyOf(border), shown);
     bar.className = "pane-border";
@@ -95,10 +96,7 @@ export class PaneBorders {
 
   /** By keys, each border is moved by itself. */
   #newCorner() {
-    const element = document.createElement("div");
-    element.className = "pane-corner";
-    element.title = "Drag to resize, double-click to reset";
-    element.setAttribute("aria-hidden", "true");
+    const element = make("div", { className: "pane-corner", title: "Drag to resize, double-click to reset", "aria-hidden": "true" });
     const corner = { element, borders: /** @type {Border[]} */ ([]) };
     onDrag(element, () => {
       const moved = corner.borders;

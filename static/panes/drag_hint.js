@@ -4,6 +4,8 @@
  * The hint does not follow the pointer, where it would cover the joint and cost a repaint with each move.
  */
 
+import { make } from "../widgets/elements.js";
+
 /** @type {Record<import("../model/protocol.js").DragMode, string>} */
 const HINTS = {
   move: "Shift: turn or tilt · Ctrl: depth · Alt or Ctrl+Shift: bend the trunk",
@@ -13,14 +15,12 @@ const HINTS = {
 };
 
 export class DragHint {
-  #element = document.createElement("div");
+  #element = make("div", { className: "drag-hint", "aria-hidden": "true" });
   /** @type {import("../model/protocol.js").DragMode | null} the mode of the text that is shown */
   #mode = null;
 
   constructor() {
-    this.#element.className = "drag-hint";
     this.#element.hidden = true;
-    this.#element.setAttribute("aria-hidden", "true");
     document.body.append(this.#element);
   }
 

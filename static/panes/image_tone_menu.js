@@ -1,6 +1,6 @@
 /** Popover for brightness, contrast and gamma of a camera's image. */
 
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { PLAIN, isPlain } from "../model/image_tone.js";
 import { slider, togglePopover } from "../widgets/popovers.js";
 
@@ -13,10 +13,10 @@ export class ImageToneMenu {
   #store;
   #imageTones;
   #panel = byId("image-tone-menu", HTMLElement);
-  #title = document.createElement("h3");
+  #title = make("h3");
   #camera = 0;
   #closedAt = -Infinity;
-  #reset = document.createElement("button");
+  #reset = make("button", {}, "Reset");
   /** @type {(() => void)[]} */
   #show = [];
 
@@ -68,9 +68,7 @@ export class ImageToneMenu {
    */
   #row(label, title, field) {
     const isGamma = field === "gamma";
-    const caption = document.createElement("span");
-    caption.textContent = label;
-    caption.title = title;
+    const caption = make("span", { title }, label);
     const control = slider({
       label,
       title,
@@ -90,15 +88,12 @@ export class ImageToneMenu {
   }
 
   #buildFoot() {
-    const foot = document.createElement("div");
+    const foot = make("div");
     foot.className = "popover-foot";
-    const all = document.createElement("button");
-    all.type = "button";
-    all.textContent = "All cameras";
+    const all = make("button", { type: "button" }, "All cameras");
     all.title = "Apply these settings to all cameras";
     all.addEventListener("click", () => this.#imageTones.setAll(this.#tone));
     this.#reset.type = "button";
-    this.#reset.textContent = "Reset";
     this.#reset.title = "Show the original image";
     this.#reset.addEventListener("click", () => this.#imageTones.set(this.#camera, PLAIN));
     this.#show.push(() => (this.#reset.disabled = isPlain(this.#tone)));

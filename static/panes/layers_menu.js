@@ -1,6 +1,6 @@
 /** Popover of all layers, and switches of the most important ones in the top bar. */
 
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { BY_KEY, LAYERS } from "../model/layers.js";
 import { opensPopover, slider, togglePopover } from "../widgets/popovers.js";
 
@@ -64,9 +64,7 @@ export class LayersMenu {
 
   /** @param {string} group */
   #buildGroup(group) {
-    const heading = document.createElement("h3");
-    heading.textContent = group;
-    this.#panel.append(heading);
+    this.#panel.append(make("h3", {}, group));
     // In painting order, topmost first.
     for (const info of LAYERS.filter((layer) => layer.group === group).reverse()) {
       this.#panel.append(...this.#row(info));
@@ -80,7 +78,7 @@ export class LayersMenu {
     element.className = "popover-check";
     input.dataset.layer = id;
     input.addEventListener("change", () => this.#layers.toggle([id], input.checked));
-    const key = document.createElement("kbd");
+    const key = make("kbd");
     const number = BY_KEY.indexOf(id) + 1;
     key.textContent = number ? `⇧${number}` : "";
     key.title = number ? `Shift+${number}` : "";
@@ -105,7 +103,7 @@ export class LayersMenu {
   }
 
   #colors() {
-    const choice = document.createElement("fieldset");
+    const choice = make("fieldset");
     choice.className = "segmented popover-choice";
     choice.setAttribute("aria-label", "Colours of the contours");
     for (const [value, label, title] of /** @type {const} */ ([
@@ -122,12 +120,10 @@ export class LayersMenu {
   }
 
   #buildFoot() {
-    const foot = document.createElement("div");
+    const foot = make("div");
     foot.className = "popover-foot";
-    const hint = document.createElement("span");
-    hint.textContent = "Saved in this browser for this session";
-    const reset = document.createElement("button");
-    reset.type = "button";
+    const hint = make("span", {}, "Saved in this browser for this session");
+    const reset = make("button", { type: "button" });
     reset.id = "reset-layers";
     reset.textContent = "Reset layers";
     reset.title = "Restore the default layers and opacities";
@@ -142,11 +138,9 @@ export class LayersMenu {
  * @param {string} title
  */
 function checkbox(label, title) {
-  const element = document.createElement("label");
-  const input = document.createElement("input");
-  input.type = "checkbox";
-  const text = document.createElement("span");
-  text.textContent = label;
+  const element = make("label");
+  const input = make("input", { type: "checkbox" });
+  const text = make("span", {}, label);
   element.title = title;
   element.append(input, text);
   return { element, input };

@@ -1,5 +1,6 @@
 /** Pane of one camera: two canvases, labels in the corners, zoom and pan. */
 
+import { make } from "../widgets/elements.js";
 import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
 import { decluttered } from "./declutter.js";
@@ -29,13 +30,13 @@ const NARROW_PX = 250;
 const [ENOUGH, MORE_THAN_ENOUGH] = [0.95, 1.25];
 
 export class Pane {
-  element = document.createElement("section");
+  element = make("section", "pane");
   view;
   #store;
   #camera;
   #info;
-  #image = document.createElement("canvas");
-  #overlay = document.createElement("canvas");
+  #image = make("canvas");
+  #overlay = make("canvas", "pane-overlay");
   #corner;
   #tonedImage = new TonedImage();
   #onView;
@@ -55,9 +56,7 @@ export class Pane {
     this.#info = info;
     this.#onView = viewChanged;
     this.view = new PaneView(info.width, info.height);
-    this.element.className = "pane";
     this.element.setAttribute("aria-label", `Camera ${info.name}`);
-    this.#overlay.className = "pane-overlay";
     this.#corner = new PaneCorner(camera, info.name, {
       reset: () => this.reset(),
       openToneMenu: (button) => openToneMenu(camera, button),

@@ -1,5 +1,6 @@
 /** Labels in the corners of a pane: camera, visibility of the selected joint, cost, scale and tools. */
 
+import { make } from "../widgets/elements.js";
 import { displayName, px } from "../widgets/text.js";
 
 const SCALE_FROM_PX = 230;
@@ -17,15 +18,15 @@ const MEANINGS = {
 };
 
 export class PaneCorner {
-  #label = document.createElement("div");
-  #mark = document.createElement("span");
-  #word = document.createElement("span");
-  #joint = document.createElement("output");
-  #cost = document.createElement("output");
-  #tools = document.createElement("div");
-  #placeholder = document.createElement("div");
-  #scale = document.createElement("div");
-  #limit = document.createElement("span");
+  #label = make("div", "pane-label");
+  #mark = make("span");
+  #word = make("span");
+  #joint = make("output", { className: "pane-joint", hidden: true });
+  #cost = make("output", { className: "pane-cost", title: "Chamfer cost of this view, in pixels" });
+  #tools = make("div", "pane-tools");
+  #placeholder = make("div", { className: "pane-placeholder", title: "The requested frame is loading. Until it arrives, the nearest available frame is shown", hidden: true });
+  #scale = make("div", { className: "pane-scale", title: "Distance image: distance to the nearest edge, in image pixels", hidden: true });
+  #limit = make("span");
   #fit;
   #tone;
 
@@ -35,30 +36,15 @@ export class PaneCorner {
    * @param {{reset: () => void, openToneMenu: (button: HTMLElement) => void}} run
    */
   constructor(camera, name, { reset, openToneMenu }) {
-    this.#label.className = "pane-label";
-    const number = document.createElement("kbd");
-    number.textContent = String(camera + 1);
-    const title = document.createElement("span");
-    title.className = "pane-name";
-    title.textContent = name;
-    this.#joint.className = "pane-joint";
+    const number = make("kbd", {}, String(camera + 1));
+    const title = make("span", "pane-name", name);
     this.#joint.append(this.#mark, this.#word);
-    this.#joint.hidden = true;
     this.#label.append(number, title, this.#joint);
     this.#label.title = `Camera ${camera + 1}, ${name}: press ${keysOf(camera)} or double-click to fill the grid`;
 
-    this.#cost.className = "pane-cost";
-    this.#cost.title = "Chamfer cost of this view, in pixels";
 
-    this.#placeholder.className = "pane-placeholder";
-    this.#placeholder.title = "The requested frame is loading. Until it arrives, the nearest available frame is shown";
-    this.#placeholder.hidden = true;
 
-    this.#scale.className = "pane-scale";
-    const bar = document.createElement("i");
-    this.#scale.append("0", bar, this.#limit);
-    this.#scale.title = "Distance image: distance to the nearest edge, in image pixels";
-    this.#scale.hidden = true;
+    this.#scale.append("0", make("i"), this.#limit);
     this.#fit = toolButton("Whole", "Show the whole image (0)", `Show the whole image of ${name}`);
     this.#fit.classList.add("pane-reset");
     this.#fit.addEventListener("click", () => {
@@ -68,7 +54,6 @@ export class PaneCorner {
     this.#tone = toolButton("◐", "Brightness and contrast (I)", `Brightness and contrast of ${name}`);
     this.#tone.classList.add("pane-tone");
     this.#tone.addEventListener("click", () => openToneMenu(this.#tone));
-    this.#tools.className = "pane-tools";
     this.#tools.append(this.#scale, this.#tone, this.#fit);
   }
 
@@ -89,7 +74,7 @@ export class PaneCorner {
   showPlaceholder(placeholder) {
     this.#placeholder.hidden = placeholder === null || placeholder.frame === placeholder.target;
     if (!placeholder) return;
-    const word = document.createElement("span"); // hidden in a narrow pane
+    const word = make("span"); // hidden in a narrow pane
     word.textContent = "frame ";
     this.#placeholder.replaceChildren(word, `${placeholder.frame}, while ${placeholder.target} loads`);
   }
@@ -140,7 +125,7 @@ function keysOf(camera) {
  * @param {string} name for screen readers
  */
 function toolButton(text, title, name) {
-  const button = document.createElement("button");
+  const button = make("button");
   button.type = "button";
   button.textContent = text;
   button.title = title;

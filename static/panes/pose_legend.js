@@ -1,6 +1,6 @@
 /** Legend of the poses that the panes show besides the stored ones: replayed, tested, compared, previewed, alternative. */
 
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { shownMisfits } from "../model/selectors.js";
 import { LINE_STYLES } from "./drawing.js";
 
@@ -71,7 +71,7 @@ export class PoseLegend {
  * @param {{kind: Kind, color: string}} [line] of which a sample is drawn
  */
 function entry(text, line) {
-  const item = document.createElement("span");
+  const item = make("span");
   if (line) item.append(sampleOf(line.kind, line.color));
   item.append(text);
   return item;

@@ -1,6 +1,6 @@
 /** The people on the session: initials in the top bar, and a list with frames in a popover. */
 
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { capital } from "../widgets/text.js";
 import { colorOf, initialsOf, nameOf } from "./marks.js";
@@ -40,7 +40,7 @@ export class Here {
     const people = this.#context.store.facts.presence?.people ?? [];
     const others = people.filter(({ is_self }) => !is_self);
     const chips = others.slice(0, SHOWN).map((person) => chipOf(person, people.indexOf(person)));
-    if (others.length > SHOWN) chips.push(Object.assign(document.createElement("span"), { textContent: `+${others.length - SHOWN}` }));
+    if (others.length > SHOWN) chips.push(make("span", {}, `+${others.length - SHOWN}`));
     this.#chips.replaceChildren(...chips);
     this.#showButton();
     const names = others.map((person) => `${nameOf(person)} on frame ${person.frame}`);
@@ -60,17 +60,13 @@ export class Here {
    * @param {number} index
    */
   #row(person, index) {
-    const row = document.createElement("li");
-    const name = Object.assign(document.createElement("span"), { className: "participant-name" });
-    name.textContent = nameOf(person) + (person.is_self ? " (you)" : "");
-    const role = Object.assign(document.createElement("span"), { className: "quiet", textContent: ROLES[person.role] });
+    const row = make("li");
+    const name = make("span", "participant-name", nameOf(person) + (person.is_self ? " (you)" : ""));
+    const role = make("span", "quiet", ROLES[person.role]);
     const work = capital(person.doing);
-    const at = Object.assign(document.createElement("button"), {
-      type: "button", textContent: `Frame ${person.frame}`, title: `Go to frame ${person.frame}`, disabled: person.is_self,
-    }); // prettier-ignore
+    const at = make("button", { type: "button", title: `Go to frame ${person.frame}`, disabled: person.is_self }, `Frame ${person.frame}`); // prettier-ignore
     at.addEventListener("click", () => this.#context.navigation.goTo(person.frame));
-    const doing = Object.assign(document.createElement("span"), { className: "participant-work", textContent: work });
-    row.append(chipOf(person, index), name, role, at, doing);
+    row.append(chipOf(person, index), name, role, at, make("span", "participant-work", work));
     return row;
   }
 }
@@ -80,8 +76,7 @@ export class Here {
  * @param {number} index
  */
 function chipOf(person, index) {
-  const chip = Object.assign(document.createElement("span"), { className: "participant-chip", textContent: initialsOf(person) });
-  chip.style.setProperty("--participant", colorOf(index));
+  const chip = make("span", { className: "participant-chip", "--participant": colorOf(index) }, initialsOf(person));
   chip.classList.toggle("is-at-work", person.doing !== "");
   chip.setAttribute("aria-hidden", "true");
   return chip;

@@ -1,5 +1,7 @@
 /** The field for the name by which a page joins. */
 
+import { make } from "../widgets/elements.js";
+
 const DOES = { host: "annotate", annotate: "annotate", review: "review", look: "look around" };
 
 /**
@@ -7,13 +9,11 @@ const DOES = { host: "annotate", annotate: "annotate", review: "review", look: "
  * @param {string} place of the form in the page, which makes its field's id unique
  */
 export function joinForm({ store, joinAs }, place) {
-  const form = Object.assign(document.createElement("form"), { className: "join-form" });
-  const input = Object.assign(document.createElement("input"), {
-    type: "text", id: `join-name-${place}`, name: "name", maxLength: 60, required: true, autocomplete: "name", className: "query-field",
-  }); // prettier-ignore
-  const label = Object.assign(document.createElement("label"), { htmlFor: input.id });
-  const join = Object.assign(document.createElement("button"), { type: "submit", textContent: "Join" });
-  const refusal = Object.assign(document.createElement("output"), { className: "join-refusal" });
+  const form = make("form", "join-form");
+  const input = make("input", { type: "text", id: `join-name-${place}`, name: "name", maxLength: 60, required: true, autocomplete: "name", className: "query-field" }); // prettier-ignore
+  const label = make("label", { htmlFor: input.id });
+  const join = make("button", { type: "submit" }, "Join");
+  const refusal = make("output", "join-refusal");
   join.title = "Work under this name, on a frame of your own (Enter)";
   form.append(label, input, join, refusal);
   form.addEventListener("submit", (event) => {

@@ -1,5 +1,6 @@
 /** Marks along the timeline at the frames of the others. */
 
+import { make } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { colorOf, initialsOf, nameOf } from "./marks.js";
 
@@ -11,7 +12,7 @@ const [STEP_PX, MAX_STEPS] = [13, 2];
 export class PlaceMarks {
   #timeline;
   #store;
-  #layer = Object.assign(document.createElement("div"), { className: "place-marks" });
+  #layer = make("div", "place-marks");
 
   /**
    * @param {HTMLElement} timeline
@@ -35,8 +36,7 @@ export class PlaceMarks {
     const shown = others.filter(({ person }) => axis.shows(person.frame));
     const marks = shown.map(({ person, index }, at) => {
       const before = shown.slice(0, at).filter((one) => Math.abs(axis.middle(one.person.frame) - axis.middle(person.frame)) < WIDTH_PX);
-      const mark = Object.assign(document.createElement("span"), { className: "place-mark", textContent: initialsOf(person) });
-      mark.title = `${nameOf(person)} is on frame ${person.frame}`;
+      const mark = make("span", { className: "place-mark", title: `${nameOf(person)} is on frame ${person.frame}` }, initialsOf(person));
       mark.style.left = `${axis.middle(person.frame)}px`;
       mark.style.top = `${2 + STEP_PX * Math.min(before.length, MAX_STEPS)}px`;
       mark.style.setProperty("--participant", colorOf(index));

@@ -2,7 +2,7 @@
 
 import { contradictions, keyframeDoubt } from "../model/keyframe_doubts.js";
 import { reasonOf } from "../model/selectors.js";
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { displayName, px } from "../widgets/text.js";
 
 const STORED_OPEN = "quadrille.parts-open";
@@ -72,7 +72,7 @@ function leftBesideRight(names) {
 
 /** An empty cell. It is an output element, because every second output ends a row. */
 function gap() {
-  return [document.createElement("output")];
+  return [make("output")];
 }
 
 /**
@@ -80,11 +80,8 @@ function gap() {
  * @param {number | null} cost px; null for a part that is visible in no view
  */
 function row(name, cost) {
-  const label = document.createElement("span");
-  label.textContent = displayName(name);
-  const bar = document.createElement("i");
-  bar.style.setProperty("--filled", `${Math.min(100, (100 * (cost ?? 0)) / FULL_PX)}%`);
-  const value = document.createElement("output");
-  value.textContent = cost === null ? "not visible" : px(cost);
+  const label = make("span", {}, displayName(name));
+  const bar = make("i", { "--filled": `${Math.min(100, (100 * (cost ?? 0)) / FULL_PX)}%` });
+  const value = make("output", {}, cost === null ? "not visible" : px(cost));
   return [label, bar, value];
 }

@@ -2,7 +2,7 @@
 
 import { CopyMenu } from "./copy_menu.js";
 import { meaning, shortName } from "./dof_names.js";
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { numberField } from "../widgets/number_field.js";
 import { makeScrubber } from "../widgets/scrubber.js";
 import { displayName } from "../widgets/text.js";
@@ -130,14 +130,11 @@ export class JointBar {
    */
   #field(info, dof, point) {
     const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
-    const row = document.createElement("div");
-    row.className = "dof";
+    const row = make("div", "dof");
     const hint = "Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.";
     const effect = meaning(info);
     row.title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}, ${range(info)}. ${hint}`;
-    const label = document.createElement("span");
-    label.className = "dof-name";
-    label.append(span("is-whole", name), span("is-brief", shortName(info.name)));
+    const label = make("span", "dof-name", span("is-whole", name), span("is-brief", shortName(info.name)));
     makeScrubber(label, {
       begin: () => (this.#posing.isLocked([dof]) ? null : (this.#store.facts.state?.dofs[dof] ?? null)),
       perPixel: PER_PIXEL[info.unit],
@@ -150,11 +147,10 @@ export class JointBar {
       step: (factor) => this.#posing.turn(factor),
     });
     entry.element.addEventListener("focus", () => this.#posing.selectDof(dof));
-    const unit = document.createElement("span");
+    const unit = make("span");
     unit.className = "dof-unit";
     unit.textContent = UNITS[info.unit];
-    const lock = document.createElement("button");
-    lock.type = "button";
+    const lock = make("button", { type: "button" });
     lock.className = "is-lock";
     lock.addEventListener("click", (event) => {
       if (event.detail > 0) lock.blur();
@@ -206,7 +202,7 @@ export class JointBar {
  * @param {string} text
  */
 function span(className, text) {
-  return Object.assign(document.createElement("span"), { className, textContent: text });
+  return make("span", className, text);
 }
 
 /**

@@ -1,7 +1,7 @@
 /** Notes on the shown pose, over the images: what deserves a look, each with the button that answers it. */
 
 import { hasSearch } from "../model/selectors.js";
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { displayName } from "../widgets/text.js";
 
 /** @typedef {{text: string, button?: {text: string, title: string, run: () => void}}} Note */
@@ -85,10 +85,9 @@ export class PoseNotes {
 
 /** @param {Note} note */
 function row({ text, button }) {
-  const item = document.createElement("li");
-  item.append(Object.assign(document.createElement("span"), { textContent: text }));
+  const item = make("li", {}, make("span", {}, text));
   if (button) {
-    const press = Object.assign(document.createElement("button"), { type: "button", textContent: button.text, title: button.title });
+    const press = make("button", { type: "button", title: button.title }, button.text);
     press.addEventListener("click", (event) => {
       if (event.detail > 0) press.blur();
       button.run();

@@ -2,7 +2,7 @@
 
 import { prepare } from "../panes/drawing.js";
 import { imageColor } from "../widgets/image_colors.js";
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
 import { selectedRun } from "../model/search_runs.js";
 
@@ -15,8 +15,8 @@ export class CandidateStrip {
   #store;
   #send;
   #element = byId("candidates", HTMLElement);
-  #list = document.createElement("div");
-  #label = document.createElement("span");
+  #list = make("div", "strip-list");
+  #label = make("span", "strip-label");
   /** @type {unknown[]} the arguments of the last drawing; candidates change less often than steps */
   #drawn = [];
 
@@ -27,8 +27,6 @@ export class CandidateStrip {
   constructor(store, send) {
     this.#store = store;
     this.#send = send;
-    this.#label.className = "strip-label";
-    this.#list.className = "strip-list";
     this.#element.append(this.#label, this.#list);
   }
 
@@ -69,10 +67,7 @@ export class CandidateStrip {
 
   /** @param {number} index */
   #make(index) {
-    const element = document.createElement("button");
-    element.type = "button";
-    element.className = "candidate";
-    element.append(document.createElement("canvas"), document.createElement("output"));
+    const element = make("button", { type: "button", className: "candidate" }, make("canvas"), make("output"));
     const preview = (/** @type {number | null} */ candidate) => {
       const run = selectedRun(this.#store.facts);
       if (run) this.#send({ type: "preview", run: run.number, candidate });

@@ -4,7 +4,7 @@
 
 import { colorName, dashOf } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { Plot } from "../widgets/plot.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count } from "../widgets/text.js";
@@ -20,8 +20,8 @@ export class CostCurve {
   #store;
   #send;
   #element = byId("cost-curve", HTMLElement);
-  #lines = document.createElement("canvas");
-  #read = document.createElement("output");
+  #lines = make("canvas");
+  #read = make("output", "curve-readout");
   #hovered = /** @type {number | null} */ (null);
   #plot = /** @type {Plot | null} */ (null);
 
@@ -32,7 +32,6 @@ export class CostCurve {
   constructor(store, send) {
     this.#store = store;
     this.#send = send;
-    this.#read.className = "curve-readout";
     this.#element.append(this.#lines, this.#read);
     new ResizeObserver(() => this.#draw()).observe(this.#element);
     store.subscribe((changed) => changed.has("theme") && this.#draw());

@@ -2,9 +2,8 @@
 
 import { colorName, dashOf, lineSwatch } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
-import { byId } from "../widgets/elements.js";
+import { byId, make, textButton } from "../widgets/elements.js";
 import { Plot } from "../widgets/plot.js";
-import { makeButton } from "./search_widgets.js";
 import { displayName } from "../widgets/text.js";
 
 /** @typedef {import("../model/search_runs.js").Landscape} Landscape */
@@ -16,11 +15,11 @@ export class CostLandscape {
   #send;
   #element = byId("landscape", HTMLElement);
   #controls = byId("landscape-controls", HTMLElement);
-  #canvas = document.createElement("canvas");
-  #choice = document.createElement("select");
-  #legend = document.createElement("div");
+  #canvas = make("canvas");
+  #choice = make("select", { title: "Degree of freedom to vary; all others stay fixed", "aria-label": "Degree of freedom" });
+  #legend = make("div", "landscape-legend");
   /** Text shown until there is a landscape. */
-  #waiting = document.createElement("p");
+  #waiting = make("p", "landscape-waiting");
   #toMinimum;
   #hovered = /** @type {number | null} */ (null);
   #plot = /** @type {Plot | null} */ (null);
@@ -35,19 +34,15 @@ export class CostLandscape {
   constructor(store, send) {
     this.#store = store;
     this.#send = send;
-    this.#choice.title = "Degree of freedom to vary; all others stay fixed";
-    this.#choice.setAttribute("aria-label", "Degree of freedom");
     this.#choice.addEventListener("change", () => {
       send({ type: "landscape", dof: this.#choice.value });
       this.#choice.blur();
     });
-    this.#toMinimum = makeButton("To minimum", "Set this degree of freedom to the minimum of the cost", () => {
+    this.#toMinimum = textButton("To minimum", "Set this degree of freedom to the minimum of the cost", () => {
       const found = store.facts.landscape;
       if (found) this.#setTo(found.values[indexOfMin(found.total)]);
     });
-    this.#legend.className = "landscape-legend";
     this.#controls.append(this.#choice, this.#toMinimum, this.#legend);
-    this.#waiting.className = "landscape-waiting";
     this.#element.append(this.#canvas, this.#waiting);
     store.subscribe((changed) => {
       if (changed.has("drawer")) this.#open();
@@ -113,7 +108,7 @@ export class CostLandscape {
       : "Sampling the cost along one degree of freedom…";
     if (found && found.names.join() !== this.#listed) {
       this.#listed = found.names.join();
-      const groups = new Map(found.names.map((name) => [name.split(".")[0], document.createElement("optgroup")]));
+      const groups = new Map(found.names.map((name) => [name.split(".")[0], make("optgroup")]));
       for (const [joint, group] of groups) group.label = displayName(joint);
       for (const name of found.names) groups.get(name.split(".")[0])?.append(new Option(displayName(name).replace(".", " "), name));
       this.#choice.replaceChildren(...groups.values());
@@ -217,14 +212,14 @@ export class CostLandscape {
  * @param {number} index of the curve
  */
 function legendEntry(label, index) {
-  const entry = document.createElement("span");
+  const entry = make("span");
   if (label) {
     entry.append(lineSwatch(index), label);
     entry.title = index === 0 ? "Mean of all views, px" : `Cost in ${label}, px`;
   } else {
     entry.title = "Value under the pointer, or of the current pose";
   }
-  entry.append(document.createElement("output"));
+  entry.append(make("output"));
   return entry;
 }
 

@@ -1,7 +1,6 @@
 /** Replay of the selected run, forward and backward. The stored pose does not change. */
 
-import { byId, iconButton } from "../widgets/elements.js";
-import { makeButton } from "./search_widgets.js";
+import { byId, iconButton, make, textButton } from "../widgets/elements.js";
 import { selectedRun } from "../model/search_runs.js";
 
 const STEPS_PER_S = 12;
@@ -9,8 +8,8 @@ const STEPS_PER_S = 12;
 export class ReplayBar {
   #store;
   #send;
-  #slider = document.createElement("input");
-  #text = document.createElement("output");
+  #slider = make("input");
+  #text = make("output", "replay-text");
   #buttons;
   #leave;
   #play;
@@ -41,12 +40,11 @@ export class ReplayBar {
     slider.setAttribute("aria-label", "Step of the search");
     slider.title = "Drag to replay the search; arrow keys move by one step";
     slider.addEventListener("input", () => this.#goTo(Number(slider.value)));
-    this.#text.className = "replay-text";
-    this.#leave = makeButton("Exit", "Exit the replay and show the current pose (Esc)", () => {
+    this.#leave = textButton("Exit", "Exit the replay and show the current pose (Esc)", () => {
       this.#pause();
       this.#send({ type: "replay", run: null, step: 0 });
     });
-    const group = document.createElement("div");
+    const group = make("div");
     group.className = "group";
     group.append(...this.#buttons);
     byId("replay-bar", HTMLElement).append(group, slider, this.#text, this.#leave);

@@ -1,6 +1,6 @@
 /** Tab of the drawer that compares the poses of a range with those that they replaced, such as those of another tracker. */
 
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { capital, count, displayName } from "../widgets/text.js";
 
 /**
@@ -116,11 +116,10 @@ export class RunComparison {
    */
   #stretch(stretch, isBusy) {
     const { first, last, person, verdict, frames } = stretch;
-    const item = document.createElement("li");
-    item.className = `is-${verdict}`;
+    const item = make("li", `is-${verdict}`);
     const named = first === last ? `frame ${first}` : `frames ${first}–${last}`;
     const go = small(capital(named), `Go to frame ${first}`, () => this.#navigation.goTo(first));
-    const text = Object.assign(document.createElement("span"), { textContent: `${verdict} on ${count(frames)}` });
+    const text = make("span", {}, `${verdict} on ${count(frames)}`);
     const keep = small("Keep", `Keep the new poses of ${named}`, () => {
       this.#kept.add(keyOf(stretch));
       this.#show();
@@ -138,16 +137,8 @@ export class RunComparison {
    * @param {number} largest mean distance of all rows, mm
    */
   #row(pose, largest) {
-    const row = document.createElement("tr");
-    row.dataset.frame = String(pose.frame);
-    row.addEventListener("click", () => this.#navigation.goTo(pose.frame));
-    const head = document.createElement("th");
-    head.scope = "row";
-    const go = document.createElement("button");
-    go.type = "button";
-    go.textContent = String(pose.frame);
-    go.title = `Go to frame ${pose.frame}`;
-    head.append(go);
+    const row = make("tr", { "data-frame": String(pose.frame), onclick: () => this.#navigation.goTo(pose.frame) });
+    const head = make("th", { scope: "row" }, make("button", { type: "button", title: `Go to frame ${pose.frame}` }, String(pose.frame)));
     const [now, other] = [pose.cost_px, pose.other_cost_px];
     const apart = cell(pose.apart_mm.toFixed(1));
     apart.className = "run-comparison-apart";
@@ -213,9 +204,7 @@ function keyOf({ person, first }) {
  * @param {() => void} run
  */
 function small(text, title, run) {
-  const one = Object.assign(document.createElement("button"), { type: "button", textContent: text, title });
-  one.addEventListener("click", run);
-  return one;
+  return make("button", { type: "button", title, onclick: run }, text);
 }
 
 /** @param {string[]} all */
@@ -225,9 +214,7 @@ function methods(all) {
 
 /** @param {string} text */
 function cell(text) {
-  const element = document.createElement("td");
-  element.textContent = text;
-  return element;
+  return make("td", {}, text);
 }
 
 /**

@@ -1,8 +1,7 @@
 /** Search runs of the current frame: results, differing settings, and buttons to compare and apply. */
 
 import { lineSwatch } from "../widgets/series_lines.js";
-import { byId } from "../widgets/elements.js";
-import { makeButton } from "./search_widgets.js";
+import { byId, make, textButton } from "../widgets/elements.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count, px } from "../widgets/text.js";
 
@@ -11,7 +10,7 @@ import { count, px } from "../widgets/text.js";
 export class RunList {
   #store;
   #send;
-  #list = document.createElement("div");
+  #list = make("div", "run-rows");
   /** @type {Map<number, Row>} */
   #rows = new Map();
 
@@ -22,10 +21,7 @@ export class RunList {
   constructor(store, send) {
     this.#store = store;
     this.#send = send;
-    const head = document.createElement("h3");
-    head.textContent = "Runs";
-    head.title = "Searches of this frame. Earlier runs are kept for comparison";
-    this.#list.className = "run-rows";
+    const head = make("h3", { title: "Searches of this frame. Earlier runs are kept for comparison" }, "Runs");
     byId("search-runs", HTMLElement).append(head, this.#list);
   }
 
@@ -49,22 +45,21 @@ export class RunList {
    * @returns {Row}
    */
   #makeRow(number) {
-    const element = document.createElement("div");
-    element.className = "run-row";
-    const look = makeButton(`Run ${number}`, `Show costs, stages and candidates of run ${number}`, () => {
+    const element = make("div", "run-row");
+    const look = textButton(`Run ${number}`, `Show costs, stages and candidates of run ${number}`, () => {
       this.#store.set({ searchRun: number });
     });
     look.className = "run-name";
     look.prepend(lineSwatch(number - 1));
-    const figures = document.createElement("div");
+    const figures = make("div");
     figures.className = "run-figures";
-    const differs = document.createElement("div");
+    const differs = make("div");
     differs.className = "run-differs";
-    const compare = makeButton("Compare", `Show the pose found by run ${number} in the views, dashed`, () => {
+    const compare = textButton("Compare", `Show the pose found by run ${number} in the views, dashed`, () => {
       const isOn = this.#store.facts.searchRuns?.compared === number;
       this.#send({ type: "compare", run: isOn ? null : number });
     });
-    const take = makeButton("Apply", `Use the pose found by run ${number}. Can be undone`, () =>
+    const take = textButton("Apply", `Use the pose found by run ${number}. Can be undone`, () =>
       this.#send({ type: "take", run: number, candidate: null }),
     );
     element.append(look, figures, compare, take, differs);

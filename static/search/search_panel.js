@@ -3,11 +3,11 @@
 import { hasSearch, hasTrack, stopTitle } from "../model/selectors.js";
 import { CandidateStrip } from "./candidate_strip.js";
 import { CostCurve } from "./cost_curve.js";
-import { byId } from "../widgets/elements.js";
+import { byId, make, textButton } from "../widgets/elements.js";
 import { ReplayBar } from "./replay_bar.js";
 import { RunList } from "./run_list.js";
 import { SearchTree } from "./search_tree.js";
-import { makeButton, makeNumber } from "./search_widgets.js";
+import { makeNumber } from "./search_widgets.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count, px } from "../widgets/text.js";
 
@@ -22,8 +22,8 @@ export class SearchPanel {
   #send;
   #panel = byId("search-panel", HTMLElement);
   #controls = byId("search-controls", HTMLElement);
-  #speed = document.createElement("select");
-  #figures = document.createElement("output");
+  #speed = make("select");
+  #figures = make("output");
   #buttons;
   #theta;
   #isOpen = false;
@@ -69,37 +69,36 @@ export class SearchPanel {
     const search = (/** @type {"step" | "stage" | "frame" | "contours" | "chains" | "stop"} */ action) => () => actions.search(action);
     const track = () => (hasTrack(store.facts.state) ? actions.togglePause() : actions.track("forward"));
     return {
-      step: makeButton("Step", "Run one expansion of the search (S)", search("step")),
-      stage: makeButton("Stage", "Run to the end of the current stage (Shift+S)", search("stage")),
-      frame: makeButton("Frame", "Run the whole search of this frame (F)", search("frame")),
-      contours: makeButton(
+      step: textButton("Step", "Run one expansion of the search (S)", search("step")),
+      stage: textButton("Stage", "Run to the end of the current stage (Shift+S)", search("stage")),
+      frame: textButton("Frame", "Run the whole search of this frame (F)", search("frame")),
+      contours: textButton(
         "Contours",
         "Fit the contours of this frame by Gauss-Newton; each iteration can be replayed",
         search("contours"),
       ),
-      chains: makeButton(
+      chains: textButton(
         "Chains",
         "Fit the contours of a rough pose chain by chain: root, trunk, each limb, then the whole body; each iteration can be replayed",
         search("chains"),
       ),
-      again: makeButton("Rerun", "Repeat the selected run from its start pose with the current settings (Shift+F)", () =>
+      again: textButton("Rerun", "Repeat the selected run from its start pose with the current settings (Shift+F)", () =>
         actions.searchAgain(),
       ),
-      track: makeButton("Track", "Track forward from this frame (T); pause or continue (Alt+P)", track),
-      stop: makeButton("Stop", "Stop the search or tracking and keep the best pose (Esc)", () =>
+      track: textButton("Track", "Track forward from this frame (T); pause or continue (Alt+P)", track),
+      stop: textButton("Stop", "Stop the search or tracking and keep the best pose (Esc)", () =>
         hasTrack(store.facts.state) ? actions.stopTracking() : actions.search("stop"),
       ),
     };
   }
 
   #build() {
-    const group = document.createElement("div");
+    const group = make("div");
     group.className = "group";
     group.setAttribute("role", "group");
     group.setAttribute("aria-label", "Search");
     group.append(...Object.values(this.#buttons));
-    const speed = document.createElement("label");
-    speed.className = "search-field";
+    const speed = make("label", "search-field");
     speed.title = "Search speed in expansions per second. Changes take effect immediately";
     this.#speed.append(...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
     this.#speed.setAttribute("aria-label", "Expansions per second");

@@ -3,7 +3,7 @@
  * stage, and the running stage.
  */
 
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { selectedRun } from "../model/search_runs.js";
 import { makeNumber } from "./search_widgets.js";
 import { count, displayName } from "../widgets/text.js";
@@ -62,7 +62,7 @@ export class SearchTree {
       this.#built = shape;
       this.#cells.clear();
       this.#fields = [];
-      const table = document.createElement("div");
+      const table = make("div");
       table.className = "tree-table";
       table.style.setProperty("--passes", String(setup.passes.length));
       table.append(...this.#head(setup));
@@ -157,8 +157,7 @@ export class SearchTree {
    * @param {Setup} setup
    */
   #rest(setup) {
-    const line = document.createElement("div");
-    line.className = "tree-rest";
+    const line = make("div", "tree-rest");
     const patience = makeNumber({
       label: "Patience",
       title: "A stage ends after this many expansions without improvement",
@@ -170,10 +169,8 @@ export class SearchTree {
       change: (value) => value !== null && this.#change({ max_expansions: Math.round(value) }),
     });
     this.#fields.push({ field: patience, read: (now) => now.patience }, { field: max, read: (now) => now.max_expansions });
-    const passes = document.createElement("label");
-    passes.className = "search-field";
-    passes.title = "Step factors: all stages are searched once per factor. The paper uses 1";
-    const text = document.createElement("input");
+    const passes = make("label", { className: "search-field", title: "Step factors: all stages are searched once per factor. The paper uses 1" });
+    const text = make("input");
     text.type = "text";
     text.value = setup.passes.join(" ");
     text.setAttribute("aria-label", passes.title);
@@ -184,12 +181,8 @@ export class SearchTree {
     });
     text.addEventListener("keydown", (event) => event.stopPropagation());
     passes.append("Passes", text);
-    const apart = document.createElement("label");
-    apart.className = "search-field";
-    apart.title = "Search the limbs of a group separately, not together as in the paper";
-    const box = document.createElement("input");
-    box.type = "checkbox";
-    box.checked = setup.limbs_apart;
+    const apart = make("label", { className: "search-field", title: "Search the limbs of a group separately, not together as in the paper" });
+    const box = make("input", { type: "checkbox", checked: setup.limbs_apart });
     box.addEventListener("change", () => {
       this.#change({ limbs_apart: box.checked });
       box.blur();
@@ -226,11 +219,7 @@ function describe({ name, factor, evaluations, gain_px, running }) {
  * @param {string} title
  */
 function cell(className, text, title) {
-  const element = document.createElement("div");
-  element.className = className;
-  element.textContent = text;
-  element.title = title;
-  return element;
+  return make("div", { className, title }, text);
 }
 
 /**

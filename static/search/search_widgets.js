@@ -1,23 +1,6 @@
 /** Small controls of the search tab. */
 
-/**
- * Make a button that loses focus after a click by pointer, so that keys keep their meaning.
- *
- * @param {string} text
- * @param {string} title
- * @param {() => void} run
- */
-export function makeButton(text, title, run) {
-  const element = document.createElement("button");
-  element.type = "button";
-  element.textContent = text;
-  element.title = title;
-  element.addEventListener("click", (event) => {
-    if (event.detail > 0) element.blur();
-    run();
-  });
-  return element;
-}
+import { make } from "../widgets/elements.js";
 
 /**
  * Make a field for an optional number. Input is sent when it is entered; values of the program are shown unless the user
@@ -26,14 +9,8 @@ export function makeButton(text, title, run) {
  * @param {{label: string, title: string, placeholder?: string, change: (value: number | null) => void}} options
  */
 export function makeNumber({ label, title, placeholder = "", change }) {
-  const element = document.createElement("label");
-  element.className = "search-field";
-  element.title = title;
-  const input = document.createElement("input");
-  input.type = "number";
-  input.step = "any";
-  input.placeholder = placeholder;
-  input.setAttribute("aria-label", title);
+  const element = make("label", { className: "search-field", title });
+  const input = make("input", { type: "number", step: "any", placeholder, "aria-label": title });
   let shown = "";
   const send = () => {
     if (input.value !== shown) change(input.value === "" ? null : Number(input.value));

@@ -1,5 +1,7 @@
 /** The table of a batch: a row for each recording, the one that needs a person most first. */
 
+import { make } from "../widgets/elements.js";
+
 /**
  * @typedef {{name: string, session: string, state: string, expected_error_mm: number | null, share_doubted: number,
  *   poses: number, verified: number, worst_frame: number | null, worst_person: string, seconds: number,
@@ -18,17 +20,14 @@ const STATES = /** @type {const} */ (["done", "failed", "running", "waiting"]);
  * @param {(folder: string, at: {frame: number, person: string}) => void} open opens a session at its worst frame
  */
 export function batchTable({ name, totals, recordings }, open) {
-  const box = document.createElement("details");
-  box.className = "batch";
-  const summary = document.createElement("summary");
+  const box = make("details", "batch");
+  const summary = make("summary");
   const counts = STATES.filter((state) => totals[state]).map((state) => `${totals[state]} ${state}`);
   const verified = `${Math.round(100 * totals.share_verified)}% verified, ${totals.hours.toFixed(1)} hours of workers`;
-  const title = document.createElement("b");
-  title.textContent = name;
-  summary.append(title, ` ${counts.join(", ")}; ${verified}`);
-  const table = document.createElement("table");
+  summary.append(make("b", {}, name), ` ${counts.join(", ")}; ${verified}`);
+  const table = make("table");
   const head = table.createTHead().insertRow();
-  for (const text of HEADS) head.append(Object.assign(document.createElement("th"), { textContent: text, scope: "col" }));
+  for (const text of HEADS) head.append(make("th", { scope: "col" }, text));
   const body = table.createTBody();
   for (const row of recordings) addRow(body.insertRow(), row, open);
   box.append(summary, table);
@@ -43,7 +42,7 @@ export function batchTable({ name, totals, recordings }, open) {
 function addRow(line, row, open) {
   const first = line.insertCell();
   if (row.state === "done") {
-    const button = document.createElement("button");
+    const button = make("button");
     const at = { frame: row.worst_frame ?? 0, person: row.worst_person };
     Object.assign(button, { type: "button", textContent: row.name });
     button.title = `Close this session and open ${row.name} at frame ${at.frame}, where it is worst`;
@@ -54,7 +53,7 @@ function addRow(line, row, open) {
   }
   const note = row.error || row.contradiction || (row.joined ?? "");
   if (note) {
-    const small = Object.assign(document.createElement("small"), { textContent: note });
+    const small = make("small", {}, note);
     small.classList.toggle("is-failed", row.error !== "");
     first.append(small);
   }

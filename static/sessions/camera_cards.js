@@ -1,6 +1,6 @@
 /** Cards of the calibrated cameras in the form of a new session: footage with a picture, and the offset of each. */
 
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { previewOf } from "./path_picker.js";
 
 /**
@@ -93,12 +93,11 @@ export class CameraCards {
    * @param {number} index
    */
   #card(name, choice, index) {
-    const card = document.createElement("li");
-    card.draggable = true;
+    const card = make("li", { draggable: true });
     card.classList.toggle("is-left-out", !choice.footage);
     const picture = choice.footage ? firstFrame(name, choice.footage) : noPicture("No footage");
-    const title = Object.assign(document.createElement("b"), { textContent: name });
-    const offset = document.createElement("input");
+    const title = make("b", {}, name);
+    const offset = make("input");
     Object.assign(offset, { id: `new-offset-${index}`, type: "number", step: "any", placeholder: "auto", value: String(choice.offset ?? ""), className: "query-field" });
     offset.title = `Offset of ${name}: number of frames that it began earlier than the others, such as 2 or 2.4. Empty: by the clocks of the footage, else 0`;
     offset.setAttribute("aria-label", `Offset of ${name} in frames`);
@@ -106,10 +105,7 @@ export class CameraCards {
       choice.offset = offset.value === "" ? null : Number(offset.value);
       this.#changed();
     });
-    const line = document.createElement("span");
-    line.className = "with-unit";
-    line.append("Offset", offset, "frames");
-    card.append(picture, title, this.#menu(name, choice, index), line);
+    card.append(picture, title, this.#menu(name, choice, index), make("span", "with-unit", "Offset", offset, "frames"));
     this.#listenToDrags(card, name);
     return card;
   }
@@ -120,11 +116,7 @@ export class CameraCards {
    * @param {number} index
    */
   #menu(name, choice, index) {
-    const menu = document.createElement("select");
-    menu.id = `new-footage-${index}`;
-    menu.title = `Footage of ${name}. That of another camera is exchanged`;
-    menu.setAttribute("aria-label", `Footage of ${name}`);
-    menu.append(new Option("Leave out", ""));
+    const menu = make("select", { id: `new-footage-${index}`, title: `Footage of ${name}. That of another camera is exchanged`, "aria-label": `Footage of ${name}` }, new Option("Leave out", ""));
     const isListed = this.#files.some(({ path }) => path === choice.footage);
     if (choice.footage && !isListed) menu.append(new Option(choice.footage.split("/").pop(), choice.footage));
     for (const { path, name: file } of this.#files) menu.append(new Option(file, path));
@@ -189,14 +181,12 @@ function listed(names) {
  * @param {string} footage
  */
 function firstFrame(camera, footage) {
-  const picture = document.createElement("img");
-  Object.assign(picture, { alt: `First frame of ${camera}`, src: previewOf(footage), draggable: false });
-  picture.title = "Drag onto another camera to exchange their footage";
+  const picture = make("img", { alt: `First frame of ${camera}`, src: previewOf(footage), draggable: false, title: "Drag onto another camera to exchange their footage" });
   picture.addEventListener("error", () => picture.replaceWith(noPicture("Cannot be read")));
   return picture;
 }
 
 /** @param {string} why */
 function noPicture(why) {
-  return Object.assign(document.createElement("div"), { className: "no-picture", textContent: why });
+  return make("div", "no-picture", why);
 }

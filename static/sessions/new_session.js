@@ -3,7 +3,7 @@
  * checks are listed as they pass.
  */
 
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { CameraCards } from "./camera_cards.js";
 import { makePathField } from "./path_field.js";
 import { PathPicker } from "./path_picker.js";
@@ -145,9 +145,8 @@ export class NewSession {
     if (!rig) return;
     const [top, side] = this.#rig.querySelectorAll("svg");
     drawRig(top, side, rig, this.#value("up"));
-    const doubts = rig.doubts.map((doubt) => Object.assign(document.createElement("p"), { className: "is-warning", textContent: doubt }));
-    const sentence = Object.assign(document.createElement("p"), { textContent: rig.sentence });
-    byId("rig-text", HTMLElement).replaceChildren(sentence, ...doubts);
+    const doubts = rig.doubts.map((doubt) => make("p", "is-warning", doubt));
+    byId("rig-text", HTMLElement).replaceChildren(make("p", {}, rig.sentence), ...doubts);
   }
 
   /** Forget the outcome of the last attempt. */
@@ -215,8 +214,7 @@ export class NewSession {
   #offerExchange({ cameras: [first, second], with_backgrounds: withSide, text }) {
     const item = this.#add("is-warning", `${text[0].toUpperCase()}${text.slice(1)}. Nothing has been made yet.`);
     const offer = (/** @type {string} */ label, /** @type {string} */ title, /** @type {() => void} */ run) => {
-      const choice = Object.assign(document.createElement("button"), { type: "button", textContent: label, title });
-      choice.addEventListener("click", run);
+      const choice = make("button", { type: "button", title, onclick: run }, label);
       item.append(choice);
       return choice;
     };
@@ -235,8 +233,7 @@ export class NewSession {
    * @param {string} text
    */
   #add(kind, text) {
-    const item = Object.assign(document.createElement("li"), { className: kind });
-    item.append(Object.assign(document.createElement("span"), { textContent: text }));
+    const item = make("li", kind, make("span", {}, text));
     this.#checks.append(item);
     item.scrollIntoView({ block: "nearest" });
     return item;

@@ -1,5 +1,6 @@
 /** Fields that take a path: completion as one types, and a button that opens the path picker. */
 
+import { make } from "../widgets/elements.js";
 import { completePaths } from "./session_requests.js";
 
 const FOLDER_ICON = '<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M2 4.5v8h12V6H8L6.5 4.5z" /></svg>';
@@ -11,15 +12,14 @@ const FOLDER_ICON = '<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M2 4.5
  * @param {() => void} browse called by the button
  */
 export function makePathField(input, browse) {
-  const list = Object.assign(document.createElement("datalist"), { id: `${input.id}-paths` });
+  const list = make("datalist", { id: `${input.id}-paths` });
   input.setAttribute("list", list.id);
   input.autocomplete = "off";
   input.spellcheck = false;
   completePaths(input, list);
   const label = input.closest("label") ?? input.labels?.[0]; // a form that is not in the page yet has no labels
   const title = `Browse for ${label?.textContent?.toLowerCase()}`;
-  const button = Object.assign(document.createElement("button"), { type: "button", className: "is-icon", title, innerHTML: FOLDER_ICON });
-  button.setAttribute("aria-label", title);
+  const button = make("button", { type: "button", className: "is-icon", title, innerHTML: FOLDER_ICON, "aria-label": title });
   Object.assign(button.dataset, { browse: input.name, noCommand: "" });
   button.addEventListener("click", browse);
   input.after(list, button);

@@ -1,6 +1,6 @@
 /** Dialog that chooses a file or folder of the program's machine. */
 
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 
 /**
  * @typedef {{name: string, path: string, kind: "folder" | "session" | "video" | "file"}} Entry
@@ -92,23 +92,19 @@ export class PathPicker {
   #row(entry) {
     const { name, path, kind } = entry;
     const isFolder = kind === "folder" || kind === "session";
-    const item = document.createElement("li");
-    const open = document.createElement("button");
-    open.type = "button";
-    open.className = `is-${kind}`;
-    open.title = isFolder ? `Open the folder ${name}` : `Choose ${name}`;
+    const item = make("li");
+    const open = make("button", { type: "button", className: `is-${kind}`, title: isFolder ? `Open the folder ${name}` : `Choose ${name}` });
     // Files are listed where a folder is wanted, so that it can be recognized.
     open.disabled = !isFolder && (this.#wanted === "folder" || (this.#wanted === "footage" && kind !== "video"));
     if (kind === "video") {
-      const picture = document.createElement("img");
-      Object.assign(picture, { alt: "", loading: "lazy", src: previewOf(path) });
+      const picture = make("img", { alt: "", loading: "lazy", src: previewOf(path) });
       picture.addEventListener("error", () => picture.removeAttribute("src"));
       open.append(picture);
     } else {
-      open.append(Object.assign(document.createElement("i"), { textContent: MARKS[kind] }));
+      open.append(make("i", {}, MARKS[kind]));
     }
-    open.append(Object.assign(document.createElement("span"), { textContent: name }));
-    if (kind === "session") open.append(Object.assign(document.createElement("small"), { textContent: "session" }));
+    open.append(make("span", {}, name));
+    if (kind === "session") open.append(make("small", {}, "session"));
     open.dataset.name = isFolder ? "" : name;
     open.addEventListener("click", (event) => {
       if (isFolder) void this.#go(path);

@@ -1,6 +1,6 @@
 /** Popover that opens another session: a recent one, or a folder by its path, which is completed as the user types. */
 
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { batchTable } from "./batch_table.js";
 import { NewSession } from "./new_session.js";
@@ -105,29 +105,19 @@ export class Sessions {
 
   /** Say what to do where no other session was opened before. */
   #firstRow() {
-    const item = document.createElement("li");
-    item.className = "is-empty";
-    const make = document.createElement("button");
-    Object.assign(make, { type: "button", className: "is-primary", textContent: "New session…", title: "Make a session of videos and a calibration" });
-    make.addEventListener("click", () => void this.showNew());
-    item.append("No other session was opened before. Make one of your own videos and their calibration:", make);
-    return item;
+    const text = "No other session was opened before. Make one of your own videos and their calibration:";
+    const title = "Make a session of videos and a calibration";
+    const create = make("button", { type: "button", className: "is-primary", title, onclick: () => void this.showNew() }, "New session…");
+    return make("li", "is-empty", text, create);
   }
 
   /** @param {Recent} session */
   #row({ folder, name, opened }) {
-    const item = document.createElement("li");
-    const open = document.createElement("button");
-    open.type = "button";
+    const item = make("li");
+    const open = make("button", { type: "button" });
     open.title = `Close this session and open ${folder}`;
-    const where = document.createElement("small");
-    where.append(Object.assign(document.createElement("bdi"), { textContent: folder }));
-    const when = document.createElement("time");
-    when.dateTime = opened;
-    when.textContent = new Date(opened).toLocaleDateString([], { day: "numeric", month: "short" });
-    const title = document.createElement("b");
-    title.textContent = name;
-    open.append(title, when, where);
+    const when = make("time", { dateTime: opened }, new Date(opened).toLocaleDateString([], { day: "numeric", month: "short" }));
+    open.append(make("b", {}, name), when, make("small", {}, make("bdi", {}, folder)));
     open.addEventListener("click", () => void this.#choose(folder));
     item.append(open);
     return item;

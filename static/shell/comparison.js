@@ -1,6 +1,6 @@
 /** Before and after of the last fit or search: costs in the top bar and for each view, and a switch between the poses. */
 
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { px } from "../widgets/text.js";
 
@@ -85,21 +85,15 @@ function costs(before, after) {
  * @param {number | null} after
  */
 function row(name, before, after) {
-  const line = document.createElement("tr");
-  const head = document.createElement("th");
-  head.scope = "row";
-  head.textContent = name;
+  const line = make("tr");
+  const head = make("th", { scope: "row" }, name);
   const change = before === null || after === null ? null : after - before;
   const isRise = change !== null && change > LEAST_PX;
   const sign = change === null ? "" : isRise ? "▲ +" : change < -LEAST_PX ? "▼ −" : "";
   const cells = [before?.toFixed(2) ?? "–", after?.toFixed(2) ?? "–", change === null ? "" : `${sign}${Math.abs(change).toFixed(2)}`];
   line.append(
     head,
-    ...cells.map((text) => {
-      const cell = document.createElement("td");
-      cell.textContent = text;
-      return cell;
-    }),
+    ...cells.map((text) => make("td", {}, text)),
   );
   line.classList.toggle("is-rise", isRise);
   return line;

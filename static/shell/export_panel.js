@@ -1,7 +1,7 @@
 /** Popover that exports the session to a file of another program, which the browser downloads. */
 
 import { download } from "../widgets/downloads.js";
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { capital } from "../widgets/text.js";
 
@@ -72,8 +72,7 @@ export class ExportPanel {
     if (!answer.ok) throw new Error(`status ${answer.status}`);
     this.#formats = await answer.json();
     const isSent = (/** @type {Format} */ { name }) => name.startsWith("like/");
-    const sent = Object.assign(document.createElement("optgroup"), { label: "Imported observations" });
-    sent.append(...this.#formats.filter(isSent).map(({ name, title }) => new Option(title, name)));
+    const sent = make("optgroup", { label: "Imported observations" }, ...this.#formats.filter(isSent).map(({ name, title }) => new Option(title, name)));
     const formats = this.#formats.filter((one) => !isSent(one)).map(({ name, title }) => new Option(capital(title), name));
     choices(this.#format, sent.children.length ? [...formats, sent] : formats);
     const { session, range } = this.#store.facts;

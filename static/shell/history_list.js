@@ -1,6 +1,6 @@
 /** Popover that lists the history. A click on an entry undoes or redoes up to it. */
 
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 
 const FIRST_LIMIT = 100;
@@ -97,31 +97,18 @@ export class HistoryList {
    * @param {boolean} isUndone
    */
   #entry(edit, cells, title, isCurrent, isUndone) {
-    const row = document.createElement("button");
-    row.type = "button";
-    row.title = title;
-    row.dataset.edit = String(edit);
+    const row = make("button", { type: "button", title, "data-edit": String(edit) });
     row.classList.toggle("is-undone", isUndone);
     if (isCurrent) row.setAttribute("aria-current", "step");
-    row.append(
-      ...cells.map((text) => {
-        const cell = document.createElement("span");
-        cell.textContent = text;
-        return cell;
-      }),
-    );
+    row.append(...cells.map((text) => make("span", {}, text)));
     row.addEventListener("click", () => isCurrent || this.#send({ type: "go_to", edit }));
-    const item = document.createElement("li");
-    item.append(row);
-    return item;
+    return make("li", {}, row);
   }
 
   /** @param {string} text */
   #more(text) {
-    const item = document.createElement("li");
-    const row = document.createElement("button");
-    row.type = "button";
-    row.className = "is-more";
+    const item = make("li");
+    const row = make("button", { type: "button", className: "is-more" });
     const isLast = this.#limit >= MOST;
     row.textContent = isLast ? `Only ${MOST.toLocaleString("en")} entries are listed. Undo and redo also reach the others` : text;
     row.title = row.textContent;

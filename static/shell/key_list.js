@@ -1,6 +1,6 @@
 /** Dialog that lists the keys by area, and the marks, with a search field. */
 
-import { button, byId, keyCaps } from "../widgets/elements.js";
+import { button, byId, keyCaps, make } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
 import { markSection } from "../timeline/mark_list.js";
 
@@ -25,14 +25,12 @@ export class KeyList {
     for (const { keys, label, labels, area } of merged(table.filter((binding) => binding.keys.length > 0))) {
       let section = areas.get(area);
       if (!section) {
-        section = document.createElement("section");
-        const heading = document.createElement("h3");
-        heading.textContent = area;
-        section.append(heading, document.createElement("dl"));
+        section = make("section");
+        section.append(make("h3", {}, area), make("dl"));
         areas.set(area, section);
       }
-      const row = document.createElement("div");
-      const [term, description] = [document.createElement("dt"), document.createElement("dd")];
+      const row = make("div");
+      const [term, description] = [make("dt"), make("dd")];
       term.append(keyCaps(keys));
       description.textContent = label;
       description.dataset.labels = JSON.stringify(labels);

@@ -1,6 +1,6 @@
 /** Notices that disappear after a while, the message log, and the banner while disconnected. */
 
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 
 const INFO_MS = 5000;
@@ -65,17 +65,9 @@ export class Notices {
    * @param {string} text
    */
   #add(level, text) {
-    const element = document.createElement("div");
-    element.className = `notice is-${level}`;
-    element.setAttribute("role", level === "error" ? "alert" : "status");
-    const sentence = document.createElement("span");
-    sentence.textContent = text;
-    const close = document.createElement("button");
-    close.type = "button";
-    close.textContent = "×";
-    close.setAttribute("aria-label", "Dismiss");
-    close.title = "Dismiss (Shift+Esc)";
-    element.append(sentence, close);
+    const element = make("div", { className: `notice is-${level}`, role: level === "error" ? "alert" : "status" });
+    const close = make("button", { type: "button", "aria-label": "Dismiss", title: "Dismiss (Shift+Esc)" }, "×");
+    element.append(make("span", {}, text), close);
     const shown = { element, text, count: 1, timer: 0 };
     close.addEventListener("click", () => this.#remove(shown));
     // A notice stays while the pointer or the focus is on it.
@@ -118,13 +110,9 @@ export class Notices {
   #showLog() {
     this.#list.replaceChildren(
       ...this.#log.map(({ level, text, time, count }) => {
-        const item = document.createElement("li");
-        item.className = `is-${level}`;
-        const when = document.createElement("time");
-        when.textContent = time.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
-        const sentence = document.createElement("span");
-        sentence.textContent = count > 1 ? `${text} (${count} times)` : text;
-        item.append(when, sentence);
+        const item = make("li", `is-${level}`);
+        const sentence = make("span", {}, count > 1 ? `${text} (${count} times)` : text);
+        item.append(make("time", {}, time.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" })), sentence);
         return item;
       }),
     );

@@ -1,7 +1,7 @@
 /** Command palette: find commands by a few letters, run them with Enter. */
 
 import { buttonCommands, contextCommands, keyCommands, settingCommands, suitingLabels } from "./commands.js";
-import { byId, keyCaps } from "../widgets/elements.js";
+import { byId, keyCaps, make } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
 
 const RECENT = "quadrille.palette.recent";
@@ -142,20 +142,13 @@ export class Palette {
  * @param {number} index
  */
 function option({ area, label, keys, why }, mark, index) {
-  const item = document.createElement("li");
-  item.id = `palette-option-${index}`;
-  item.setAttribute("role", "option");
-  item.setAttribute("aria-selected", "false");
+  const item = make("li", { id: `palette-option-${index}`, role: "option", "aria-selected": "false" });
   const reason = why();
   if (reason !== null) {
     item.setAttribute("aria-disabled", "true");
     item.title = reason;
   }
-  const text = document.createElement("span");
-  text.textContent = label;
-  const where = document.createElement("small");
-  where.textContent = `${area}${mark}`;
-  item.append(text, where, keyCaps(keys));
+  item.append(make("span", {}, label), make("small", {}, `${area}${mark}`), keyCaps(keys));
   return item;
 }
 

@@ -1,6 +1,6 @@
 /** People of the session: active person, visibility, solo, and the people that searches move. */
 
-import { button, byId, iconButton } from "../widgets/elements.js";
+import { button, byId, iconButton, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 
 const EYE = "M1.5 8S4 3.5 8 3.5 14.5 8 14.5 8 12 12.5 8 12.5 1.5 8 1.5 8zM8 6a2 2 0 1 0 .01 0z";
@@ -68,18 +68,13 @@ export class People {
    * @param {number} person
    */
   #choice(within, name, info, person) {
-    const label = document.createElement("label");
-    label.title = `Select ${info.name} (P: next person)`;
-    const input = Object.assign(document.createElement("input"), { type: "radio", name, value: String(person) });
+    const label = make("label", { title: `Select ${info.name} (P: next person)` });
+    const input = make("input", { type: "radio", name, value: String(person) });
     input.addEventListener("change", () => {
       this.#actions.selectPerson(person);
       if (within === this.#bar) input.blur();
     });
-    const text = document.createElement("span");
-    text.className = "person-name";
-    text.style.setProperty("--person", info.color);
-    text.textContent = info.name;
-    label.append(input, text);
+    label.append(input, make("span", { className: "person-name", "--person": info.color }, info.name));
     return input;
   }
 
@@ -89,13 +84,10 @@ export class People {
    * @returns {Row}
    */
   #row(info, person) {
-    const row = document.createElement("li");
+    const row = make("li");
     const radio = this.#choice(row, "person-in-list", info, person);
-    const model = document.createElement("span");
-    model.className = "quiet";
-    model.textContent = `${info.model}, ${info.height_m.toFixed(2)} m`;
-    const summary = document.createElement("span");
-    summary.className = "quiet";
+    const model = make("span", "quiet", `${info.model}, ${info.height_m.toFixed(2)} m`);
+    const summary = make("span", "quiet");
     const bend = `Copy the joint angles of ${info.name}; position and orientation stay`;
     const copy = iconButton(COPY, bend, () => this.#posing.copyPerson(person));
     copy.setAttribute("aria-label", `Copy the pose of ${info.name}`);

@@ -2,7 +2,7 @@
 
 import { usualCosts } from "../model/cells.js";
 import { hasSearch, hasTrack, personCells, stopTitle } from "../model/selectors.js";
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { count, displayName, px } from "../widgets/text.js";
 
 export class TopBar {
@@ -80,11 +80,7 @@ export class TopBar {
     this.#stage.title = this.#stage.textContent;
     this.#figures.textContent = isActive ? `best ${px(job.best_px)} · ${count(job.per_second)}/s` : "";
     this.#stages.replaceChildren(
-      ...(isActive ? job.stages : []).map((_, index) => {
-        const mark = document.createElement("i");
-        mark.className = index < at ? "is-done" : index === at ? "is-current" : "";
-        return mark;
-      }),
+      ...(isActive ? job.stages : []).map((_, index) => make("i", index < at ? "is-done" : index === at ? "is-current" : "")),
     );
   }
 
@@ -103,9 +99,7 @@ export class TopBar {
     const rate = stage !== "tracking" ? "" : per_second > 0 ? `${per_second.toFixed(1)}/s` : done === 0 && "starting";
     const figures = [rate, ...counts].filter(Boolean).join(" · ");
     this.#figures.textContent = isActive ? figures : rest.join(" · ");
-    const bar = document.createElement("i");
-    bar.style.setProperty("--done", `${(100 * done) / Math.max(1, total)}%`);
-    bar.className = "is-share";
+    const bar = make("i", { "--done": `${(100 * done) / Math.max(1, total)}%`, className: "is-share" });
     this.#stages.replaceChildren(...(isActive ? [bar] : []));
   }
 }

@@ -4,7 +4,7 @@
  */
 
 import { hasTrack } from "../model/selectors.js";
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { capital, count, displayName, percent } from "../widgets/text.js";
 import { TimeLeft, timeText } from "../widgets/time_left.js";
 
@@ -99,16 +99,10 @@ export class WorkList {
 
   /** @param {Work} work */
   #add(work) {
-    const row = document.createElement("div");
-    row.className = "work";
-    row.id = `work-${work.id}`;
-    const [text, figures] = [document.createElement("b"), document.createElement("output")];
-    const bar = document.createElement("progress");
-    bar.setAttribute("aria-label", work.text);
-    const stop = document.createElement("button");
-    stop.type = "button";
-    stop.textContent = "Stop";
-    stop.title = "Stop; what is done and stored stays";
+    const row = make("div", { className: "work", id: `work-${work.id}` });
+    const [text, figures] = [make("b"), make("output")];
+    const bar = make("progress", { "aria-label": work.text });
+    const stop = make("button", { type: "button", title: "Stop; what is done and stored stays" }, "Stop");
     const shown = { row, text, figures, bar, stop, left: new TimeLeft(), work };
     stop.addEventListener("click", () => shown.work.stop?.());
     row.append(text, stop, figures, bar);
@@ -174,7 +168,7 @@ export class WorkList {
     byId("failure-look", HTMLButtonElement).textContent = `Show silhouettes of frame ${tried}`;
     byId("failure-details", HTMLDetailsElement).open = false;
     byId("failure-notes", HTMLElement).replaceChildren(
-      ...[message, ...notes].map((text) => Object.assign(document.createElement("li"), { textContent: text })),
+      ...[message, ...notes].map((text) => make("li", {}, text)),
     );
     this.#failure.hidden = false;
     if (tried === this.#store.facts.target) this.#lookAtSilhouettes();

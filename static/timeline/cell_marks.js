@@ -2,6 +2,8 @@
  * Marks of the timeline: sources, statuses and keyframes. Besides its colour, each has its own shape. Sizes are CSS pixels.
  */
 
+import { make } from "../widgets/elements.js";
+
 /** @typedef {{color: string, bands: [number, number][]}} SourceMark */
 
 /**
@@ -55,7 +57,7 @@ export function fillBands(context, bands, x, width, { top, bottom }) {
  * @param {string} source
  */
 export function sourceSwatch(source) {
-  const mark = document.createElement("i");
+  const mark = make("i");
   const { color, bands } = SOURCE_MARKS[source];
   const stops = bands.flatMap(([from, to]) => [
     `transparent ${100 * from}%`, `var(${color}) ${100 * from}% ${100 * to}%`, `transparent ${100 * to}%`,
@@ -71,21 +73,21 @@ export function sourceSwatch(source) {
  * @param {string} status
  */
 export function statusSwatch(status) {
-  const mark = document.createElement("i");
+  const mark = make("i");
   mark.className = `status-mark is-${status}`;
   return mark;
 }
 
 /** Sample of a pose of an earlier calibration for the legend. */
 export function earlierSwatch() {
-  const mark = document.createElement("i");
+  const mark = make("i");
   mark.className = "earlier-mark";
   return mark;
 }
 
 /** Sample of a keyframe for the legend. */
 export function diamondSwatch() {
-  const mark = document.createElement("i");
+  const mark = make("i");
   mark.className = "keyframe-mark";
   return mark;
 }
@@ -129,7 +131,7 @@ export function drawTask(context, state, x, { top, bottom }, style) {
  * @param {string} state
  */
 export function taskSwatch(state) {
-  const mark = document.createElement("i");
+  const mark = make("i");
   mark.className = `task-mark is-${state}`;
   return mark;
 }
@@ -144,7 +146,7 @@ export function taskSwatch(state) {
  */
 export function hatch(context, color, stripes, isCrossed) {
   const size = 6;
-  const tile = Object.assign(document.createElement("canvas"), { width: size, height: size });
+  const tile = make("canvas", { width: size, height: size });
   const ink = /** @type {CanvasRenderingContext2D} */ (tile.getContext("2d"));
   ink.fillStyle = color;
   ink.fillRect(0, 0, size, size);

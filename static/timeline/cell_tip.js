@@ -1,17 +1,17 @@
 /** Tooltip of a cell of the timeline, above the pointer at once. The slider's text has the same words for screen readers. */
 
+import { make } from "../widgets/elements.js";
+
 const MARGIN_PX = 6;
 
 export class CellTip {
-  #tip = document.createElement("div");
+  #tip = make("div", { id: "cell-tip", "aria-hidden": "true" });
   #over;
 
   /** @param {HTMLElement} over the timeline */
   constructor(over) {
     this.#over = over;
-    this.#tip.id = "cell-tip";
     this.#tip.hidden = true;
-    this.#tip.setAttribute("aria-hidden", "true");
     over.parentElement?.append(this.#tip);
   }
 
@@ -20,13 +20,7 @@ export class CellTip {
    * @param {number} clientX of the pointer
    */
   show(lines, clientX) {
-    this.#tip.replaceChildren(
-      ...lines.map((text) => {
-        const line = document.createElement("div");
-        line.textContent = text;
-        return line;
-      }),
-    );
+    this.#tip.replaceChildren(...lines.map((text) => make("div", {}, text)));
     this.#tip.hidden = false;
     const { top } = this.#over.getBoundingClientRect();
     const { width, height } = this.#tip.getBoundingClientRect();

@@ -6,7 +6,7 @@
 import { drawCurves } from "./curve_drawing.js";
 import { CURVE_GROUPS } from "./drawer.js";
 import { prepare } from "../panes/drawing.js";
-import { byId } from "../widgets/elements.js";
+import { byId, make } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { lineSwatch } from "../widgets/series_lines.js";
 import { zoomByWheel } from "./frame_window.js";
@@ -28,8 +28,8 @@ export class Curves {
   #stage = byId("curves", HTMLElement);
   #legend = byId("curves-legend", HTMLElement);
   #person = byId("curves-person", HTMLElement);
-  #lines = document.createElement("canvas");
-  #cursor = document.createElement("canvas");
+  #lines = make("canvas");
+  #cursor = make("canvas");
   /** The group that is shown; null while the drawer is closed or shows another tab. */
   #group = /** @type {CurveGroup | null} */ (null);
   /** Names of the curves that are switched off. */
@@ -124,13 +124,7 @@ export class Curves {
     this.#described = described;
     this.#legend.replaceChildren(
       ...labels.map((label, index) => {
-        const one = document.createElement("button");
-        one.type = "button";
-        one.className = "legend-switch";
-        one.setAttribute("aria-pressed", String(!this.#hidden.has(label)));
-        one.title = `Show or hide ${label}`;
-        const value = document.createElement("output");
-        one.append(lineSwatch(index), label, value);
+        const one = make("button", { type: "button", className: "legend-switch", "aria-pressed": String(!this.#hidden.has(label)), title: `Show or hide ${label}` }, lineSwatch(index), label, make("output"));
         one.addEventListener("click", () => this.#switch(one, label));
         return one;
       }),

@@ -1,6 +1,6 @@
 /** Tab of the drawer that lists doubtful and lost poses and doubted keyframes with thumbnails, the most severe first. */
 
-import { byId, iconButton } from "../widgets/elements.js";
+import { byId, iconButton, make } from "../widgets/elements.js";
 import { count, displayName, percent } from "../widgets/text.js";
 import { reasonOf } from "../model/selectors.js";
 import { contradictions } from "../model/keyframe_doubts.js";
@@ -26,8 +26,8 @@ export class DoubtList {
   /** @type {Map<string, HTMLLIElement>} rows by what they show */
   #rows = new Map();
   #limit = FEW_LISTED;
-  #more = document.createElement("li");
-  #moreButton = document.createElement("button");
+  #more = make("li");
+  #moreButton = make("button", { type: "button", className: "doubt-more" });
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -38,8 +38,6 @@ export class DoubtList {
     this.#queue = queue;
     /** @type {(keyof import("../model/store.js").Facts)[]} */
     const listed = ["drawer", "timeline", "lanes", "session", "keyframeDoubts"];
-    this.#moreButton.type = "button";
-    this.#moreButton.className = "doubt-more";
     this.#moreButton.addEventListener("click", () => {
       this.#limit = MAX_LISTED;
       this.#show();
@@ -126,17 +124,12 @@ export class DoubtList {
     const { session, calibration } = this.#store.facts;
     const { person, first, last, spans, worst, status, limbs, limb, keyframe } = doubt;
     const info = session?.people[person];
-    const row = document.createElement("li");
-    const go = document.createElement("button");
-    go.type = "button";
-    go.className = "doubt";
-    go.dataset.noCommand = "";
-    const image = document.createElement("img");
-    image.alt = "";
-    image.draggable = false;
+    const row = make("li");
+    const go = make("button", { type: "button", className: "doubt", "data-no-command": "" });
+    const image = make("img", { alt: "", draggable: false });
     const cost = this.#cellsOf(person)?.costs[worst] ?? 0;
     this.#loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}-${calibration?.revision ?? 1}`);
-    const text = document.createElement("span");
+    const text = make("span");
     text.className = "doubt-text";
     const frames = `${first === last ? `frame ${first}` : `frames ${first}–${last}`}${spans.length > 1 ? `, in ${spans.length} stretches` : ""}`;
     const remark = this.#cellsOf(person)?.get(worst)?.remark ?? "";
@@ -180,8 +173,7 @@ function chanceOf({ name, lost }, rank) {
  * @param {string} [more] another class
  */
 function line(kind, text, more) {
-  const one = document.createElement("span");
-  one.className = kind;
+  const one = make("span", kind);
   if (more) one.classList.add(more);
   one.textContent = text;
   return one;

@@ -1,6 +1,6 @@
 /** Buttons that go to doubtful frames, and a menu of other kinds of frames to go to. */
 
-import { button, byId, iconButton } from "../widgets/elements.js";
+import { button, byId, iconButton, make } from "../widgets/elements.js";
 import { KINDS } from "./jumps.js";
 import { count } from "../widgets/text.js";
 
@@ -16,8 +16,8 @@ export class JumpMenu {
   #menu = byId("jump-menu", HTMLElement);
   /** @type {Map<import("./jumps.js").Kind, {count: HTMLElement, buttons: HTMLButtonElement[]}>} */
   #rows = new Map();
-  #gap = document.createElement("button");
-  #list = document.createElement("button");
+  #gap = make("button");
+  #list = make("button", {}, "List doubts by severity");
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -60,24 +60,20 @@ export class JumpMenu {
 
   #build() {
     const rows = KINDS.map(({ kind, label, title, key, more }) => {
-      const row = document.createElement("div");
+      const row = make("div");
       row.className = "jump-row";
       row.title = title;
-      const name = document.createElement("span");
-      name.textContent = label;
-      const number = document.createElement("output");
-      number.setAttribute("aria-label", `Number of frames: ${label}`);
+      const name = make("span", {}, label);
+      const number = make("output", { "aria-label": `Number of frames: ${label}` });
       const keyOf = (/** @type {boolean} */ back) => (key ? ` (${back ? previousKey(key) : key.replace(" ", "+")})` : "");
       const buttons = [
         iconButton(PREVIOUS, `Previous ${more}${keyOf(true)}`, () => this.#jumps.go(kind, -1)),
         iconButton(NEXT, `Next ${more}${keyOf(false)}`, () => this.#jumps.go(kind, 1)),
       ];
-      const group = document.createElement("div");
+      const group = make("div");
       group.className = "group";
       group.append(...buttons);
-      const cap = document.createElement("kbd");
-      cap.textContent = key.replace(" ", "+");
-      row.append(name, number, cap, group);
+      row.append(name, number, make("kbd", {}, key.replace(" ", "+")), group);
       this.#rows.set(kind, { count: number, buttons });
       return row;
     });
@@ -88,7 +84,6 @@ export class JumpMenu {
     this.#gap.addEventListener("click", () => this.#jumps.toLongestGap());
     this.#list.type = "button";
     this.#list.className = "jump-list";
-    this.#list.textContent = "List doubts by severity";
     this.#list.title = "List doubtful and lost poses with thumbnails, most severe first (Shift+L)";
     this.#menu.append(...rows, this.#gap, this.#list);
   }

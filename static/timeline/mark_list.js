@@ -1,5 +1,6 @@
 /** Samples of the marks of the timeline and of the lines over images, with their meanings. */
 
+import { make } from "../widgets/elements.js";
 import { sampleOf } from "../panes/pose_legend.js";
 import { SOURCES } from "../model/cells.js";
 import { STATUSES, diamondSwatch, earlierSwatch, sourceSwatch, statusSwatch, taskSwatch } from "./cell_marks.js";
@@ -33,11 +34,9 @@ const LINES = [
 
 /** Section of the list of keys, and content of the legend's popover. */
 export function markSection() {
-  const section = document.createElement("section");
-  section.className = "mark-list";
-  const heading = document.createElement("h3");
-  heading.textContent = "Marks and lines";
-  const list = document.createElement("dl");
+  const section = make("section", "mark-list");
+  const heading = make("h3", {}, "Marks and lines");
+  const list = make("dl");
   list.append(
     ...STATUSES.map((status) => row(statusSwatch(status), STATUS_MEANINGS[status])),
     row(diamondSwatch(), "keyframe; larger with an exclamation mark: check it"),
@@ -52,7 +51,7 @@ export function markSection() {
 
 /** Samples of all states of a task, side by side. */
 function taskSamples() {
-  const samples = document.createElement("span");
+  const samples = make("span");
   samples.className = "task-samples";
   samples.append(...TASK_STATES.map(taskSwatch));
   return samples;
@@ -63,8 +62,8 @@ function taskSamples() {
  * @param {string} meaning
  */
 function row(mark, meaning) {
-  const element = document.createElement("div");
-  const [term, description] = [document.createElement("dt"), document.createElement("dd")];
+  const element = make("div");
+  const [term, description] = [make("dt"), make("dd")];
   term.append(mark);
   description.textContent = meaning;
   element.append(term, description);

@@ -3,6 +3,7 @@
  * to a frame; with Shift it marks a range. The strip at the bottom is an overview of the whole recording.
  */
 
+import { make } from "../widgets/elements.js";
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
 import { filterTest } from "../model/provenance.js";
 import { earlierCalibration } from "../model/selectors.js";
@@ -27,8 +28,8 @@ export class Timeline {
   #navigation;
   #jumps;
   #frameWindow;
-  #cells = document.createElement("canvas");
-  #cursor = document.createElement("canvas");
+  #cells = make("canvas");
+  #cursor = make("canvas");
   #tip;
   #hovered = /** @type {number | null} */ (null);
   #gesture = /** @type {Gesture | null} */ (null);

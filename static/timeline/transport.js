@@ -1,6 +1,6 @@
 /** Transport row above the timeline: playback, current frame, its marks and source, and the legend. */
 
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, make } from "../widgets/elements.js";
 import { clock } from "../widgets/text.js";
 import { earlierCalibration, personCells } from "../model/selectors.js";
 import { SOURCES, STATUSES as CELL_STATUSES } from "../model/cells.js";
@@ -126,7 +126,7 @@ export class Transport {
     this.#legend.title = `${[...shown, ...earlier, ...sources].join(", ")}. Click for all marks and lines`;
     this.#legend.replaceChildren(
       ...rows.map((swatches) => {
-        const row = document.createElement("span");
+        const row = make("span");
         row.className = "legend-row";
         row.append(...swatches);
         return row;
@@ -140,7 +140,5 @@ export class Transport {
  * @param {HTMLElement} mark
  */
 function entry(text, mark) {
-  const item = document.createElement("span");
-  item.append(mark, text);
-  return item;
+  return make("span", {}, mark, text);
 }

@@ -1,5 +1,7 @@
 /** Files of the program that the browser saves. */
 
+import { make } from "./elements.js";
+
 /** Longest text of the server that is shown as its reason. */
 const MAX_REASON = 400;
 
@@ -31,9 +33,7 @@ function fileName(disposition) {
  * @param {string} name
  */
 function save(data, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(data);
-  link.download = name;
+  const link = make("a", { href: URL.createObjectURL(data), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }

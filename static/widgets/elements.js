@@ -1,4 +1,56 @@
-/** Find elements of the page, and build buttons and key caps. */
+/** Find elements of the page, and make elements, icons, buttons and key caps. */
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/**
+ * What an element is made with: properties by their names, attributes by names with a dash, styles by names that begin
+ * with two dashes.
+ *
+ * @template {keyof HTMLElementTagNameMap} Tag
+ * @typedef {Partial<Omit<HTMLElementTagNameMap[Tag], "style">> & {[attribute: `${string}-${string}`]: string}} Properties
+ */
+
+/**
+ * Make an element. Texts never become markup.
+ *
+ * @template {keyof HTMLElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {Properties<Tag> | string} [properties] or only the class name
+ * @param {...(string | Node)} children
+ * @returns {HTMLElementTagNameMap[Tag]}
+ */
+export function make(tag, properties = {}, ...children) {
+  const element = document.createElement(tag);
+  const all = typeof properties === "string" ? { className: properties } : properties;
+  for (const [name, value] of Object.entries(all)) {
+    if (name.startsWith("--")) element.style.setProperty(name, String(value));
+    else if (name.includes("-") || name === "role") element.setAttribute(name, String(value));
+    else Reflect.set(element, name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+/**
+ * Make an element of a drawing.
+ *
+ * @template {keyof SVGElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {Record<string, string | number>} attributes
+ * @param {...(string | Node)} children
+ * @returns {SVGElementTagNameMap[Tag]}
+ */
+export function makeSvg(tag, attributes, ...children) {
+  const element = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+  element.append(...children);
+  return element;
+}
+
+/** @param {string} path in a box of 16 by 16 */
+export function icon(path) {
+  return makeSvg("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, makeSvg("path", { d: path }));
+}
 
 /**
  * @template {HTMLElement} T
@@ -13,13 +65,12 @@ export function byId(id, kind) {
 }
 
 /**
- * Find a button and call a function on click. After a click by pointer the button loses focus, so that Space still plays.
+ * Call a function on click. After a click by pointer the button loses focus, so that Space still plays.
  *
- * @param {string} id
+ * @param {HTMLButtonElement} element
  * @param {() => void} run
  */
-export function button(id, run) {
-  const element = byId(id, HTMLButtonElement);
+function onPress(element, run) {
   element.addEventListener("click", (event) => {
     if (event.detail > 0) element.blur();
     run();
@@ -28,22 +79,25 @@ export function button(id, run) {
 }
 
 /**
- * Show keyboard keys as key caps.
+ * Find a button and call a function on click.
  *
- * @param {string[]} keys alternatives, each of them keys that are pressed together
+ * @param {string} id
+ * @param {() => void} run
  */
-export function keyCaps(keys) {
-  const caps = document.createElement("span");
-  caps.className = "keys";
-  keys.forEach((key, index) => {
-    if (index > 0) caps.append(" or ");
-    for (const part of key.split(" ")) {
-      const cap = document.createElement(part === "–" ? "span" : "kbd");
-      cap.textContent = part;
-      caps.append(cap, " ");
-    }
-  });
-  return caps;
+export function button(id, run) {
+  return onPress(byId(id, HTMLButtonElement), run);
+}
+
+/**
+ * Make a button that calls a function on click.
+ *
+ * @param {string} text
+ * @param {string} title
+ * @param {() => void} run
+ * @param {Properties<"button">} [more] properties
+ */
+export function textButton(text, title, run, more) {
+  return onPress(make("button", { type: "button", title, ...more }, text), run);
 }
 
 /**
@@ -54,18 +108,20 @@ export function keyCaps(keys) {
  * @param {() => void} run
  */
 export function iconButton(path, title, run) {
-  const one = document.createElement("button");
-  one.type = "button";
-  one.className = "is-icon";
-  one.title = title;
-  one.setAttribute("aria-label", title.replace(/ \(.*\)$/, ""));
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", "0 0 16 16");
-  svg.setAttribute("aria-hidden", "true");
-  const line = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  line.setAttribute("d", path);
-  svg.append(line);
-  one.append(svg);
-  one.addEventListener("click", run);
-  return one;
+  const label = title.replace(/ \(.*\)$/, "");
+  return make("button", { type: "button", className: "is-icon", title, "aria-label": label, onclick: run }, icon(path));
+}
+
+/**
+ * Show keyboard keys as key caps.
+ *
+ * @param {string[]} keys alternatives, each of them keys that are pressed together
+ */
+export function keyCaps(keys) {
+  const caps = make("span", "keys");
+  keys.forEach((key, index) => {
+    if (index > 0) caps.append(" or ");
+    for (const part of key.split(" ")) caps.append(make(part === "–" ? "span" : "kbd", {}, part), " ");
+  });
+  return caps;
 }

@@ -1,5 +1,7 @@
 /** Menus that a button opens above itself: arrow keys move, Esc and a press elsewhere close. */
 
+import { make } from "./elements.js";
+
 /**
  * @typedef {{text: string, note: string, title: string, run: () => void, isDisabled?: boolean}} MenuItem note: the key, or a
  *   remark in small type
@@ -37,7 +39,7 @@ export class Menu {
     if (items.length === 0) return;
     const entries = items.map((item) => this.#entry(item));
     this.#menu.replaceChildren(...entries);
-    if (note) this.#menu.append(Object.assign(document.createElement("p"), { textContent: note }));
+    if (note) this.#menu.append(make("p", {}, note));
     this.#menu.hidden = false;
     this.#button.setAttribute("aria-expanded", "true");
     const box = this.#button.getBoundingClientRect();
@@ -48,12 +50,7 @@ export class Menu {
 
   /** @param {MenuItem} item */
   #entry({ text, note, title, run, isDisabled = false }) {
-    const entry = document.createElement("button");
-    entry.type = "button";
-    entry.setAttribute("role", "menuitem");
-    entry.title = title;
-    entry.disabled = isDisabled;
-    entry.append(text, Object.assign(document.createElement("small"), { textContent: note }));
+    const entry = make("button", { type: "button", role: "menuitem", title, disabled: isDisabled }, text, make("small", {}, note));
     entry.addEventListener("click", () => {
       this.#close();
       run();

@@ -1,5 +1,7 @@
 /** Text field for one number: Enter applies and leaves it, Esc restores, arrows step, and invalid input is refused with a message. */
 
+import { make } from "./elements.js";
+
 /**
  * @typedef {object} NumberField
  * @property {HTMLInputElement} element
@@ -15,13 +17,7 @@
  * @returns {NumberField}
  */
 export function numberField({ name, take, refuse, step }) {
-  const element = document.createElement("input");
-  element.type = "text";
-  element.inputMode = "decimal";
-  element.autocomplete = "off";
-  element.spellcheck = false;
-  element.className = "number-field";
-  element.setAttribute("aria-label", name);
+  const element = make("input", { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false, className: "number-field", "aria-label": name });
   let shown = "";
 
   const restore = () => {

@@ -1,5 +1,7 @@
 /** Popover panels: a button opens them; Esc or a click outside closes them. */
 
+import { make } from "./elements.js";
+
 const MARGIN_PX = 8;
 
 /**
@@ -54,10 +56,8 @@ export function closePopover() {
  *   format: (value: number) => string, onInput: (value: number) => void}} options
  */
 export function slider({ label, title, min, max, step, format, onInput }) {
-  const input = document.createElement("input");
-  Object.assign(input, { type: "range", min: String(min), max: String(max), step: String(step), title });
-  input.setAttribute("aria-label", label);
-  const value = document.createElement("output");
+  const input = make("input", { type: "range", min: String(min), max: String(max), step: String(step), title, "aria-label": label });
+  const value = make("output");
   const show = (/** @type {number} */ shown) => {
     input.value = String(shown);
     value.textContent = format(shown);

@@ -1,5 +1,7 @@
 /** Lines of the curves of a plot: four colours, each solid and dashed. */
 
+import { make } from "./elements.js";
+
 const COLORS = 4;
 /** Dashes of the curves after the first four. */
 const SECOND_DASH = [6, 3];
@@ -24,7 +26,7 @@ export function dashOf(index) {
  * @param {number} index
  */
 export function lineSwatch(index) {
-  const swatch = document.createElement("i");
+  const swatch = make("i");
   const color = `var(${colorName(index)})`;
   const [dash, gap] = dashOf(index);
   swatch.style.background = dash
