@@ -9,9 +9,6 @@ import { planForm } from "./plan_form.js";
 import { speedTable } from "./speed_table.js";
 import { taskList } from "./task_list.js";
 
-/** Facts that the tasks and comments depend on. @type {(keyof import("../model/store.js").Facts)[]} */
-const LISTED_FROM = ["annotation", "session", "target"];
-
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("./review.js").Review} review
@@ -83,6 +80,14 @@ export function annotationSection(context, review, visits) {
   showAll();
   let marked = review.here.person; // whose task the list marks
 
+  store.on(["annotation", "session"], showAll);
+  store.on(["target"], tasks.show);
+  store.on(["target", "state"], () => {
+    if (review.here.person !== marked) tasks.show();
+    marked = review.here.person;
+    showHere();
+    comments.showPlace();
+  });
   return {
     id: "annotation",
     title: "Annotation",
@@ -93,15 +98,5 @@ export function annotationSection(context, review, visits) {
     comments,
     askReason,
     /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-    update(changed) {
-      const { person } = review.here;
-      if (changed.has("annotation") || changed.has("session")) showAll();
-      else if (person !== marked || LISTED_FROM.some((fact) => changed.has(fact))) tasks.show();
-      marked = person;
-      if (changed.has("target") || changed.has("state")) {
-        showHere();
-        comments.showPlace();
-      }
-    },
   };
 }

@@ -18,9 +18,7 @@ export class Visits {
   constructor(context, panes) {
     this.#context = context;
     this.#panes = panes;
-    context.store.subscribe((changed) => {
-      if (changed.has("overlay") || changed.has("target")) this.#zoomNow();
-    });
+    context.store.on(["overlay", "target"], () => this.#zoomNow());
   }
 
   /** @param {Goal} goal */

@@ -99,14 +99,8 @@ export class BodySection {
     foot.className = "section-foot";
     foot.append(this.#keyframes.element, this.#note, buttons);
     this.body.append(this.#person, this.#model.element, this.#height.element, this.#alike.element, this.#acquisition.element, this.#table, foot);
-  }
-
-  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  update(changed) {
-    if (changed.has("bodySizes") || changed.has("state") || changed.has("session")) this.#show();
-    if (changed.has("acquisition") || changed.has("bodySizes") || changed.has("session")) {
-      this.#acquisition.update(this.#store.facts.bodySizes?.person ?? 0);
-    }
+    store.on(["bodySizes", "state", "session"], () => this.#show());
+    store.on(["acquisition", "bodySizes", "session"], () => this.#acquisition.update(store.facts.bodySizes?.person ?? 0));
   }
 
   /** @param {Record<string, unknown> & {action: string}} change */

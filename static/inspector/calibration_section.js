@@ -91,15 +91,12 @@ export function calibrationSection({ store, send, notify }) {
     if (isNews) notify({ type: "notice", level: "info", text: `${sentences(tracked, 0)[0]} Track them again in the inspector (Alt+I), section Calibration.` });
   };
 
+  store.on(["calibration", "showsMisfits", "state", "timeline", "lanes"], () => store.facts.calibration && show(store.facts.calibration));
   return {
     id: "calibration",
     title: "Calibration",
     hint: "Check the cameras by the tracked people, and correct them",
     body,
-    update(changed) {
-      const { calibration } = store.facts;
-      if (calibration && ["calibration", "showsMisfits", "state", "timeline", "lanes"].some((f) => changed.has(/** @type {"state"} */ (f)))) show(calibration);
-    },
     bindings(reveal) {
       const noCamera = () => (isNamed() ? null : "No camera is known to be off. Check the cameras first.");
       const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({

@@ -143,14 +143,12 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
   };
   refuse("");
   show();
+  store.on(["otherCopy", "state", "session", "connected"], show);
   return {
     id: "copy",
     title: "Other copy",
     hint: "Compare with another annotator's copy of this session, and decide where both differ",
     body,
-    update(changed) {
-      if (["otherCopy", "state", "session", "connected"].some((fact) => changed.has(/** @type {"state"} */ (fact)))) show();
-    },
     bindings(reveal) {
       const noCopy = () => (store.facts.otherCopy ? null : NO_COPY);
       const none = () => noCopy() ?? (copyDifferences(store.facts).length ? null : "The copies differ nowhere by more than the tolerance.");

@@ -58,11 +58,11 @@ export function findSection({ store, send, layers }) {
     notes.replaceChildren(...(finding?.notes ?? []).slice(-SHOWN).map((text) => make("li", {}, text)));
   };
   show();
+  store.on(["finding", "observations", "session"], show);
   return {
     id: "find",
     title: "Find people",
     hint: "First poses, sizes and a track with nobody's help",
     body,
-    update: (changed) => (changed.has("finding") || changed.has("observations") || changed.has("session")) && show(),
   };
 }

@@ -10,7 +10,6 @@ const STORED = "quadrille.inspector";
  * @property {string} title
  * @property {string} hint what it is for
  * @property {HTMLElement} body
- * @property {(changed: Set<keyof import("../model/store.js").Facts>) => void} update
  */
 
 export class Inspector {
@@ -28,10 +27,7 @@ export class Inspector {
     this.#button = button("show-inspector", () => this.toggle());
     for (const section of sections) this.add(section);
     this.#show();
-    store.subscribe((changed) => {
-      if (changed.has("connected")) this.#column.inert = !store.facts.connected;
-      for (const { section } of this.#sections.values()) section.update(changed);
-    });
+    store.on(["connected"], () => (this.#column.inert = !store.facts.connected));
   }
 
   toggle() {

@@ -11,8 +11,6 @@ const UNITS = { deg: "°", cm: "cm" };
 /** Range of the slider of an angle without limits, degrees. */
 const FULL_TURN = { low: -180, high: 180 };
 const MAX_CM = 1e5;
-const SHOWN_FACTS = /** @type {const} */ (["state", "session", "observability", "layers", "costMap", "theme"]);
-
 /** @typedef {{dof: number, field: ReturnType<typeof boundedField>, slider: HTMLInputElement | null, element: HTMLElement, title: string}} Row */
 
 /**
@@ -91,15 +89,13 @@ export function jointSection(context, { posing }) {
       if (document.activeElement !== slider || !slider.matches(":active")) slider.value = String(value);
     }
   };
+  store.on(["connected"], () => map.update(true));
+  store.on(["state", "session", "observability", "layers", "costMap", "theme"], show);
   return {
     id: "joint",
     title: "Joint",
     hint: "Angles of the selected joint (J selects the next one)",
     body,
     openMap: map.open,
-    update(changed) {
-      if (changed.has("connected")) map.update(true);
-      if (SHOWN_FACTS.some((fact) => changed.has(fact))) show();
-    },
   };
 }

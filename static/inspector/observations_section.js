@@ -198,16 +198,14 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   showAll();
   body.hidden = false;
 
+  store.on(["observations", "session"], showAll);
+  store.on(["finding"], () => found() && showWork(/** @type {Observations} */ (found())));
+  store.on(["overlay", "target"], zoomNow);
   return {
     id: "observations",
     title: "Observations",
     hint: "Key points, joints and masks of other programs: import, judge, mend",
     body,
-    update(changed) {
-      if (changed.has("observations") || changed.has("session")) showAll();
-      else if (changed.has("finding") && found()) showWork(/** @type {Observations} */ (found()));
-      if (changed.has("overlay") || changed.has("target")) zoomNow();
-    },
     bindings(reveal) {
       const noSet = () => (current() ? null : NO_SET);
       const busy = () => (found()?.running ? "Work on observations is under way." : store.facts.finding?.running ? "A search for people is under way." : noSet());

@@ -10,8 +10,6 @@ import { choiceRow, sectionNote } from "./rows.js";
 
 const ALL = "all";
 const BY_NAME = "annotator:";
-const SHOWN_FACTS = /** @type {const} */ (["provenance", "annotators", "annotation", "state", "session", "connected", "timeline", "provenanceFilter"]);
-
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("../timeline/index.js").TimelineRoom} timeline
@@ -91,20 +89,18 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
     list.hidden = joints.length === 0;
   };
   showFilter();
+  store.on(["connected"], () => (asked = store.facts.connected ? asked : ""));
+  store.on(["session"], () => store.set({ provenanceFilter: null }));
+  store.on(["hover", "dragging", "state", "connected"], () => ask());
+  store.on(["provenance", "annotators", "annotation", "state", "session", "connected", "timeline", "provenanceFilter"], () => {
+    showFilter();
+    showPose();
+  });
   return {
     id: "provenance",
     title: "Provenance",
     hint: "Who or what made this pose and each joint; filter the timeline by it",
     body,
-    update(changed) {
-      if (changed.has("connected") && !store.facts.connected) asked = "";
-      if (changed.has("session")) store.set({ provenanceFilter: null });
-      if (["hover", "dragging", "state", "connected"].some((fact) => changed.has(/** @type {"hover"} */ (fact)))) ask();
-      if (SHOWN_FACTS.some((fact) => changed.has(fact))) {
-        showFilter();
-        showPose();
-      }
-    },
     bindings(reveal) {
       const command = (/** @type {string} */ label, /** @type {Filter | null} */ wanted) => ({
         keys: [],

@@ -9,8 +9,6 @@ import { triedTable } from "./tried_table.js";
 /** @typedef {import("./reason_table.js").Measure} Measure */
 
 const STORED = "quadrille.reason-measure";
-const SHOWN_FACTS = /** @type {const} */ (["reason", "session", "state", "connected"]);
-
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
@@ -88,16 +86,16 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
     else if (!hasWork) table.clear();
   };
   show();
+  store.on(["connected"], () => {
+    isAsking &&= store.facts.connected;
+    follow();
+  });
+  store.on(["reason", "session", "state", "connected"], show);
   return {
     id: "reason",
     title: "Reason",
     hint: "Why this pose is in doubt: what each view shows of each part (Alt+W)",
     body,
-    update(changed) {
-      if (changed.has("connected") && !store.facts.connected) isAsking = false;
-      if (changed.has("connected")) follow();
-      if (SHOWN_FACTS.some((fact) => changed.has(fact))) show();
-    },
   };
 }
 

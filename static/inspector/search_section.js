@@ -113,11 +113,11 @@ export function searchSection({ store, send, notify }) {
     apart.show(search.limbs_apart, search.limbs_apart !== initial.limbs_apart);
     reset.disabled = JSON.stringify(search) === JSON.stringify(initial);
   };
+  store.on(["settings"], show);
   return {
     id: "search",
     title: "Search settings",
     hint: "How the search of a frame (F) chooses the poses that it tries",
     body,
-    update: (changed) => changed.has("settings") && show(),
   };
 }

@@ -73,12 +73,12 @@ export function trackSection({ store, send, notify }) {
     }
     reset.disabled = JSON.stringify(track) === JSON.stringify(initial);
   };
+  store.on(["settings", "session"], show);
   return {
     id: "track",
     title: "Track settings",
     hint: "How the tracker (T) finds the pose of each frame",
     body,
-    update: (changed) => (changed.has("settings") || changed.has("session")) && show(),
   };
 }
 

@@ -157,12 +157,12 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
     const chosen = store.facts.view3d?.view.trail_points ?? [];
     set({ trail_points: on ? [...chosen, name] : chosen.filter((other) => other !== name) });
   };
+  store.on(["view3d", "state", "session", "theme", "linkedViews", "layers"], show);
   return {
     id: "view",
     title: "View",
     hint: "Theme of the page, error ellipses, and what the 3-D view shows",
     body,
-    update: (changed) => ["view3d", "state", "session", "theme", "linkedViews", "layers"].some((fact) => changed.has(/** @type {"state"} */ (fact))) && show(),
   };
 }
 

@@ -158,9 +158,7 @@ export class Layers {
   /** @param {import("./store.js").Store} store */
   constructor(store) {
     this.#store = store;
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#restore();
-    });
+    store.on(["session"], () => this.#restore());
   }
 
   /**

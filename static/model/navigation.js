@@ -22,11 +22,9 @@ export class Navigation {
   constructor(store, send) {
     this.#store = store;
     this.#send = send;
-    store.subscribe((changed) => {
-      if (changed.has("connected")) this.#reset();
-      if (changed.has("shown") || changed.has("state")) this.#arrived();
-      if (changed.has("state") && !this.#pending) this.#isMoving = false;
-    });
+    store.on(["connected"], () => this.#reset());
+    store.on(["shown", "state"], () => this.#arrived());
+    store.on(["state"], () => (this.#isMoving &&= this.#pending !== null));
   }
 
   get #last() {

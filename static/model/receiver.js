@@ -32,9 +32,7 @@ export class Receiver {
     this.#send = send;
     this.#recent = recent;
     this.#notify = notify;
-    store.subscribe((changed) => {
-      if (changed.has("layers")) this.#forgetHidden();
-    });
+    store.on(["layers"], () => this.#forgetHidden());
   }
 
   /** @param {boolean} open */

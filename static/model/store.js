@@ -202,6 +202,14 @@ export class Store {
   }
 
   /**
+   * @param {(keyof Facts)[]} facts
+   * @param {() => void} act called whenever one of them has changed
+   */
+  on(facts, act) {
+    this.subscribe((changed) => facts.some((fact) => changed.has(fact)) && act());
+  }
+
+  /**
    * @param {keyof Facts} fact
    * @param {() => void} act called once, when the fact is known
    */

@@ -48,8 +48,7 @@ export class Gestures {
     this.#store = store;
     this.#send = send;
     this.#latency = latency;
-    store.subscribe((changed) => {
-      if (!changed.has("connected")) return;
+    store.on(["connected"], () => {
       this.#release();
       this.#latency.forget();
     });

@@ -35,9 +35,7 @@ export class ImageToneMenu {
     this.#panel.addEventListener("toggle", () => {
       if (!this.#panel.matches(":popover-open")) this.#closedAt = performance.now();
     });
-    store.subscribe((changed) => {
-      if (changed.has("imageTones")) this.#show.forEach((one) => one());
-    });
+    store.on(["imageTones"], () => this.#show.forEach((one) => one()));
   }
 
   /**

@@ -35,9 +35,7 @@ export class LayersMenu {
     for (const group of GROUPS) this.#buildGroup(group);
     this.#buildFoot();
     const show = () => this.#show.forEach((one) => one());
-    store.subscribe((changed) => {
-      if (changed.has("layers")) show();
-    });
+    store.on(["layers"], () => show());
     show();
   }
 

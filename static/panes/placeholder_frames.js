@@ -19,9 +19,7 @@ export class PlaceholderFrames {
   constructor(store, recent) {
     this.#store = store;
     this.#recent = recent;
-    store.subscribe((changed) => {
-      if (["target", "shown", "playing", "connected"].some((fact) => changed.has(/** @type {any} */ (fact)))) this.#update();
-    });
+    store.on(["target", "shown", "playing", "connected"], () => this.#update());
   }
 
   /** The frame that is loading; null if no placeholder is needed. */

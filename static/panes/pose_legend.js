@@ -34,9 +34,7 @@ export class PoseLegend {
   /** @param {import("../model/store.js").Store} store */
   constructor(store) {
     this.#store = store;
-    store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("overlay") || changed.has("calibration") || changed.has("showsMisfits") || changed.has("layers")) this.#show();
-    });
+    store.on(["state", "overlay", "calibration", "showsMisfits", "layers"], () => this.#show());
   }
 
   #show() {

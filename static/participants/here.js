@@ -27,7 +27,7 @@ export class Here {
     this.#panel.append(join.form);
     opensPopover(this.#panel, this.#button, () => this.toggle());
     this.#panel.addEventListener("toggle", () => this.#showButton());
-    context.store.subscribe((changed) => changed.has("presence") && this.#show());
+    context.store.on(["presence"], () => this.#show());
   }
 
   toggle() {

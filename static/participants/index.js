@@ -24,8 +24,7 @@ export function mount(context) {
   new PlaceMarks(byId("timeline", HTMLElement), context.store);
   const bar = byId("join-bar", HTMLElement);
   bar.append(joinForm(context, "bar").form);
-  context.store.subscribe((changed) => {
-    if (!changed.has("presence") && !changed.has("session")) return;
+  context.store.on(["presence", "session"], () => {
     const { presence, session } = context.store.facts;
     bar.hidden = !presence || !session || session.has_place;
     document.documentElement.dataset.place = String(session?.has_place ?? true);

@@ -25,9 +25,9 @@ export function joinForm({ store, joinAs }, place) {
     event.stopPropagation();
     if (event.key === "Escape") input.blur();
   });
-  store.subscribe((changed) => {
+  store.on(["presence"], () => {
     const { presence } = store.facts;
-    if (!changed.has("presence") || !presence) return;
+    if (!presence) return;
     const isHost = presence.link === "host";
     label.textContent = isHost ? "Join under another name" : presence.name ? "Change your name" : `Your name, to ${DOES[presence.link]}`;
     refusal.textContent = presence.refusal;

@@ -24,9 +24,7 @@ export class PlaceMarks {
     this.#layer.setAttribute("aria-hidden", "true"); // the list of people says the same
     timeline.append(this.#layer);
     new ResizeObserver(() => this.#show()).observe(timeline);
-    store.subscribe((changed) => {
-      if (["presence", "session", "visible"].some((fact) => changed.has(/** @type {"presence"} */ (fact)))) this.#show();
-    });
+    store.on(["presence", "session", "visible"], () => this.#show());
   }
 
   #show() {

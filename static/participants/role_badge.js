@@ -11,9 +11,9 @@ const TEXTS = {
 /** @param {import("../model/store.js").Store} store */
 export function showRole(store) {
   const badge = byId("role-badge", HTMLElement);
-  store.subscribe((changed) => {
+  store.on(["session"], () => {
     const role = store.facts.session?.role;
-    if (!changed.has("session") || !role) return;
+    if (!role) return;
     document.documentElement.dataset.role = role;
     badge.hidden = role === "host";
     if (role !== "host") [badge.textContent, badge.title] = TEXTS[role];

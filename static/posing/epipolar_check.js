@@ -23,12 +23,10 @@ export class EpipolarCheck {
   constructor(store, send) {
     this.#store = store;
     this.#send = send;
-    store.subscribe((changed) => {
-      if (changed.has("connected")) this.#asked = "";
-      if (changed.has("pinning") && store.facts.pinning) this.cancel();
-      if (changed.has("epipolar") || changed.has("epipolarLines")) this.#show();
-      if (changed.has("epipolar") || changed.has("connected")) this.#ask();
-    });
+    store.on(["connected"], () => (this.#asked = ""));
+    store.on(["pinning"], () => store.facts.pinning && this.cancel());
+    store.on(["epipolar", "epipolarLines"], () => this.#show());
+    store.on(["epipolar", "connected"], () => this.#ask());
   }
 
   toggle() {

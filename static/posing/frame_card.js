@@ -30,9 +30,7 @@ export class FrameCard {
       localStorage.setItem(STORED_OPEN, this.#card.open ? "yes" : "no");
       this.#show();
     });
-    store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("keyframeDoubts") || changed.has("reason")) this.#show();
-    });
+    store.on(["state", "keyframeDoubts", "reason"], () => this.#show());
   }
 
   #show() {

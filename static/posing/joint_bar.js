@@ -52,10 +52,8 @@ export class JointBar {
     this.#list.addEventListener("wheel", (event) => {
       this.#list.scrollLeft += event.deltaY + event.deltaX;
     });
-    store.subscribe((changed) => {
-      if (changed.has("connected")) this.#enable(element);
-      if (changed.has("state") || changed.has("session") || changed.has("dof")) this.#show();
-    });
+    store.on(["connected"], () => this.#enable(element));
+    store.on(["state", "session", "dof"], () => this.#show());
     new ResizeObserver(() => this.#fitNames()).observe(this.#list);
     this.#enable(element);
   }

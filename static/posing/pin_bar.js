@@ -32,8 +32,7 @@ export class PinBar {
       this.#live.blur();
     });
     /** @type {(keyof import("../model/store.js").Facts)[]} */
-    const shown = ["state", "connected", "overlay", "pinning", "livePins", "scope"];
-    store.subscribe((changed) => shown.some((fact) => changed.has(fact)) && this.#show());
+    store.on(["state", "connected", "overlay", "pinning", "livePins", "scope"], () => this.#show());
   }
 
   #show() {

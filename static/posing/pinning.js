@@ -34,11 +34,9 @@ export class Pinning {
     this.#store = store;
     this.#send = send;
     this.#notify = notify;
-    store.subscribe((changed) => {
-      if (changed.has("connected")) this.#release(false);
-      if (changed.has("overlay") && !this.#held && store.facts.heldPin) store.set({ heldPin: null });
-      if (changed.has("state") && store.facts.pinning && !store.facts.state?.point) store.set({ pinning: false });
-    });
+    store.on(["connected"], () => this.#release(false));
+    store.on(["overlay"], () => !this.#held && store.facts.heldPin && store.set({ heldPin: null }));
+    store.on(["state"], () => store.facts.pinning && !store.facts.state?.point && store.set({ pinning: false }));
   }
 
   /** Toggle the mode in which each click pins the selected joint. */

@@ -23,9 +23,7 @@ export class PoseNotes {
     this.#actions = actions;
     this.#pinning = pinning;
     this.#grid = grid;
-    store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("session") || changed.has("filled")) this.#show();
-    });
+    store.on(["state", "session", "filled"], () => this.#show());
   }
 
   #show() {

@@ -29,6 +29,6 @@ export function loadScene(scene, store) {
     target.head.append(style);
     paint();
   });
-  store.subscribe((changed) => changed.has("theme") && paint());
+  store.on(["theme"], () => paint());
   scene.src = store.facts.theme.isDark ? "viser/?darkMode" : "viser/";
 }

@@ -14,9 +14,7 @@ export class CameraView {
     this.#store = store;
     this.#grid = grid;
     this.#send = send;
-    store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("session")) this.#mark();
-    });
+    store.on(["state", "session"], () => this.#mark());
   }
 
   /** Look through the camera that fills the grid, or else through the active one (toggle). */

@@ -37,7 +37,7 @@ export class Floor {
     panes.addEventListener("pointerup", (event) => this.#up(event), { capture: true });
     // A double-click sets two marks and must not fill the grid.
     panes.addEventListener("dblclick", (event) => this.isOn && event.stopPropagation(), { capture: true });
-    store.subscribe((changed) => changed.has("state") && this.#show());
+    store.on(["state"], () => this.#show());
   }
 
   /** Whether the floor is being set. */

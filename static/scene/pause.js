@@ -24,9 +24,7 @@ export class ScenePause {
   constructor(scene, store) {
     this.#scene = scene;
     this.#store = store;
-    store.subscribe((changed) => {
-      if (changed.has("target") || changed.has("shown")) this.#sought = performance.now();
-    });
+    store.on(["target", "shown"], () => (this.#sought = performance.now()));
     scene.addEventListener("load", () => {
       this.#release(LOADED_MS);
       if (scene.contentWindow) this.#holdBack(scene.contentWindow);

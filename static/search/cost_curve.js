@@ -34,7 +34,7 @@ export class CostCurve {
     this.#send = send;
     this.#element.append(this.#lines, this.#read);
     new ResizeObserver(() => this.#draw()).observe(this.#element);
-    store.subscribe((changed) => changed.has("theme") && this.#draw());
+    store.on(["theme"], () => this.#draw());
     this.#listen();
   }
 

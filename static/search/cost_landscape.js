@@ -52,7 +52,7 @@ export class CostLandscape {
       if (changed.has("landscape") || changed.has("session")) this.#show();
     });
     new ResizeObserver(() => this.#draw()).observe(this.#element);
-    store.subscribe((changed) => changed.has("theme") && this.#show());
+    store.on(["theme"], () => this.#show());
     this.#listen();
     this.#open();
   }

@@ -51,8 +51,7 @@ export class Sessions {
     completePaths(this.#folder, byId("session-folders", HTMLDataListElement));
     /** @type {string | undefined} */
     let first;
-    store.subscribe((changed) => {
-      if (!changed.has("session")) return;
+    store.on(["session"], () => {
       first ??= store.facts.session?.name;
       // Another page has opened another session: everything here belongs to the former one.
       if (first !== store.facts.session?.name) location.reload();

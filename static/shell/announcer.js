@@ -18,8 +18,7 @@ export class Announcer {
   constructor(region, store) {
     this.#region = region;
     this.#store = store;
-    store.subscribe((changed) => {
-      if (!changed.has("state")) return;
+    store.on(["state"], () => {
       this.#announced ??= store.facts.state;
       clearTimeout(this.#timer);
       // Wait until a sequence of changes has ended.

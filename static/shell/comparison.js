@@ -28,9 +28,7 @@ export class Comparison {
     this.#toggle = button("toggle-before", () => actions.toggleBefore());
     this.#toggleHere = button("toggle-before-here", () => actions.toggleBefore());
     opensPopover(this.#panel, this.#before, () => togglePopover(this.#panel, this.#cost));
-    store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("connected")) this.#show();
-    });
+    store.on(["state", "connected"], () => this.#show());
   }
 
   #show() {

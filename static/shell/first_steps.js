@@ -39,11 +39,9 @@ export class FirstSteps {
       event.preventDefault();
       this.#close();
     });
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#begin();
-      if (changed.has("state")) this.#follow();
-      if (changed.has("timeline") && !this.#isAsked && this.#isTracked()) this.#row.hidden = true;
-    });
+    store.on(["session"], () => this.#begin());
+    store.on(["state"], () => this.#follow());
+    store.on(["timeline"], () => (this.#row.hidden ||= !this.#isAsked && this.#isTracked()));
   }
 
   /** Show the first steps and focus their button. */

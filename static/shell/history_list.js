@@ -28,10 +28,8 @@ export class HistoryList {
       else this.#ask(0);
     });
     this.#list.addEventListener("keydown", (event) => this.#onKey(event));
-    store.subscribe((changed) => {
-      if (changed.has("history")) this.#show();
-      if (changed.has("connected") && store.facts.connected && this.#limit > 0) this.#ask(this.#limit);
-    });
+    store.on(["history"], () => this.#show());
+    store.on(["connected"], () => store.facts.connected && this.#limit > 0 && this.#ask(this.#limit));
   }
 
   toggle() {

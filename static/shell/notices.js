@@ -132,8 +132,6 @@ export function watchConnection(banner, store) {
     banner.classList.toggle("is-shown", !connected || opening !== null);
     document.body.classList.toggle("is-cut-off", !connected);
   };
-  store.subscribe((changed) => {
-    if (changed.has("connected") || changed.has("session") || changed.has("opening") || changed.has("openingStep")) show();
-  });
+  store.on(["connected", "session", "opening", "openingStep"], () => show());
   show();
 }

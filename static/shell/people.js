@@ -39,10 +39,8 @@ export class People {
       store.set({ scope: this.#scope.value === "one" ? "one" : "all" });
       this.#scope.blur();
     });
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#build();
-      if (["session", "state", "connected", "scope"].some((f) => changed.has(/** @type {"state"} */ (f)))) this.#show();
-    });
+    store.on(["session"], () => this.#build());
+    store.on(["session", "state", "connected", "scope"], () => this.#show());
   }
 
   toggle() {

@@ -18,9 +18,7 @@ export class SavedMark {
     const retry = () => send({ type: "save" });
     this.#mark = button("saved", retry);
     this.#retry = button("retry-saving", retry);
-    store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("connected")) this.#show();
-    });
+    store.on(["state", "connected"], () => this.#show());
     addEventListener("beforeunload", (event) => {
       if (this.isSafe) return;
       event.preventDefault();

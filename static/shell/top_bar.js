@@ -30,11 +30,9 @@ export class TopBar {
     this.#stop = button("search-stop", () => actions.search("stop"));
     this.#undo = button("undo", () => actions.undo());
     this.#redo = button("redo", () => actions.redo());
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#showSession();
-      if (changed.has("state") || changed.has("connected") || changed.has("session")) this.#showState();
-      if (["timeline", "lanes", "session", "state"].some((fact) => changed.has(/** @type {"state"} */ (fact)))) this.#showUsual();
-    });
+    store.on(["session"], () => this.#showSession());
+    store.on(["state", "connected", "session"], () => this.#showState());
+    store.on(["timeline", "lanes", "session", "state"], () => this.#showUsual());
   }
 
   #showSession() {

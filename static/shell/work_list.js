@@ -60,12 +60,10 @@ export class WorkList {
     button("failure-look", () => this.#lookAtSilhouettes());
     button("failure-place", () => this.#placeByHand());
     button("failure-close", () => this.#closeFailure());
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#failure.hidden = true;
-      if (changed.has("finding")) this.#watchFinding();
-      if (["state", "finding", "acquisition", "connected", "exporting"].some((fact) => changed.has(/** @type {"state"} */ (fact)))) this.#show();
-      if (changed.has("state")) this.#showDamage();
-    });
+    store.on(["session"], () => (this.#failure.hidden = true));
+    store.on(["finding"], () => this.#watchFinding());
+    store.on(["state", "finding", "acquisition", "connected", "exporting"], () => this.#show());
+    store.on(["state"], () => this.#showDamage());
     setInterval(() => this.#shown.size > 0 && this.#showFigures(), TICK_MS);
   }
 

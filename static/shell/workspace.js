@@ -50,9 +50,8 @@ export class Workspace {
     });
     this.#button.addEventListener("click", () => this.toggleScene());
     let isLookingThrough = false;
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#show();
-      if (!changed.has("state")) return;
+    store.on(["session"], () => this.#show());
+    store.on(["state"], () => {
       const looks = (store.facts.state?.snapped ?? null) !== null;
       if (looks && !isLookingThrough && this.#isFolded) this.toggleScene();
       isLookingThrough = looks;

@@ -52,7 +52,7 @@ export class Curves {
     this.#stage.append(this.#lines, this.#cursor);
     store.subscribe((changed) => this.#update(changed));
     new ResizeObserver(() => this.#drawAll()).observe(this.#stage);
-    store.subscribe((changed) => changed.has("theme") && this.#drawAll());
+    store.on(["theme"], () => this.#drawAll());
     this.#listen();
     this.#open();
   }

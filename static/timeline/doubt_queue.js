@@ -26,10 +26,8 @@ export class DoubtQueue {
     this.#navigation = navigation;
     this.#actions = actions;
     this.#grid = grid;
-    store.subscribe((changed) => {
-      if (["timeline", "lanes", "session", "keyframeDoubts"].some((fact) => changed.has(/** @type {"lanes"} */ (fact)))) this.#listed = null;
-      if (changed.has("overlay") || changed.has("target")) this.#zoomNow();
-    });
+    store.on(["timeline", "lanes", "session", "keyframeDoubts"], () => (this.#listed = null));
+    store.on(["overlay", "target"], () => this.#zoomNow());
   }
 
   /** The unresolved doubts, the most severe first. */

@@ -56,11 +56,9 @@ export class Drawer {
     const heights = new ResizeObserver(() => this.#fit());
     for (const bar of [...barsAround(), byId("timeline", HTMLElement)]) heights.observe(bar);
     this.#show(null);
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#begin();
-      if (changed.has("timeline") && this.#pending && !isEmpty(store.facts, this.#pending)) this.#restore(this.#pending);
-      if (["timeline", "lanes", "searchRuns", "rangeComparison", "state"].some((fact) => changed.has(/** @type {"state"} */ (fact)))) this.#check();
-    });
+    store.on(["session"], () => this.#begin());
+    store.on(["timeline"], () => this.#pending && !isEmpty(store.facts, this.#pending) && this.#restore(this.#pending));
+    store.on(["timeline", "lanes", "searchRuns", "rangeComparison", "state"], () => this.#check());
   }
 
   /** Close the drawer in another session; open it there if it was open and has content. */

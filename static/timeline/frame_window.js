@@ -21,10 +21,8 @@ export class FrameWindow {
   /** @param {import("../model/store.js").Store} store */
   constructor(store) {
     this.#store = store;
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#keepWithin();
-      if (changed.has("target")) this.#follow();
-    });
+    store.on(["session"], () => this.#keepWithin());
+    store.on(["target"], () => this.#follow());
   }
 
   /** The visible part, also if that is everything. */

@@ -51,11 +51,7 @@ export class JumpMenu {
       if (hadFocus) this.#open.focus();
     };
     document.addEventListener("keydown", closes, true);
-    store.subscribe((changed) => {
-      if (["timeline", "disagreeing", "calibration", "otherCopy", "provenanceFilter", "annotators", "connected", "session"].some((f) => changed.has(/** @type {"timeline"} */ (f)))) {
-        this.#count();
-      }
-    });
+    store.on(["timeline", "disagreeing", "calibration", "otherCopy", "provenanceFilter", "annotators", "connected", "session"], () => this.#count());
   }
 
   #build() {

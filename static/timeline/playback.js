@@ -30,10 +30,8 @@ export class Playback {
   constructor(store, navigation) {
     this.#store = store;
     this.#navigation = navigation;
-    store.subscribe((changed) => {
-      if (changed.has("rate") || changed.has("everyFrame")) this.#anchor = this.#here();
-      if (changed.has("shown") && this.#store.facts.playing) this.#tick(performance.now());
-    });
+    store.on(["rate", "everyFrame"], () => (this.#anchor = this.#here()));
+    store.on(["shown"], () => store.facts.playing && this.#tick(performance.now()));
   }
 
   toggle() {

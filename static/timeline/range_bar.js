@@ -46,12 +46,10 @@ export class RangeBar {
     this.#stop = button("range-stop", () => actions.stopRange());
     button("range-close", () => store.set({ range: null }));
     this.#scope.addEventListener("change", () => this.#scope.blur());
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#listPeople();
-      if (changed.has("range")) this.#old = store.facts.state?.range?.message ?? "";
-      if (["range", "state", "connected", "session"].some((f) => changed.has(/** @type {"range"} */ (f)))) this.#show();
-      if (changed.has("range") || changed.has("visible") || changed.has("session")) this.#place();
-    });
+    store.on(["session"], () => this.#listPeople());
+    store.on(["range"], () => (this.#old = store.facts.state?.range?.message ?? ""));
+    store.on(["range", "state", "connected", "session"], () => this.#show());
+    store.on(["range", "visible", "session"], () => this.#place());
     addEventListener("resize", () => this.#place());
   }
 

@@ -22,6 +22,9 @@ const MIDDLE_BUTTON = 1;
 
 /** @typedef {"scrub" | "mark" | "pan" | "overview"} Gesture of the pointer while it is down */
 
+/** Facts that cells are drawn from and described by. @type {(keyof import("../model/store.js").Facts)[]} */
+const CELL_FACTS = ["timeline", "lanes", "session", "keyframeDoubts", "calibration"];
+
 export class Timeline {
   #element;
   #store;
@@ -51,16 +54,12 @@ export class Timeline {
     this.#frameWindow = frameWindow;
     element.append(this.#cells, this.#cursor);
     this.#tip = new CellTip(element);
-    store.subscribe((changed) => {
-      const has = (/** @type {(keyof import("../model/store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
-      if (has("session", "annotation", "otherCopy")) element.style.height = `${this.#layout.height}px`;
-      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts", "calibration")) this.#drawCells();
-      else if (has("annotation", "otherCopy", "provenanceFilter", "annotators")) this.#drawCells();
-      if (has("target", "session", "range", "visible", "annotation")) this.#drawCursor();
-      if (has("target", "timeline", "lanes", "session", "keyframeDoubts", "calibration")) this.#describe();
-    });
+    store.on(["session", "annotation", "otherCopy"], () => (element.style.height = `${this.#layout.height}px`));
+    store.on([...CELL_FACTS, "visible", "annotation", "otherCopy", "provenanceFilter", "annotators"], () => this.#drawCells());
+    store.on(["target", "session", "range", "visible", "annotation"], () => this.#drawCursor());
+    store.on([...CELL_FACTS, "target"], () => this.#describe());
     new ResizeObserver(() => this.#drawAll()).observe(element);
-    store.subscribe((changed) => changed.has("theme") && this.#drawAll());
+    store.on(["theme"], () => this.#drawAll());
     this.#listen();
   }
 

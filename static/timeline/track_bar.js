@@ -25,9 +25,7 @@ export class TrackBar {
       actions.follow(this.#follow.checked);
       this.#follow.blur();
     });
-    store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("connected") || changed.has("range")) this.#showRun();
-    });
+    store.on(["state", "connected", "range"], () => this.#showRun());
   }
 
   #showRun() {

@@ -56,16 +56,12 @@ export class Transport {
     const marks = byId("marks-panel", HTMLElement);
     marks.append(markSection());
     opensPopover(marks, this.#legend, () => togglePopover(marks, this.#legend));
-    store.subscribe((changed) => {
-      if (changed.has("session")) this.#showSession();
-      if (changed.has("target") || changed.has("session")) this.#showFrame();
-      if (changed.has("playing")) this.#showPlaying();
-      if (changed.has("rate") || changed.has("loops") || changed.has("everyFrame")) this.#showHow();
-      if (["state", "calibration", "timeline", "lanes", "target", "connected"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
-        this.#showSource();
-      }
-      if (changed.has("timeline") || changed.has("calibration")) this.#showLegend();
-    });
+    store.on(["session"], () => this.#showSession());
+    store.on(["target", "session"], () => this.#showFrame());
+    store.on(["playing"], () => this.#showPlaying());
+    store.on(["rate", "loops", "everyFrame"], () => this.#showHow());
+    store.on(["state", "calibration", "timeline", "lanes", "target", "connected"], () => this.#showSource());
+    store.on(["timeline", "calibration"], () => this.#showLegend());
   }
 
   #showSession() {
