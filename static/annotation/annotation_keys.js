@@ -1,6 +1,6 @@
 /** Keys of the plan: tasks, verdicts, the next best click, comments. */
 
-import { alt, inArea } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 
 /**
  * @param {ReturnType<typeof import("./section.js").annotationSection>} section
@@ -12,22 +12,14 @@ export function annotationBindings(section, review, reveal) {
   const noVerdict = () => review.whyNoVerdict;
   const words = "dataset plan annotation task";
   return inArea("Annotation", [
-    { keys: ["Alt U"], label: "Plan, tasks and comments", words, matches: alt("KeyU", false), run: () => reveal() },
-    { keys: ["Alt T"], label: "Next task", words, matches: alt("KeyT", false), why: noTask, run: () => review.step(1) },
-    { keys: [], label: "Previous task", words, matches: () => false, why: noTask, run: () => review.step(-1) },
-    {
-      keys: ["Alt K"],
-      label: "Accept the planned pose",
-      words: `${words} verify reviewer next`,
-      matches: alt("KeyK", false),
-      why: noVerdict,
-      run: () => review.accept(),
-    },
+    { keys: ["Alt U"], label: "Plan, tasks and comments", words, run: () => reveal() },
+    { keys: ["Alt T"], label: "Next task", words, why: noTask, run: () => review.step(1) },
+    { keys: [], label: "Previous task", words, why: noTask, run: () => review.step(-1) },
+    { keys: ["Alt K"], label: "Accept the planned pose", words: `${words} verify reviewer next`, why: noVerdict, run: () => review.accept() },
     {
       keys: ["Alt R"],
       label: "Reject the planned pose",
       words: `${words} reviewer comment`,
-      matches: alt("KeyR", false),
       why: noVerdict,
       run: () => {
         if (review.whyNoVerdict) return;
@@ -39,7 +31,6 @@ export function annotationBindings(section, review, reveal) {
       keys: ["Alt C"],
       label: "Next best click",
       words: `${words} propose where a correction lowers the expected error most`,
-      matches: alt("KeyC", false),
       why: section.click.why,
       run: () => {
         reveal(section.click.text);
@@ -50,7 +41,6 @@ export function annotationBindings(section, review, reveal) {
       keys: ["Alt M"],
       label: "Comment on the selected limb",
       words: `${words} remark`,
-      matches: alt("KeyM", false),
       run: () => {
         reveal(section.click.text);
         section.comments.input.focus();
@@ -60,7 +50,6 @@ export function annotationBindings(section, review, reveal) {
       keys: [],
       label: "Plan frames to annotate",
       words: `${words} assign every diverse doubted`,
-      matches: () => false,
       run: () => {
         reveal();
         section.plan.open();

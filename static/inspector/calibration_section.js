@@ -32,7 +32,7 @@ const NUMBERS = {
 
 /**
  * @param {import("../model/index.js").Context} context
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Binding[]}}
+ * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
  */
 export function calibrationSection({ store, send, notify }) {
   const act = (/** @type {Action} */ action) => send({ type: "calibration_check", action });
@@ -103,7 +103,6 @@ export function calibrationSection({ store, send, notify }) {
         keys: [],
         label,
         words: `${words} calibration`,
-        matches: () => false,
         why,
         run: () => {
           reveal();

@@ -18,7 +18,7 @@ const NO_COPY = "No copy is compared. Open one first.";
  * @param {import("../model/index.js").Context} context
  * @param {import("../timeline/index.js").TimelineRoom} timeline
  * @param {import("./import_form.js").PathFields} paths
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Binding[]}}
+ * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
  */
 export function copySection({ store, send, notify, navigation, actions }, { jumps }, paths) {
   const decide = (/** @type {Action} */ action) => {
@@ -157,7 +157,6 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
         keys: [],
         label: text,
         words: "annotator agreement copy compare disagreement difference",
-        matches: () => false,
         why,
         run,
       });

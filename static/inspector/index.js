@@ -5,7 +5,7 @@
  */
 
 import { button } from "../widgets/elements.js";
-import { alt, inArea } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 import { calibrationSection } from "./calibration_section.js";
 import { copySection } from "./copy_section.js";
 import { findSection } from "./find_section.js";
@@ -66,7 +66,6 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
       label: "Inspector: sizes, settings (toggle)",
       area: "Views", // an area of one key would take two lines of the key list
       words: "body",
-      matches: alt("KeyI", false),
       run: () => inspector.toggle(),
     },
     {
@@ -74,26 +73,18 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
       label: "Why this pose is in doubt",
       area: "Views",
       words: "reason explain evidence colours outside silhouette contour nats parts views",
-      matches: alt("KeyW", false),
       run: () => inspector.reveal("reason"),
     },
     {
       keys: [],
       label: "Cost over two angles of the joint",
       words: "landscape map nats inspector",
-      matches: () => false,
       run: () => {
         inspector.reveal("joint");
         joint.openMap();
       },
     },
-    {
-      keys: [],
-      label: "Find people",
-      words: "start automatically initialize bootstrap first pose acquire track nobody placed",
-      matches: () => false,
-      run: findPeople,
-    },
+    { keys: [], label: "Find people", words: "start automatically initialize bootstrap first pose acquire track nobody placed", run: findPeople },
     ...calibration.bindings(() => inspector.reveal("calibration")),
     ...observations.bindings(() => inspector.reveal("observations")),
     ...provenance.bindings(() => inspector.reveal("provenance")),
@@ -102,14 +93,12 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
       keys: [],
       label: id === "view" ? "View settings: theme, 3-D view" : title,
       words: `${hint} inspector settings`,
-      matches: () => false,
       run: () => inspector.reveal(id),
     })),
     ...THEMES.map(({ choice, label }) => ({
       keys: [],
       label,
       words: "colour scheme mode appearance",
-      matches: () => false,
       run: () => context.themes.choose(choice),
     })),
   ]);

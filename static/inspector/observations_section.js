@@ -2,7 +2,6 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { download } from "../widgets/downloads.js";
-import { alt } from "../widgets/key_matching.js";
 import { capital, count, displayName, percent } from "../widgets/text.js";
 import { importForm } from "./import_form.js";
 import { sectionNote } from "./rows.js";
@@ -21,7 +20,7 @@ const NO_SET = "No observations were imported. Import them first.";
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
  * @param {import("./import_form.js").PathFields} sessions
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Binding[]}}
+ * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
  */
 export function observationsSection({ store, send, notify, navigation, actions, layers }, panes, sessions) {
   const act = (/** @type {Action} */ action, name = "") => send({ type: "observations", action, name });
@@ -215,7 +214,6 @@ export function observationsSection({ store, send, notify, navigation, actions, 
         keys: [],
         label,
         words: `${words} observations imported detector`,
-        matches: () => false,
         why,
         run: () => {
           reveal();
@@ -228,11 +226,10 @@ export function observationsSection({ store, send, notify, navigation, actions, 
           label: "Observations of other programs",
           area: "Views",
           words: "imported key points joints openpose trc judge detector",
-          matches: alt("KeyJ", false),
           run: reveal,
         },
-        { keys: ["Alt Shift ↓"], label: "Next imported limb that is off", area: "Timeline", words: "judge worst", matches: alt("ArrowDown", true), why: noEntry, run: () => step(1) },
-        { keys: ["Alt Shift ↑"], label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", matches: alt("ArrowUp", true), why: noEntry, run: () => step(-1) },
+        { keys: ["Alt Shift ↓"], label: "Next imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(1) },
+        { keys: ["Alt Shift ↑"], label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(-1) },
         command("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
         command("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
         command("Take the observations as poses", "store mend correct", busy, () => act("take", current())),

@@ -13,7 +13,7 @@ const BY_NAME = "annotator:";
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("../timeline/index.js").TimelineRoom} timeline
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Binding[]}}
+ * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
  */
 export function provenanceSection({ store, send, actions }, { jumps }) {
   const filter = choiceRow({
@@ -106,7 +106,6 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
         keys: [],
         label,
         words: "provenance timeline dim source made",
-        matches: () => false,
         run: () => {
           reveal();
           choose(wanted);

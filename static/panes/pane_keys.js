@@ -1,7 +1,7 @@
 /** Keys of the camera panes and their layers. */
 
 import { BY_KEY } from "../model/layers.js";
-import { alt, inArea, plain } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 
 /**
  * @param {{store: import("../model/store.js").Store, grid: import("./pane_grid.js").PaneGrid, gestures: import("./gestures.js").Gestures, layers: import("../model/layers.js").Layers,
@@ -9,45 +9,23 @@ import { alt, inArea, plain } from "../widgets/key_matching.js";
  */
 export function paneBindings({ store, grid, gestures, layers, layersMenu, say }) {
   return inArea("Views", [
-    { keys: ["A"], label: "Layers", matches: plain("a"), run: () => layersMenu.toggle() },
+    { keys: ["A"], label: "Layers", run: () => layersMenu.toggle() },
     {
       keys: ["Shift 1 – 9"],
       label: "Show or hide a layer, by its number in the menu",
-      matches: (event) => plain("", event.code, true)(event) && /^Digit[1-9]$/.test(event.code),
       run: (event) => layers.toggle([BY_KEY[Number(event.code.at(-1)) - 1]]),
     },
-    { keys: ["I"], label: "Brightness and contrast of a pane", matches: plain("i"), run: () => grid.openToneMenu() },
-    {
-      keys: ["1 – 9"],
-      label: "Fill the grid with a camera (toggle); two digits for 10 to 16",
-      matches: (event) => plain(event.key.toLowerCase())(event) && /^[1-9]$/.test(event.key),
-      run: (event) => grid.typeCamera(Number(event.key)),
-    },
-    { keys: ["PageDown"], label: "Fill the grid with the next camera", matches: plain("pagedown"), run: () => grid.stepFill(1) },
-    { keys: ["PageUp"], label: "Fill the grid with the previous camera", matches: plain("pageup"), run: () => grid.stepFill(-1) },
-    {
-      keys: ["0"],
-      label: "Show the whole image",
-      matches: plain("0"),
-      run: () => grid.typeCamera(0) || grid.resetViews(),
-    },
-    {
-      keys: ["Shift 0"],
-      label: "Zoom all views to the people",
-      matches: (event) => plain("", event.code, true)(event) && event.code === "Digit0",
-      run: () => grid.framePeople(),
-    },
-    {
-      keys: ["Alt 0"],
-      label: "Link the zoom of all views (toggle)",
-      matches: alt("Digit0", false),
-      run: () => grid.toggleLink(),
-    },
+    { keys: ["I"], label: "Brightness and contrast of a pane", run: () => grid.openToneMenu() },
+    { keys: ["1 – 9"], label: "Fill the grid with a camera (toggle); two digits for 10 to 16", run: (event) => grid.typeCamera(Number(event.key)) },
+    { keys: ["PageDown"], label: "Fill the grid with the next camera", run: () => grid.stepFill(1) },
+    { keys: ["PageUp"], label: "Fill the grid with the previous camera", run: () => grid.stepFill(-1) },
+    { keys: ["0"], label: "Show the whole image", run: () => grid.typeCamera(0) || grid.resetViews() },
+    { keys: ["Shift 0"], label: "Zoom all views to the people", run: () => grid.framePeople() },
+    { keys: ["Alt 0"], label: "Link the zoom of all views (toggle)", run: () => grid.toggleLink() },
     {
       keys: ["`"],
       label: "Bare picture: hide all drawing while the key left of 1 is held",
       words: "hide show nothing overlay contours joints",
-      matches: plain("`", "Backquote"),
       // The palette has no key to hold: there it is a toggle.
       run: ({ code }) => store.set({ bare: code !== "" || !store.facts.bare }),
       release: () => store.set({ bare: false }),
@@ -56,22 +34,15 @@ export function paneBindings({ store, grid, gestures, layers, layersMenu, say })
       keys: ["Alt L"],
       label: "Zoomed views follow the people from frame to frame (toggle)",
       words: "pan track playback steady still",
-      matches: alt("KeyL", false),
       run: () => say(`Zoomed views ${grid.togglePeopleFollowed() ? "follow the people." : "stay where they are."}`),
     },
     {
       keys: [],
       label: "Reset the sizes of all panes",
       words: "resize border split automatic",
-      matches: () => false,
       why: () => (grid.isResized ? null : "No pane was resized. Drag a border between two panes to do so."),
       run: () => grid.resetSizes(),
     },
-    {
-      keys: ["Alt O"],
-      label: "Take the next of the joints that overlap under the pointer",
-      matches: alt("KeyO", false),
-      run: () => gestures.offerNext(),
-    },
+    { keys: ["Alt O"], label: "Take the next of the joints that overlap under the pointer", run: () => gestures.offerNext() },
   ]);
 }

@@ -5,7 +5,7 @@
  */
 
 import { byId } from "../widgets/elements.js";
-import { alt, inArea } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 import { Here } from "./here.js";
 import { joinForm } from "./join_form.js";
 import { PlaceMarks } from "./place_marks.js";
@@ -30,7 +30,7 @@ export function mount(context) {
     document.documentElement.dataset.place = String(session?.has_place ?? true);
   });
   const bindings = inArea("People", [
-    { keys: ["Alt E"], label: "Who is here, and your name", words: "join participants", matches: alt("KeyE", false), run: () => here.toggle() },
+    { keys: ["Alt E"], label: "Who is here, and your name", words: "join participants", run: () => here.toggle() },
   ]);
   return { bindings };
 }

@@ -1,6 +1,6 @@
 /** Keys that start searches. */
 
-import { inArea, plain } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 
 /**
  * @param {import("../model/store.js").Store} store
@@ -11,13 +11,12 @@ export function searchBindings(store, actions, { search: why }) {
   const search = (/** @type {"step" | "stage" | "frame" | "contours" | "chains"} */ action) => () => {
     if (store.facts.connected && !store.facts.state?.job.running) actions.search(action);
   };
-  const shift = (/** @type {string} */ key) => plain(key, undefined, true);
   return inArea("Search", [
-    { keys: ["S"], label: "Search: one step", matches: plain("s"), why, run: search("step") },
-    { keys: ["Shift S"], label: "Search: to the end of the stage", matches: shift("s"), why, run: search("stage") },
-    { keys: ["Shift F"], label: "Search: repeat from the same start", matches: shift("f"), run: () => actions.searchAgain() },
-    { keys: [], label: "Search: fit the contours, iteration by iteration", matches: () => false, why, run: search("contours") },
-    { keys: [], label: "Search: fit the contours chain by chain, from a rough pose", matches: () => false, why, run: search("chains") },
-    { keys: ["F"], label: "Search: this frame", matches: plain("f"), why, run: search("frame") },
+    { keys: ["S"], label: "Search: one step", why, run: search("step") },
+    { keys: ["Shift S"], label: "Search: to the end of the stage", why, run: search("stage") },
+    { keys: ["Shift F"], label: "Search: repeat from the same start", run: () => actions.searchAgain() },
+    { keys: [], label: "Search: fit the contours, iteration by iteration", why, run: search("contours") },
+    { keys: [], label: "Search: fit the contours chain by chain, from a rough pose", why, run: search("chains") },
+    { keys: ["F"], label: "Search: this frame", why, run: search("frame") },
   ]);
 }

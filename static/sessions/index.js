@@ -4,7 +4,7 @@
  * The room imports `widgets` and types of `model`.
  */
 
-import { control, inArea } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 import { Sessions } from "./sessions.js";
 
 /** @typedef {ReturnType<typeof mount>} SessionsRoom */
@@ -22,17 +22,10 @@ export function mount({ store, notify }) {
       keys: ["Ctrl O"],
       label: "Open another session",
       words: "recent sessions folder recording file load switch",
-      matches: control("o", false),
       anywhere: true,
       run: () => sessions.toggle(),
     },
-    {
-      keys: [],
-      label: "New session from videos and a calibration",
-      words: "new session… create recording footage form cameras",
-      matches: () => false,
-      run: showNew,
-    },
+    { keys: [], label: "New session from videos and a calibration", words: "new session… create recording footage form cameras", run: showNew },
   ]);
   return { bindings, showNew, completes: (/** @type {HTMLInputElement} */ input) => sessions.completes(input) };
 }

@@ -17,7 +17,7 @@ import { Notices, watchConnection } from "./notices.js";
 import { Palette } from "./palette.js";
 import { People } from "./people.js";
 import { SavedMark } from "./saved_mark.js";
-import { escapeBinding, helpBindings, peopleBindings } from "./shell_keys.js";
+import { escapeBindings, helpBindings, peopleBindings } from "./shell_keys.js";
 import { TopBar } from "./top_bar.js";
 import { WorkList } from "./work_list.js";
 import { Workspace } from "./workspace.js";
@@ -66,7 +66,7 @@ export function mount(context, rooms) {
   const own = [
     ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }),
     ...rooms.sessions.bindings,
-    escapeBinding({ store, actions, notices, grid, gestures, pinning, epipolar: rooms.posing.epipolar, floor: rooms.scene.floor }),
+    ...escapeBindings({ store, actions, notices, grid, gestures, pinning, epipolar: rooms.posing.epipolar, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
     ...workspace.bindings,
   ];

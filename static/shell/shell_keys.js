@@ -1,7 +1,7 @@
 /** Keys of history, help and messages, and Esc. */
 
 import { hasSearch, hasTrack } from "../model/selectors.js";
-import { control, inArea, plain } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 import { closePopover } from "../widgets/popovers.js";
 
 /** @typedef {import("../widgets/key_matching.js").Binding} Binding */
@@ -13,35 +13,21 @@ import { closePopover } from "../widgets/popovers.js";
  *   reasons: import("../model/unavailable_reasons.js").Reasons}} parts
  */
 export function helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }) {
-  const shift = (/** @type {string} */ key) => plain(key, undefined, true);
   return inArea("History and help", [
-    { keys: ["Ctrl K"], label: "Commands", matches: control("k", false), anywhere: true, run: () => palette.toggle() },
-    { keys: ["Ctrl Z"], label: "Undo", matches: control("z", false), anywhere: true, why: reasons.undo, run: () => actions.undo() },
-    {
-      keys: ["Ctrl Shift Z", "Ctrl Y"],
-      label: "Redo",
-      anywhere: true,
-      why: reasons.redo,
-      matches: (event) => control("z", true)(event) || control("y", false)(event),
-      run: () => actions.redo(),
-    },
+    { keys: ["Ctrl K"], label: "Commands", anywhere: true, run: () => palette.toggle() },
+    { keys: ["Ctrl Z"], label: "Undo", anywhere: true, why: reasons.undo, run: () => actions.undo() },
+    { keys: ["Ctrl Shift Z", "Ctrl Y"], label: "Redo", anywhere: true, why: reasons.redo, run: () => actions.redo() },
     {
       keys: ["Shift B"],
       label: "Show the pose before the last fit or search, or its result",
-      matches: shift("b"),
       why: reasons.compared,
       run: () => actions.toggleBefore(),
     },
-    { keys: ["H"], label: "History of edits", matches: plain("h"), run: () => history.toggle() },
-    { keys: ["Shift H"], label: "Messages", matches: shift("h"), run: () => notices.toggleLog() },
-    { keys: ["Shift Esc"], label: "Dismiss all messages", matches: shift("escape"), run: () => notices.dismissAll() },
+    { keys: ["H"], label: "History of edits", run: () => history.toggle() },
+    { keys: ["Shift H"], label: "Messages", run: () => notices.toggleLog() },
+    { keys: ["Shift Esc"], label: "Dismiss all messages", run: () => notices.dismissAll() },
     { keys: ["?"], label: "Keyboard shortcuts", matches: (event) => event.key === "?", run: () => keyList.show() },
-    {
-      keys: [],
-      label: "First steps with a new recording",
-      matches: () => false,
-      run: () => firstSteps.show(),
-    },
+    { keys: [], label: "First steps with a new recording", run: () => firstSteps.show() },
   ]);
 }
 
@@ -52,9 +38,9 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
  *   notices: import("./notices.js").Notices, grid: import("../panes/pane_grid.js").PaneGrid,
  *   gestures: import("../panes/gestures.js").Gestures, pinning: import("../posing/pinning.js").Pinning,
  *   epipolar: import("../posing/epipolar_check.js").EpipolarCheck, floor: import("../scene/floor.js").Floor}} parts
- * @returns {Binding}
+ * @returns {Binding[]}
  */
-export function escapeBinding({ store, actions, notices, grid, gestures, pinning, epipolar, floor }) {
+export function escapeBindings({ store, actions, notices, grid, gestures, pinning, epipolar, floor }) {
   const run = () => {
     if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || epipolar.cancel()) return;
     if (store.facts.bare) return store.set({ bare: false });
@@ -68,7 +54,7 @@ export function escapeBinding({ store, actions, notices, grid, gestures, pinning
     else if (filled !== null) grid.toggleFill(filled);
   };
   const label = "Cancel a drag, exit the replay, stop a run, or unmark the range";
-  return { keys: ["Esc"], label, area: "Tracking", matches: plain("escape"), run };
+  return inArea("Tracking", [{ keys: ["Esc"], label, run }]);
 }
 
 /**
@@ -77,32 +63,13 @@ export function escapeBinding({ store, actions, notices, grid, gestures, pinning
  */
 export function peopleBindings({ actions, posing, people, reasons }) {
   const why = reasons.people;
-  const shift = (/** @type {string} */ key) => plain(key, undefined, true);
   return inArea("People", [
-    { keys: ["P"], label: "Select the next person", matches: plain("p"), why, run: () => actions.stepPerson(1) },
-    { keys: ["Shift P"], label: "Select the previous person", matches: shift("p"), why, run: () => actions.stepPerson(-1) },
-    { keys: ["Shift A"], label: "Solo: dim other people (toggle)", matches: shift("a"), why, run: () => actions.toggleSolo() },
-    {
-      keys: ["Shift V"],
-      label: "Show or hide the active person",
-      matches: shift("v"),
-      why,
-      run: () => actions.toggleShown(),
-    },
-    {
-      keys: ["Shift E"],
-      label: "Search and fit everyone or only the active person (toggle)",
-      matches: shift("e"),
-      why,
-      run: () => actions.toggleScope(),
-    },
-    {
-      keys: ["Shift C"],
-      label: "Copy the next person's angles",
-      matches: shift("c"),
-      why,
-      run: () => posing.copyNextPerson(),
-    },
-    { keys: ["Shift U"], label: "List of people", matches: shift("u"), why, run: () => people.toggle() },
+    { keys: ["P"], label: "Select the next person", why, run: () => actions.stepPerson(1) },
+    { keys: ["Shift P"], label: "Select the previous person", why, run: () => actions.stepPerson(-1) },
+    { keys: ["Shift A"], label: "Solo: dim other people (toggle)", why, run: () => actions.toggleSolo() },
+    { keys: ["Shift V"], label: "Show or hide the active person", why, run: () => actions.toggleShown() },
+    { keys: ["Shift E"], label: "Search and fit everyone or only the active person (toggle)", why, run: () => actions.toggleScope() },
+    { keys: ["Shift C"], label: "Copy the next person's angles", why, run: () => posing.copyNextPerson() },
+    { keys: ["Shift U"], label: "List of people", why, run: () => people.toggle() },
   ]);
 }

@@ -6,7 +6,7 @@
 
 import { usefulWidth } from "../layout/grid_layout.js";
 import { byId } from "../widgets/elements.js";
-import { inArea, alt } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 import { makeSeparator, showPosition } from "../widgets/separator.js";
 
 const STORED = "quadrille.panes-fraction";
@@ -66,7 +66,6 @@ export class Workspace {
       keys: ["Alt Y"],
       label: "3-D view: fold away or open (toggle)",
       words: "show hide close collapse scene panel",
-      matches: alt("KeyY", false),
       run: () => this.toggleScene(),
     };
     return inArea("3-D view", [binding]);

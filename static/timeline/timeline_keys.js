@@ -1,17 +1,16 @@
 /** Keys of navigation, tracking, timeline and drawer. */
 
-import { alt, inArea, plain } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 import { KINDS } from "./jumps.js";
 
 /**
- * @typedef {import("../widgets/key_matching.js").Binding} Binding
+ * @typedef {import("../widgets/key_matching.js").Command} Command
  * @typedef {import("../model/store.js").Store} Store
  * @typedef {import("../model/actions.js").Actions} Actions
  * @typedef {import("../model/unavailable_reasons.js").Reasons} Reasons
  * @typedef {import("./playback.js").Playback} Playback
  */
 
-const shift = (/** @type {string} */ key) => plain(key, undefined, true);
 
 /**
  * @param {import("../model/navigation.js").Navigation} navigation
@@ -19,13 +18,13 @@ const shift = (/** @type {string} */ key) => plain(key, undefined, true);
  */
 export function frameBindings(navigation, playback) {
   return inArea("Frames", [
-    { keys: [","], label: "Previous frame", matches: plain(",", "Comma"), run: () => navigation.step(-1) },
-    { keys: ["."], label: "Next frame", matches: plain(".", "Period"), run: () => navigation.step(1) },
-    { keys: ["Shift ,"], label: "Ten frames back", matches: plain("<", "Comma", true), run: () => navigation.step(-10) },
-    { keys: ["Shift ."], label: "Ten frames forward", matches: plain(">", "Period", true), run: () => navigation.step(10) },
-    { keys: ["Home"], label: "First frame", matches: plain("home"), run: () => navigation.first() },
-    { keys: ["End"], label: "Last frame", matches: plain("end"), run: () => navigation.last() },
-    { keys: ["Space"], label: "Play or pause", matches: plain(" "), run: () => playback.toggle() },
+    { keys: [","], label: "Previous frame", run: () => navigation.step(-1) },
+    { keys: ["."], label: "Next frame", run: () => navigation.step(1) },
+    { keys: ["Shift ,"], label: "Ten frames back", run: () => navigation.step(-10) },
+    { keys: ["Shift ."], label: "Ten frames forward", run: () => navigation.step(10) },
+    { keys: ["Home"], label: "First frame", run: () => navigation.first() },
+    { keys: ["End"], label: "Last frame", run: () => navigation.last() },
+    { keys: ["Space"], label: "Play or pause", run: () => playback.toggle() },
   ]);
 }
 
@@ -40,27 +39,21 @@ export function trackBindings(store, actions, reasons) {
   };
   const { track: why, tracking } = reasons;
   return inArea("Tracking", [
-    { keys: ["T"], label: "Track forward", matches: plain("t"), why, run: track("forward") },
-    { keys: ["Shift T"], label: "Track backward", matches: shift("t"), why, run: track("backward") },
-    {
-      keys: ["Alt P"],
-      label: "Pause or continue tracking",
-      matches: alt("KeyP", false),
-      why: tracking,
-      run: () => actions.togglePause(),
-    },
-    { keys: ["L"], label: "Follow the tracker (toggle)", matches: plain("l"), why: tracking, run: () => actions.toggleFollow() },
+    { keys: ["T"], label: "Track forward", why, run: track("forward") },
+    { keys: ["Shift T"], label: "Track backward", why, run: track("backward") },
+    { keys: ["Alt P"], label: "Pause or continue tracking", why: tracking, run: () => actions.togglePause() },
+    { keys: ["L"], label: "Follow the tracker (toggle)", why: tracking, run: () => actions.toggleFollow() },
   ]);
 }
 
 /** @param {import("./drawer.js").Drawer} drawer */
 export function drawerBindings(drawer) {
   return inArea("Views", [
-    { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
-    { keys: ["B"], label: "Search panel", matches: plain("b"), run: () => drawer.toggle("search") },
-    { keys: ["V"], label: "Cost landscape", matches: plain("v"), run: () => drawer.toggle("landscape") },
-    { keys: ["Shift L"], label: "Doubtful and lost poses, most severe first", matches: shift("l"), run: () => drawer.toggle("doubts") },
-    { keys: [], label: "Poses compared with those that they replaced", matches: () => false, run: () => drawer.toggle("runs") },
+    { keys: ["C"], label: "Curves", run: () => drawer.toggleCurves() },
+    { keys: ["B"], label: "Search panel", run: () => drawer.toggle("search") },
+    { keys: ["V"], label: "Cost landscape", run: () => drawer.toggle("landscape") },
+    { keys: ["Shift L"], label: "Doubtful and lost poses, most severe first", run: () => drawer.toggle("doubts") },
+    { keys: [], label: "Poses compared with those that they replaced", run: () => drawer.toggle("runs") },
   ]);
 }
 
@@ -71,12 +64,11 @@ export function drawerBindings(drawer) {
 export function queueBindings(queue, away) {
   const why = () => away() ?? queue.why;
   return inArea("Timeline", [
-    { keys: ["Alt ↓"], label: "Next doubtful or lost pose by severity", matches: alt("ArrowDown", false), why, run: () => queue.step(1) },
-    { keys: ["Alt ↑"], label: "Previous doubtful or lost pose by severity", matches: alt("ArrowUp", false), why, run: () => queue.step(-1) },
+    { keys: ["Alt ↓"], label: "Next doubtful or lost pose by severity", why, run: () => queue.step(1) },
+    { keys: ["Alt ↑"], label: "Previous doubtful or lost pose by severity", why, run: () => queue.step(-1) },
     {
       keys: ["Alt Enter"],
       label: "Accept the doubtful or lost poses here: mark them as reviewed",
-      matches: alt("Enter", false),
       why: () => away() ?? queue.whyNotAccept,
       run: () => queue.accept(queue.current),
     },
@@ -91,40 +83,24 @@ export function timelineBindings({ store, actions, playback, jumps, frameWindow,
   return inArea("Timeline", [
     ...playBindings(playback),
     ...KINDS.filter(({ key }) => key).flatMap(({ kind, key, more }) => jumpKeys(jumps, kind, key, more)),
-    {
-      keys: ["Q"],
-      label: "Middle of the longest gap",
-      words: "between keyframes",
-      matches: plain("q"),
-      run: () => jumps.toLongestGap(),
-    },
+    { keys: ["Q"], label: "Middle of the longest gap", words: "between keyframes", run: () => jumps.toLongestGap() },
     ...markBindings(store, actions, reasons),
-    { keys: ["Z"], label: "Timeline: zoom in", matches: plain("z"), run: () => frameWindow.zoomIn() },
-    { keys: ["Shift Z"], label: "Timeline: zoom out", matches: shift("z"), run: () => frameWindow.zoomOut() },
-    {
-      keys: ["Alt Z"],
-      label: "Timeline: show the marked range, or all frames",
-      matches: alt("KeyZ", false),
-      run: () => frameWindow.fit(),
-    },
+    { keys: ["Z"], label: "Timeline: zoom in", run: () => frameWindow.zoomIn() },
+    { keys: ["Shift Z"], label: "Timeline: zoom out", run: () => frameWindow.zoomOut() },
+    { keys: ["Alt Z"], label: "Timeline: show the marked range, or all frames", run: () => frameWindow.fit() },
     ...rangeBindings(store),
   ]);
 }
 
 /**
  * @param {Playback} playback
- * @returns {Binding[]}
+ * @returns {Command[]}
  */
 function playBindings(playback) {
   return [
-    {
-      keys: ["Shift Space"],
-      label: "Loop playback, within the marked range if there is one (toggle)",
-      matches: shift(" "),
-      run: () => playback.toggleLoop(),
-    },
-    { keys: [";"], label: "Play slower", matches: plain(";", "Semicolon"), run: () => playback.changeRate(-1) },
-    { keys: ["'"], label: "Play faster", matches: plain("'", "Quote"), run: () => playback.changeRate(1) },
+    { keys: ["Shift Space"], label: "Loop playback, within the marked range if there is one (toggle)", run: () => playback.toggleLoop() },
+    { keys: [";"], label: "Play slower", run: () => playback.changeRate(-1) },
+    { keys: ["'"], label: "Play faster", run: () => playback.changeRate(1) },
   ];
 }
 
@@ -132,33 +108,21 @@ function playBindings(playback) {
  * @param {Store} store
  * @param {Actions} actions
  * @param {Reasons} reasons
- * @returns {Binding[]}
+ * @returns {Command[]}
  */
 function markBindings(store, actions, reasons) {
   const interpolate = () => {
     if (store.facts.connected && store.facts.range) actions.onRange("interpolate", null);
   };
   return [
-    {
-      keys: ["K"],
-      label: "Keyframe: confirm this pose (toggle)",
-      matches: plain("k"),
-      run: () => actions.toggleMark("keyframe"),
-    },
-    { keys: ["Shift K"], label: "Remove the marks of this frame", matches: shift("k"), run: () => actions.unmark() },
-    { keys: ["E"], label: "Reviewed (toggle)", matches: plain("e"), run: () => actions.toggleMark("reviewed") },
-    {
-      keys: ["Shift I"],
-      label: "Interpolate the marked range",
-      matches: shift("i"),
-      why: reasons.range,
-      run: interpolate,
-    },
+    { keys: ["K"], label: "Keyframe: confirm this pose (toggle)", run: () => actions.toggleMark("keyframe") },
+    { keys: ["Shift K"], label: "Remove the marks of this frame", run: () => actions.unmark() },
+    { keys: ["E"], label: "Reviewed (toggle)", run: () => actions.toggleMark("reviewed") },
+    { keys: ["Shift I"], label: "Interpolate the marked range", why: reasons.range, run: interpolate },
     {
       keys: ["Shift R"],
       label: "Estimate the poses here again",
       words: "marked range, or the poses around this frame",
-      matches: shift("r"),
       why: reasons.away,
       run: () => actions.estimateAgain(),
     },
@@ -167,7 +131,7 @@ function markBindings(store, actions, reasons) {
 
 /**
  * @param {Store} store
- * @returns {Binding[]}
+ * @returns {Command[]}
  */
 function rangeBindings(store) {
   const mark = (/** @type {"first" | "last"} */ end) => () => {
@@ -176,8 +140,8 @@ function rangeBindings(store) {
     store.set({ range: { first: Math.min(target, other), last: Math.max(target, other) } });
   };
   return [
-    { keys: ["["], label: "Mark the start of a range", matches: plain("[", "BracketLeft"), run: mark("first") },
-    { keys: ["]"], label: "Mark the end of a range", matches: plain("]", "BracketRight"), run: mark("last") },
+    { keys: ["["], label: "Mark the start of a range", run: mark("first") },
+    { keys: ["]"], label: "Mark the end of a range", run: mark("last") },
   ];
 }
 
@@ -186,16 +150,14 @@ function rangeBindings(store) {
  * @param {import("./jumps.js").Kind} kind
  * @param {string} key
  * @param {string} what
- * @returns {import("../widgets/key_matching.js").Binding[]}
+ * @returns {import("../widgets/key_matching.js").Command[]}
  */
 function jumpKeys(jumps, kind, key, what) {
   const letter = key.slice(-1);
   const why = () => (jumps.count(kind) > 0 ? null : `There is no ${what}.`);
-  const match = (/** @type {boolean} */ shift) =>
-    key.startsWith("Alt ") ? alt(`Key${letter}`, shift) : plain(letter.toLowerCase(), undefined, shift);
   const previous = key.startsWith("Alt ") ? `Alt Shift ${letter}` : `Shift ${letter}`;
   return [
-    { keys: [key], label: `Next ${what}`, matches: match(false), why, run: () => jumps.go(kind, 1) },
-    { keys: [previous], label: `Previous ${what}`, matches: match(true), why, run: () => jumps.go(kind, -1) },
+    { keys: [key], label: `Next ${what}`, why, run: () => jumps.go(kind, 1) },
+    { keys: [previous], label: `Previous ${what}`, why, run: () => jumps.go(kind, -1) },
   ];
 }
