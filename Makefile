@@ -69,7 +69,8 @@ lint: $(VENV)/.tested
 types: $(VENV)/.tested
 	$(BIN)/pyrefly check --progress-bar no
 
-page-types: $(VENV)/.typescript
+page-types: $(VENV)/.typescript $(VENV)/.installed
+	$(BIN)/python tests/recipes/protocol_docs.py static/model/protocol.d.ts
 	$(BIN)/node node_modules/typescript/bin/tsc
 
 format: $(VENV)/.tested

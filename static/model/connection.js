@@ -1,7 +1,5 @@
 /** Pane socket: reconnects automatically, and passes messages to a listener. */
 
-import { decodeBinary } from "./protocol.js";
-
 const FIRST_DELAY_MS = 250;
 const MAX_DELAY_MS = 5000;
 /** Where the name is kept by which this tab joins: each tab may have another. */
@@ -100,4 +98,16 @@ export class Connection {
     setTimeout(() => (this.#isWanted() ? this.#connect() : this.#connectLater()), this.#delayMs * (0.75 + 0.5 * Math.random()));
     this.#delayMs = Math.min(2 * this.#delayMs, MAX_DELAY_MS);
   }
+}
+
+/**
+ * Take a binary message apart: `[uint32 LE header length][header JSON][payload]`.
+ *
+ * @param {ArrayBuffer} buffer
+ * @returns {{header: import("./protocol.js").BinaryHeader, payload: ArrayBuffer}}
+ */
+function decodeBinary(buffer) {
+  const headerLength = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, headerLength)));
+  return { header, payload: buffer.slice(4 + headerLength) };
 }

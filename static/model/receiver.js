@@ -9,6 +9,43 @@ import { mergeCurves } from "./series.js";
 
 const MAX_EARLY = 8;
 
+/**
+ * @typedef {import("./store.js").Facts} Facts
+ * @typedef {import("./protocol.js").TextMessage} TextMessage
+ * @typedef {import("./protocol.js").BinaryHeader} BinaryHeader
+ */
+
+/**
+ * Facts that a message changes, where it is not itself the fact of its name: `body_sizes` is the fact `bodySizes`.
+ *
+ * @type {{[Type in TextMessage["type"]]?: (message: Extract<TextMessage, {type: Type}>, facts: Facts) => Partial<Facts>}}
+ */
+const CHANGES = {
+  imported: (observations) => ({ observations }),
+  epipolar: (epipolarLines) => ({ epipolarLines }),
+  other_copy: (message) => ({ otherCopy: message.name ? message : null }),
+  range_comparison: (message) => ({ rangeComparison: message.first === null ? null : message }),
+  inconsistent: ({ frames, keyframes }) => ({ disagreeing: frames, keyframeDoubts: keyframes }),
+  search_runs: (message, facts) => takeRuns(facts, message),
+};
+
+/**
+ * Facts that a binary message changes.
+ *
+ * @type {{[Type in BinaryHeader["type"]]?: (header: Extract<BinaryHeader, {type: Type}>, payload: ArrayBuffer, facts: Facts) => Partial<Facts>}}
+ */
+const BINARY_CHANGES = {
+  curves: (header, payload, { curves, session }) => ({ curves: mergeCurves(curves, header, payload, session?.n_frames ?? 0) }),
+  search_steps: (header, payload, { searchSteps }) => ({ searchSteps: mergeSteps(searchSteps, header, payload) }),
+  search_candidates: (header, payload, { searchCandidates }) => ({ searchCandidates: mergeCandidates(searchCandidates, header, payload) }),
+  landscape: (header, payload) => ({ landscape: takeLandscape(header, payload) }),
+};
+
+/** @param {string} type of a message */
+function factOf(type) {
+  return type.replace(/_(.)/g, (_, letter) => letter.toUpperCase());
+}
+
 export class Receiver {
   #store;
   #notify;
@@ -40,121 +77,27 @@ export class Receiver {
     if (open !== this.#store.facts.connected) this.#store.set({ connected: open });
   }
 
-  /** @param {import("./protocol.js").TextMessage} message */
+  /** @param {TextMessage} message */
   onText(message) {
-    switch (message.type) {
-      case "session":
-        this.#begin(message);
-        break;
-      case "state":
-        this.#store.set({ state: message });
-        this.#goBack(message);
-        break;
-      case "timeline":
-        this.#mergeTimeline(message);
-        break;
-      case "settings":
-        this.#store.set({ settings: message });
-        break;
-      case "view_3d":
-        this.#store.set({ view3d: message });
-        break;
-      case "finding":
-        this.#store.set({ finding: message });
-        break;
-      case "calibration":
-        this.#store.set({ calibration: message });
-        break;
-      case "imported":
-        this.#store.set({ observations: message });
-        break;
-      case "annotation":
-        this.#store.set({ annotation: message });
-        break;
-      case "presence":
-        if (message.refusal) this.#refuse(message.refusal);
-        this.#store.set({ presence: message });
-        break;
-      case "provenance":
-        this.#store.set({ provenance: message });
-        break;
-      case "annotators":
-        this.#store.set({ annotators: message });
-        break;
-      case "other_copy":
-        this.#store.set({ otherCopy: message.name ? message : null });
-        break;
-      case "acquisition":
-        this.#store.set({ acquisition: message });
-        break;
-      case "body_sizes":
-        this.#store.set({ bodySizes: message });
-        break;
-      case "search_setup":
-        this.#store.set({ searchSetup: message });
-        break;
-      case "search_runs":
-        this.#store.set(takeRuns(this.#store.facts, message));
-        break;
-      case "observability":
-        this.#store.set({ observability: message });
-        break;
-      case "epipolar":
-        this.#store.set({ epipolarLines: message });
-        break;
-      case "reason":
-        this.#store.set({ reason: message });
-        break;
-      case "cost_map":
-        this.#store.set({ costMap: message });
-        break;
-      case "range_comparison":
-        this.#store.set({ rangeComparison: message.first === null ? null : message });
-        break;
-      case "inconsistent":
-        this.#store.set({ disagreeing: message.frames, keyframeDoubts: message.keyframes });
-        break;
-      case "history":
-        this.#store.set({ history: message });
-        break;
-      case "notice":
-        this.#notify(message);
-        break;
-    }
+    if (message.type === "session") return this.#begin(message);
+    if (message.type === "timeline") return this.#mergeTimeline(message);
+    if (message.type === "notice") return this.#notify(message);
+    if (message.type === "presence" && message.refusal) this.#refuse(message.refusal);
+    const change = /** @type {((message: TextMessage, facts: Facts) => Partial<Facts>) | undefined} */ (CHANGES[message.type]);
+    this.#store.set(change?.(message, this.#store.facts) ?? { [factOf(message.type)]: message });
+    if (message.type === "state") this.#goBack(message);
   }
 
   /**
-   * @param {import("./protocol.js").BinaryHeader} header
+   * @param {BinaryHeader} header
    * @param {ArrayBuffer} payload
    */
   onBinary(header, payload) {
-    switch (header.type) {
-      case "image":
-        this.#pictures?.receive(header, payload);
-        break;
-      case "overlay":
-        this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
-        break;
-      case "cells":
-        this.#cells(header).take(header, payload);
-        break;
-      case "curves":
-        this.#store.set({ curves: mergeCurves(this.#store.facts.curves, header, payload, this.#frameCount) });
-        break;
-      case "search_steps":
-        this.#store.set({ searchSteps: mergeSteps(this.#store.facts.searchSteps, header, payload) });
-        break;
-      case "search_candidates":
-        this.#store.set({ searchCandidates: mergeCandidates(this.#store.facts.searchCandidates, header, payload) });
-        break;
-      case "landscape":
-        this.#store.set({ landscape: takeLandscape(header, payload) });
-        break;
-    }
-  }
-
-  get #frameCount() {
-    return this.#store.facts.session?.n_frames ?? 0;
+    if (header.type === "image") return this.#pictures?.receive(header, payload);
+    if (header.type === "overlay") return this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
+    if (header.type === "cells") return this.#cells(header).take(header, payload);
+    const change = /** @type {(header: BinaryHeader, payload: ArrayBuffer, facts: Facts) => Partial<Facts>} */ (BINARY_CHANGES[header.type]);
+    this.#store.set(change(header, payload, this.#store.facts));
   }
 
   /**
@@ -258,7 +201,7 @@ export class Receiver {
   #cells({ replace, person }) {
     const { facts } = this.#store;
     const known = person === null ? facts.timeline : facts.lanes[person];
-    const cells = replace || !known ? new Cells(this.#frameCount) : known;
+    const cells = replace || !known ? new Cells(facts.session?.n_frames ?? 0) : known;
     if (person === null) this.#store.set({ timeline: cells });
     else this.#store.set({ lanes: Object.assign([...facts.lanes], { [person]: cells }) });
     return cells;

@@ -16,48 +16,30 @@ import { defaultLayers } from "./layers.js";
  * @typedef {{frame: number, target: number, pictures: PlaceholderPictures | null}} Placeholder pictures: those of `frame`,
  *   without overlay; null if `frame` is the frame shown
  *
- * @typedef {object} Facts
+ * @typedef {object} OtherFacts
  * @property {boolean} connected
  * @property {string | null} opening name of another session that the program is opening
  * @property {string} openingStep what the program is doing to open it; empty while unknown
- * @property {import("./protocol.js").SessionMessage | null} session
- * @property {import("./protocol.js").StateMessage | null} state
  * @property {import("./cells.js").Cells} timeline cells of all people together
  * @property {import("./cells.js").Cells[]} lanes cells of each person, if there are several
  * @property {number[]} disagreeing frames whose pose is inconsistent with its neighbours, ascending
  * @property {import("./protocol.js").KeyframeDoubt[]} keyframeDoubts keyframes that their neighbours or views contradict
- * @property {import("./protocol.js").ObservabilityMessage | null} observability of the selected person
- * @property {import("./protocol.js").CostMapMessage | null} costMap cost over two degrees of freedom, where one is asked for
- * @property {import("./protocol.js").ReasonMessage | null} reason why the shown pose is in doubt, while the section is open
  * @property {import("./protocol.js").RangeComparisonMessage | null} rangeComparison poses of a range and those that they replaced
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
  * @property {import("./series.js").Curves | null} curves the current group of curves
  * @property {import("./series.js").Tab | null} drawer the open tab; null while the drawer is closed
  * @property {number} drawerPx height that the open drawer takes from the views, CSS pixels
  * @property {{choice: import("./theme.js").ThemeChoice, isDark: boolean}} theme
- * @property {import("./protocol.js").SettingsMessage | null} settings of tracker and search
- * @property {import("./protocol.js").View3dMessage | null} view3d what the 3-D view shows
- * @property {import("./protocol.js").BodySizesMessage | null} bodySizes of the active person
- * @property {import("./protocol.js").AcquisitionMessage | null} acquisition of sizes from the footage
- * @property {import("./protocol.js").FindingMessage | null} finding the search for people whom nobody has placed
- * @property {import("./protocol.js").CalibrationMessage | null} calibration the check of the cameras
  * @property {import("./protocol.js").ObservationsMessage | null} observations imported observations and their judgement
- * @property {import("./protocol.js").AnnotationMessage | null} annotation the plan, comments, and the next best click
- * @property {import("./protocol.js").PresenceMessage | null} presence who is on the session, and where
- * @property {import("./protocol.js").ProvenanceMessage | null} provenance where a pose of the shown frame comes from, while asked for
- * @property {import("./protocol.js").AnnotatorsMessage | null} annotators keyframes by annotator, while asked for
  * @property {import("./provenance.js").Filter | null} provenanceFilter poses that the timeline does not dim; null for all
  * @property {import("./protocol.js").OtherCopyMessage | null} otherCopy the copy of the session that is compared; null without one
  * @property {boolean} showsMisfits whether the views show where the contours of the last check miss the edges
  * @property {number | null} exporting share of an export that is done, 0 to 1; null without one
- * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
- * @property {import("./protocol.js").SearchRunsMessage | null} searchRuns
  * @property {Map<number, import("./search_runs.js").Steps>} searchSteps recorded steps by run
  * @property {Map<number, import("./search_runs.js").Candidates>} searchCandidates best poses by run
  * @property {number | null} searchRun the selected run; null for the newest
  * @property {boolean} replaying whether a replay is playing
  * @property {import("./search_runs.js").Landscape | null} landscape
- * @property {import("./protocol.js").HistoryMessage | null} history the listed part of the history
  * @property {{first: number, last: number} | null} range the marked frames, both included
  * @property {Shown | null} shown the pictures that are displayed
  * @property {Placeholder | null} placeholder what is shown until the requested frame arrives
@@ -86,6 +68,14 @@ import { defaultLayers } from "./layers.js";
  * @property {(import("./image_tone.js").ImageTone | undefined)[]} imageTones tone of each camera's image
  * @property {number[]} reductions pixels of each camera's image per displayed pixel, per side; 0 if not visible
  */
+
+/**
+ * @template {string} Name
+ * @typedef {Name extends `${infer First}_${infer Rest}` ? `${First}${Capitalize<CamelCase<Rest>>}` : Name} CamelCase
+ */
+/** @typedef {import("./protocol.js").TextMessage} Message */
+/** @typedef {{[M in Message as CamelCase<M["type"]>]: M | null}} MessageFacts the last message of each type */
+/** @typedef {OtherFacts & Omit<MessageFacts, keyof OtherFacts | "notice" | "imported" | "inconsistent">} Facts */
 
 const MAX_ROUNDS = 3;
 /** Facts beside the pictures that a playing page shows with the next pictures, or after that time: each time that something
