@@ -7,6 +7,7 @@ that; `make page-types` writes the types. A test compares the document with the 
 import ast
 import dataclasses
 import inspect
+import re
 import sys
 import types
 from functools import cache
@@ -111,21 +112,15 @@ def tables() -> str:
 
 def with_tables(text: str) -> str:
     """Return the text of `DOCS` with its generated part replaced by the present one."""
-    before, begin, rest = text.partition(_BEGIN)
-    first_line, _, rest = rest.partition("\n")
-    _, end, after = rest.partition(_END)
-    assert begin, f"{DOCS} has no generated part"
-    assert end, f"{DOCS} has no generated part"
-    return f"{before}{begin}{first_line}\n{tables()}<!-- {end}{after}"
+    parts = re.fullmatch(rf"(.*{_BEGIN}[^\n]*\n).*(<!-- {_END}.*)", text, re.DOTALL)
+    assert parts, f"{DOCS} has no generated part"
+    return parts[1] + tables() + parts[2]
 
 
 def main() -> None:
     """Write the files that the command line names, or both."""
-    paths = [Path(name) for name in sys.argv[1:]] or [TYPES, DOCS]
-    if TYPES in paths:
-        TYPES.write_text(declarations(), encoding="utf-8")
-    if DOCS in paths:
-        DOCS.write_text(with_tables(DOCS.read_text(encoding="utf-8")), encoding="utf-8")
+    for path in map(Path, sys.argv[1:] or [TYPES, DOCS]):
+        path.write_text(declarations() if path == TYPES else with_tables(path.read_text("utf-8")), "utf-8")
 
 
 def _messages() -> tuple[type, ...]:

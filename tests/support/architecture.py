@@ -189,10 +189,6 @@ PAGE_IMPORT = re.compile(r"""(?:from\s+|import\s*\(\s*|import\s+)["'](\.[^"']+)[
 SCRIPTS = {p.relative_to(STATIC).as_posix(): p.read_text("utf-8") for p in sorted(STATIC.rglob("*.js"))}
 
 
-PAGE_TYPES = "model/protocol.js"
-"""Types of messages that scripts import; `make page-types` writes their declarations."""
-
-
 def page_room(script):
     return Path(script).parent.as_posix()
 

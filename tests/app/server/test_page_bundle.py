@@ -87,11 +87,7 @@ def test_no_style_sheet_of_the_page_is_left_to_be_imported():
 
 
 def test_markup_of_rooms_stands_where_the_page_names_it():
-    files = {
-        "index.html": "<body>\n  <!-- a comment -->\n  <!-- rooms/bar.html -->\n</body>\n",
-        "rooms/bar.html": "<p>\n  <!-- rooms/inner.html -->\n</p>",
-        "rooms/inner.html": "<b>bold</b>",
-    }
-    assert bundle_markup("index.html", files) == "<body>\n  <!-- a comment -->\n<p>\n<b>bold</b>\n</p>\n</body>\n"
-    with pytest.raises(TrackerError, match=r"expected the page's file static/rooms/inner.html"):
-        bundle_markup("index.html", {name: text for name, text in files.items() if name != "rooms/inner.html"})
+    files = {"index.html": "<body>\n  <!-- a -->\n  <!-- r/b.html -->\n", "r/b.html": "<p>\n  <!-- r/c.html -->\n</p>"}
+    assert bundle_markup("index.html", files | {"r/c.html": "<b>"}) == "<body>\n  <!-- a -->\n<p>\n<b>\n</p>\n"
+    with pytest.raises(TrackerError, match=r"expected the page's file static/r/c.html"):
+        bundle_markup("index.html", files)
