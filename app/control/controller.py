@@ -217,9 +217,9 @@ class Controller:
         """Return for each person which degrees of freedom are not locked, (n_dofs,)."""
         return [self._session_state.active_dofs(person) for person in range(len(self.models))]
 
-    def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
-        """Call a view with every new state; returns the function that ends this."""
-        return self._session_state.subscribe(view)
+    def subscribe(self, view: Callable[[State], None], *fields: str) -> Callable[[], None]:
+        """See `SessionState.subscribe`."""
+        return self._session_state.subscribe(view, *fields)
 
     def close(self) -> None:
         """Stop all work and save; the controller must not be used afterwards. The host's is closed last."""

@@ -75,7 +75,8 @@ class CameraView:
         self._views: dict[int, _PageView] = {}
         # One thread for states and reports, so that neither overtakes the other.
         self._latest: LatestWinsWorker[State | _Report] = LatestWinsWorker(self._take, "camera view")
-        controller.subscribe(self._latest.offer)
+        paused = ("drag", "is_pin_held", "pages_pausing_3d")
+        controller.subscribe(self._latest.offer, "snapped", "frame", "calibration", "footage", *paused)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
 

@@ -7,9 +7,7 @@ import numpy as np
 import viser
 
 from app.control.controller import Controller
-from app.runtime.jobs import LatestWinsWorker
 from app.scene3d.meshes import PeopleMeshes
-from app.scene3d.throttle import Throttle
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.state import State
@@ -22,34 +20,24 @@ from tracker.geometry.ground_plane import GroundPlane, up_rotation
 
 _BESIDE_M = 0.8
 """Distance between a person and the character, for each person of the session, metres."""
-_REST_S = 0.08
-"""Time between updates, so that panes go first."""
 
 
 class CharacterLayer:
     """The characters of the shown frame: one for each person, as tall as the person."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
-        """Follow the controller's state; meshes are added once a character is chosen."""
+        """Add no mesh before a character is chosen."""
         self._server, self._controller = server, controller
-        self._throttle = Throttle(controller)
         self._meshes: PeopleMeshes | None = None
         self._built: tuple[object, ...] = ()
         self._drawn: tuple[object, ...] = ()
         self._characters: list[BodyModel] = []
-        latest = LatestWinsWorker(self._show, "characters", _REST_S)
-        controller.subscribe(latest.offer)
-        latest.offer(controller.state)
 
-    def _show(self, state: State) -> None:
-        if not state.view_3d.character and self._meshes is None:
-            return
-        due = self._throttle.due(state)
-        if due is None:
-            return
-        with self._server.atomic():
-            self._build(due)
-            self._pose(due)
+    def show(self, state: State) -> None:
+        """Draw the characters of a state."""
+        if state.view_3d.character or self._meshes is not None:
+            self._build(state)
+            self._pose(state)
 
     def _build(self, state: State) -> None:
         """Replace the meshes if the character or the size of a body changed."""

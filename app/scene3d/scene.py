@@ -54,12 +54,11 @@ class SceneView:
         self._present = controller.state.present
         self._trails = self._new_trails()
         self._frusta = Frusta(server, controller)
+        self._characters, self._voxels = CharacterLayer(server, controller), VoxelLayer(server, controller)
         latest = LatestWinsWorker(self._show, "scene", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
         CameraView(server, controller)
-        VoxelLayer(server, controller)
-        CharacterLayer(server, controller)
 
     def _show(self, state: State) -> None:
         due = self._throttle.due(state)
@@ -77,6 +76,8 @@ class SceneView:
                 self._people.pose(state.poses)
             self._show_prediction(state)
             self._show_trails(state)
+            self._characters.show(due)
+        self._voxels.show(due)
 
     def _show_bodies(self, state: State) -> None:
         """Rebuild the meshes when the sizes of a body change."""

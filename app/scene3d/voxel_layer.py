@@ -37,13 +37,18 @@ class VoxelLayer:
     """The voxels of the shown frame. They are carved and labelled in a thread of their own."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
-        """Follow the controller's state; silhouettes are found once the layer is switched on."""
+        """Find no silhouettes before the layer is switched on."""
         self._server, self._controller = server, controller
         self._finder: tuple[Sequence[CameraSource], SilhouetteFinder] | None = None  # with the cameras that it is of
         self._drawn: tuple[object, ...] = ()
-        latest = LatestWinsWorker(self._show, "voxels", _REST_S)
-        controller.subscribe(latest.offer)
-        latest.offer(controller.state)
+        self._latest = LatestWinsWorker(self._show, "voxels", _REST_S)
+        self._was_on = False
+
+    def show(self, state: State) -> None:
+        """Draw the voxels of a state, if they are switched on, in their own thread."""
+        if state.view_3d.voxels or self._was_on:
+            self._latest.offer(state)
+        self._was_on = state.view_3d.voxels
 
     def _show(self, state: State) -> None:
         if not state.view_3d.voxels or state.drag is not None or state.is_3d_throttled:

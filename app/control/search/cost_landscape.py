@@ -1,12 +1,12 @@
 """Sample the cost over the range of one degree of freedom, with all others fixed."""
 
-import threading
 from collections.abc import Sequence
 
 import numpy as np
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from app.control.session.watching_pages import WatchingPages
 from app.runtime.jobs import LatestWinsWorker
 from app.state.search import CostLandscape
 from app.state.state import State
@@ -36,12 +36,10 @@ class CostLandscapes:
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
-        self._pages: set[int] = set()
-        self._pages_lock = threading.Lock()
+        self._pages = WatchingPages[None](session_state, self._changed)
         self._chosen: tuple[int, str | None, str] | None = None  # selected person and point, name of the dof
         self._computed: tuple[object, ...] = ()
         self._latest = LatestWinsWorker(self._compute, "landscape", _REST_S)
-        session_state.subscribe(self._changed)
 
     def watch(self, page: int, looks: bool) -> None:
         """Note whether a page displays the landscape.
@@ -50,11 +48,11 @@ class CostLandscapes:
             page: number of the page.
             looks: whether it displays it. The landscape then begins with the selected point.
         """
-        with self._pages_lock:
-            if looks and page not in self._pages:
-                self._chosen = None
-            (self._pages.add if looks else self._pages.discard)(page)
-        if looks:
+        if not looks:
+            self._pages.leave(page)
+        else:
+            self._chosen = self._chosen if page in self._pages else None
+            self._pages.enter(page, None)
             self._latest.offer(self._session_state.state)
 
     def choose(self, dof: str) -> None:
@@ -99,7 +97,7 @@ class CostLandscapes:
         self._latest.close()
 
     def _changed(self, state: State) -> None:
-        if self._pages and not state.search.running:
+        if not state.search.running:
             self._latest.offer(state)
 
     def _compute(self, state: State) -> None:

@@ -1,6 +1,5 @@
 """Sample the cost over two degrees of freedom around the shown pose, with all others fixed."""
 
-import threading
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from app.control.search.cost_landscape import current_value
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from app.control.session.watching_pages import WatchingPages
 from app.runtime.jobs import LatestWinsWorker
 from app.state.identity import Identity
 from app.state.search import CostMap
@@ -40,11 +40,9 @@ class CostMaps:
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
-        self._pages: dict[int, tuple[int, tuple[int, int]]] = {}  # person and degrees of freedom by page
-        self._lock = threading.Lock()
+        self._pages = WatchingPages[tuple[int, tuple[int, int]]](session_state, self._changed)  # person, dofs
         self._computed: tuple[object, ...] = ()
         self._latest = LatestWinsWorker(self._compute, "cost map", _REST_S)
-        session_state.subscribe(self._changed)
 
     def watch(self, page: int, person: int, dofs: tuple[int, int]) -> None:
         """Show a page the map over two degrees of freedom of a person; it follows the pose.
@@ -53,15 +51,12 @@ class CostMaps:
             TrackerError: the body has no two such degrees of freedom.
         """
         self._require(person, dofs)
-        with self._lock:
-            self._pages.pop(page, None)
-            self._pages[page] = (person, dofs)
+        self._pages.enter(page, (person, dofs))
         self._latest.offer(self._session_state.state)
 
     def leave(self, page: int) -> None:
         """Note that a page displays no map."""
-        with self._lock:
-            self._pages.pop(page, None)
+        self._pages.leave(page)
 
     def set_values(self, person: int, dofs: tuple[int, int], values: tuple[float, float]) -> None:
         """Set two degrees of freedom, rad or metres, within their limits; one entry of the history.
@@ -100,13 +95,11 @@ class CostMaps:
             )
 
     def _changed(self, state: State) -> None:
-        if self._pages and not state.is_dragging and not state.search.running:
+        if not state.is_dragging and not state.search.running:
             self._latest.offer(state)
 
     def _compute(self, _: State) -> None:
-        with self._lock:
-            wanted = next(reversed(self._pages.values()), None)
-        state = self._session_state.state
+        wanted, state = self._pages.newest, self._session_state.state
         views = self._session_state.frames.cached_evidence(state.frame)
         if wanted is None or views is None or state.compiling is not None:
             return

@@ -50,7 +50,7 @@ class Annotating:
         self._seen = -1
         self._reading = threading.Lock()  # the last reading that begins is the last one shown
         self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._read, "plan of annotation", _REST_S)
-        session_state.subscribe(self._changed)
+        session_state.subscribe(self._changed, "timeline_version")
         self._changed(session_state.state)
 
     def close(self) -> None:

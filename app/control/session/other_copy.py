@@ -53,7 +53,7 @@ class OtherCopies:
         self._session_state, self._activities, self._assess = session_state, activities, assess
         self._latest: LatestWinsWorker[None] = LatestWinsWorker(self._refresh, "comparison of copies", _REST_S)
         self._compared = session_state.state.timeline_version
-        session_state.subscribe(self._changed)
+        session_state.subscribe(self._changed, "timeline_version")
 
     def open(self, folder: Path) -> None:
         """Compare with the copy in a folder.

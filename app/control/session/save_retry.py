@@ -18,7 +18,7 @@ class SaveRetry:
         self._timer: threading.Timer | None = None
         self._rest_s = _FIRST_S
         self._closed = False
-        session_state.subscribe(self._watch)
+        session_state.subscribe(self._watch, "save_error")
 
     def close(self) -> None:
         """Make no more attempts."""

@@ -63,7 +63,7 @@ class SessionState:
         self.lock = lock or threading.RLock()
         self.frame_poses = FramePoses(session, saver)
         """Loads the poses of a frame."""
-        self._subscribers: list[Callable[[State], None]] = []
+        self._subscribers: list[tuple[Callable[[State], None], frozenset[str]]] = []
         self._stored: tuple[tuple[ShownPose, ...], Pins] | None = None  # the shown poses and pins that are on disk
         self.unwritten: list[Callable[[], bool]] = []
         """Functions that return whether a part of the controller holds poses that it has not saved yet."""
@@ -167,15 +167,21 @@ class SessionState:
         locked = load_locks(session.people, self.saver.setting)
         self.show_frame(self.state.frame, point=point, held=held, floor=floor, locked=locked, draft=None)
 
-    def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
-        """Call a view with every new state; returns the function that ends this."""
+    def subscribe(self, view: Callable[[State], None], *fields: str) -> Callable[[], None]:
+        """Call a view with each state in which one of these fields is new; returns the function that ends this.
+
+        Args:
+            view: is called under the lock.
+            fields: names of the fields that it reads; none for all.
+        """
+        subscription = view, frozenset(fields)
         with self.lock:
-            self._subscribers.append(view)
+            self._subscribers.append(subscription)
 
         def unsubscribe() -> None:
             with self.lock:
-                if view in self._subscribers:
-                    self._subscribers.remove(view)
+                if subscription in self._subscribers:
+                    self._subscribers.remove(subscription)
 
         return unsubscribe
 
@@ -197,10 +203,12 @@ class SessionState:
                 changes["velocities"] = self.frame_poses.velocities(frame)
             if frame != self.state.frame and "search_view" not in changes:
                 changes["search_view"] = SearchView(speed=self.state.search_view.speed)
-            state = replace(self.state, **changes)
+            before, state = self.state, replace(self.state, **changes)
             self.state = replace(state, saved=self._is_saved(state))
-            for view in list(self._subscribers):
-                view(self.state)
+            new = {name for name in [*changes, "saved"] if getattr(before, name) is not getattr(self.state, name)}
+            for view, fields in list(self._subscribers):
+                if not fields or new & fields:
+                    view(self.state)
 
     def show_frame(self, frame: int, /, **changes: Unpack[StateChanges]) -> None:
         """Show the stored poses of a frame, with other changes; the next save makes a new entry of the history."""

@@ -28,7 +28,7 @@ class ComparingRuns:
         self._latest: LatestWinsWorker[range | None] = LatestWinsWorker(self._work, "comparison", _REST_S)
         self._runs = 0
         self._offered = session_state.state.timeline_version
-        session_state.subscribe(self._changed)
+        session_state.subscribe(self._changed, "timeline_version")
 
     def compare(self, first: int, last: int) -> None:
         """Compare the poses of a range, `last` included, with those before them.

@@ -40,7 +40,7 @@ class InconsistentFrames:
         self._seen = 0  # checked version of the timeline
         self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._check, "disagreements", _REST_S)
         self._offered = 0
-        session_state.subscribe(self._changed)
+        session_state.subscribe(self._changed, "timeline_version")
         self._changed(session_state.state)
 
     def close(self) -> None:

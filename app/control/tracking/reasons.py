@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.control.session.session_state import SessionState
+from app.control.session.watching_pages import WatchingPages
 from app.control.tracking import track_settings
 from app.control.tracking.poses_around import pose_in_run
 from app.remedies import page_sentence
@@ -58,12 +59,11 @@ class Reasons:
     def __init__(self, session_state: SessionState) -> None:
         """Subscribe to the state; nothing is computed until a page asks."""
         self._session_state = session_state
-        self._pages: set[int] = set()
+        self._pages = WatchingPages[None](session_state, self._changed)
         self._stopping = threading.Event()
         self._learnt: _Learnt | None = None
         self._computed: tuple[object, ...] = ()
         self._latest = LatestWinsWorker(self._compute, "reasons", _REST_S)
-        session_state.subscribe(self._changed)
 
     def watch(self, page: int, looks: bool) -> None:
         """Note whether a page shows the reason; the work begins where it does, and ends with the last page.
@@ -72,11 +72,12 @@ class Reasons:
             page: number of the page.
             looks: whether it shows the reason.
         """
-        (self._pages.add if looks else self._pages.discard)(page)
         if not looks:
+            self._pages.leave(page)
             if not self._pages:
                 self._stopping.set()
             return
+        self._pages.enter(page, None)
         self._stopping.clear()
         self._computed = ()
         self._latest.offer(self._session_state.state)
@@ -91,7 +92,7 @@ class Reasons:
         self._latest.close()
 
     def _changed(self, state: State) -> None:
-        if self._pages and not self._stopping.is_set() and _ingredients(state) != self._computed:
+        if not self._stopping.is_set() and _ingredients(state) != self._computed:
             self._latest.offer(state)
 
     def _compute(self, _: State) -> None:

@@ -52,7 +52,7 @@ class Scene:
 
 
 class Controller:
-    """Stands for the controller: a state that its one subscriber follows."""
+    """Stands for the controller."""
 
     def __init__(self):
         self.session = SimpleNamespace(cameras=(), up="z", floor=None)
@@ -65,9 +65,6 @@ class Controller:
         values = {"view_3d": view, "drag": None, "is_3d_throttled": False, "frame": frame, "poses": (POSE,)}
         calibration = SimpleNamespace(n_changes=0)
         return SimpleNamespace(**(values | {"models": (MODEL,), "calibration": calibration} | changes))
-
-    def subscribe(self, offer):
-        self.offer = offer
 
 
 @pytest.fixture
@@ -83,15 +80,15 @@ def views(monkeypatch):
 @pytest.mark.slow
 def test_voxels_are_drawn_while_they_are_switched_on(views):
     scene, controller = Scene(), Controller()
-    VoxelLayer(scene, controller)
-    controller.offer(controller.of(voxels=True, drag=object()))
-    controller.offer(controller.of(voxels=True))
+    layer = VoxelLayer(scene, controller)
+    layer.show(controller.of(voxels=True, drag=object()))
+    layer.show(controller.of(voxels=True))
     wait_for(lambda: scene.clouds)
     points = scene.clouds[0]
     assert len(points) > 500
     height = figure(noise=0.1)[0].points_world[:, 2]
     np.testing.assert_allclose([points[:, 2].min(), points[:, 2].max()], [height.min(), height.max()], atol=0.1)
-    controller.offer(controller.of(voxels=False))
+    layer.show(controller.of(voxels=False))
     wait_for(lambda: len(scene.clouds) > 1)
     assert [len(c) for c in scene.clouds[1:]] == [0]
     assert scene.notes == ["", ""]
@@ -100,19 +97,19 @@ def test_voxels_are_drawn_while_they_are_switched_on(views):
 def test_voxels_are_carved_again_by_corrected_cameras(views, monkeypatch):
     scene, controller, made, finder = Scene(), Controller(), [], voxel_layer.SilhouetteFinder
     monkeypatch.setattr(voxel_layer, "SilhouetteFinder", lambda c, r: made.append(c) or finder(c, r))
-    VoxelLayer(scene, controller)
-    controller.offer(controller.of(voxels=True, frame=1))
+    layer = VoxelLayer(scene, controller)
+    layer.show(controller.of(voxels=True, frame=1))
     wait_for(lambda: scene.clouds)
     controller.session.cameras = ("corrected",)
-    controller.offer(controller.of(voxels=True, frame=1, calibration=SimpleNamespace(n_changes=1)))
+    layer.show(controller.of(voxels=True, frame=1, calibration=SimpleNamespace(n_changes=1)))
     wait_for(lambda: len(scene.clouds) == 2)
     assert made == [(), ("corrected",)]
 
 
 def test_a_note_says_why_there_are_no_voxels(views):
     scene, controller = Scene(), Controller()
-    VoxelLayer(scene, controller)
-    controller.offer(controller.of(voxels=True, frame=1))
+    layer = VoxelLayer(scene, controller)
+    layer.show(controller.of(voxels=True, frame=1))
     wait_for(lambda: scene.notes)
     assert len(scene.clouds[0]) == 0
     expected = "No voxels: expected somebody in the silhouettes of at least 2 views, found none"
