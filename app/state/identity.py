@@ -1,6 +1,8 @@
 """Identity of values that are expensive or impossible to compare, such as poses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import is_
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,3 +18,8 @@ class Identity:
     def __hash__(self) -> int:
         """Hash by identity."""
         return id(self.value)
+
+
+def are_same(values: Sequence[object], others: Sequence[object]) -> bool:
+    """Return whether two sequences hold the same objects."""
+    return len(values) == len(others) and all(map(is_, values, others))

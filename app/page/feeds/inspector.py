@@ -17,7 +17,7 @@ from app.messages.search import CostMapMessage, GhostPose, LimbReason, PartReaso
 from app.state.annotation import AnnotationState, ProposedClick
 from app.state.calibration import CalibrationState
 from app.state.floor_picking import FloorState
-from app.state.identity import Identity
+from app.state.identity import are_same
 from app.state.observations import ObservationsState
 from app.state.people import AcquisitionState
 from app.state.progress import FindState
@@ -45,13 +45,13 @@ class InspectorFeed:
 
     def __init__(self) -> None:
         """Begin with nothing sent."""
-        self._made_from: tuple[Identity, ...] = ()
+        self._made_from: tuple[object, ...] = ()
         self._sent: list[Message] = []
         self._drawn: tuple[CalibrationCheck | None, MisfitField] = None, NO_MISFITS
 
     def is_behind(self, state: State) -> bool:
         """Return whether there may be updates; quick, because during drags a state follows every few milliseconds."""
-        return _ingredients(state) != self._made_from
+        return not are_same(_ingredients(state), self._made_from)
 
     def updates(self, controller: Controller, state: State) -> list[Message]:
         """Return the messages that bring the page up to date."""
@@ -76,15 +76,14 @@ class InspectorFeed:
         return self._drawn[1]
 
 
-def _ingredients(state: State) -> tuple[Identity, ...]:
-    """Return what the messages are made from, for comparison."""
-    made_from = (
+def _ingredients(state: State) -> tuple[object, ...]:
+    """Return what the messages are made from, for comparison by identity."""
+    return (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
         state.finding, state.calibration, state.observations, state.annotation, state.reasons, state.reason,
         state.frame, state.people[state.person].trace, state.cost_map,
     )  # fmt: skip
-    return tuple(map(Identity, made_from))
 
 
 def settings(found: TrackSettings, choices: RunChoices) -> wire.SettingsMessage:

@@ -1,0 +1,60 @@
+"""Walks through the code: the files that a piece of work passes, and how often it crosses from one to another."""
+
+import sys
+import threading
+from collections import Counter
+from contextlib import contextmanager
+
+from architecture import ROOT
+
+HOUSES = tuple(f"{ROOT / house}/" for house in ("app", "tracker"))
+
+
+class Walk:
+    """Calls from one file of the project to another, by both names; those of kernels are not seen."""
+
+    def __init__(self):
+        self._crossings = None
+        self._of_code = {}
+
+    @contextmanager
+    def counted(self):
+        """Gives the calls from one file to another meanwhile, in all threads that were started since `traced`."""
+        self._crossings = Counter()
+        try:
+            yield self._crossings
+        finally:
+            self._crossings = None
+
+    def profile(self, frame, event, _):
+        crossings = self._crossings
+        if event != "call" or crossings is None:
+            return
+        to = self._file(frame.f_code)
+        if to is None:
+            return
+        caller = frame.f_back
+        while caller is not None and (file := self._file(caller.f_code)) is None:
+            caller = caller.f_back
+        if caller is not None and file != to:
+            crossings[file, to] += 1
+
+    def _file(self, code):
+        """Name of the file of some code below the project; None of others."""
+        if code not in self._of_code:
+            name = code.co_filename
+            self._of_code[code] = name.removeprefix(f"{ROOT}/") if name.startswith(HOUSES) else None
+        return self._of_code[code]
+
+
+@contextmanager
+def traced():
+    """A walk of this thread, and of those that are started meanwhile."""
+    walk = Walk()
+    threading.setprofile(walk.profile)
+    sys.setprofile(walk.profile)
+    try:
+        yield walk
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)
