@@ -13,6 +13,8 @@ SITE := $(VENV)/site
 RELEASE_PYTHONS ?= $(foreach version,3.11 3.12 3.13,$(shell python$(version) -c $(WHERE) 2>/dev/null))
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
+# Set by `test` to what shows one line of a step.
+STEP =
 PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
 # Tests start hundreds of programs: each would compile the library again if none may keep its bytecode.
 unexport PYTHONDONTWRITEBYTECODE
@@ -27,9 +29,10 @@ run: install
 
 # What must hold on every change: at most five minutes on two cores. The steps run beside one another. The kernels, for
 # which others wait, have the highest priority; they are compiled from when the program is installed. Tests of the page
-# wait a lot: those of the library take what they leave. All steps run to their end: one run shows all that fails.
+# wait a lot: those of the library take what they leave. All steps run to their end: one run shows all that fails, and
+# one line with its time of each that passes.
 test: $(VENV)/.installed
-	$(PARALLEL) --keep-going kernels test-page test-library check
+	$(PARALLEL) --no-print-directory --keep-going STEP='.ci/step $$@' kernels test-page test-library check
 
 # And what is long, or costs much for what it alone reaches.
 test-all: test
@@ -41,19 +44,19 @@ test-quick: $(VENV)/.tested
 
 # Tests of rooms that need no kernels come first (tests/conftest.py), while the kernels are compiled.
 test-library: $(VENV)/.tested
-	nice -n 19 $(PYTEST) --no-loadscope-reorder -m "not slow" --ignore=tests/browser tests
+	$(STEP) nice -n 19 $(PYTEST) --no-loadscope-reorder -m "not slow" --ignore=tests/browser tests
 
 # Starts at once: only the files of tests/browser/live and share, which come last, wait for the kernels. Three processes,
 # because these tests wait more than they compute.
 test-page: $(VENV)/.tested
-	nice -n 5 $(PYTEST) --numprocesses 3 --no-loadscope-reorder -m "not slow" tests/browser
+	$(STEP) nice -n 5 $(PYTEST) --numprocesses 3 --no-loadscope-reorder -m "not slow" tests/browser
 
 test-slow: $(VENV)/.slow kernels
 	$(PYTEST) -m slow
 
 # Once, not in each process of the tests at the same time.
 kernels: $(VENV)/.installed
-	$(BIN)/python -m app.bench.compile_kernels
+	$(STEP) $(BIN)/python -m app.bench.compile_kernels
 
 # How fast it is here, beside what must hold and the ratios of the last release.
 bench: $(VENV)/.tested
@@ -63,15 +66,15 @@ bench: $(VENV)/.tested
 check: lint types page-types
 
 lint: $(VENV)/.tested
-	$(BIN)/ruff check $(PYTHON_FILES)
-	$(BIN)/ruff format --check $(PYTHON_FILES)
+	$(STEP) $(BIN)/ruff check $(PYTHON_FILES)
+	$(STEP) $(BIN)/ruff format --check $(PYTHON_FILES)
 
 types: $(VENV)/.tested
-	$(BIN)/pyrefly check --progress-bar no
+	$(STEP) $(BIN)/pyrefly check --progress-bar no
 
 page-types: $(VENV)/.typescript $(VENV)/.installed
 	$(BIN)/python tests/recipes/protocol_docs.py static/model/protocol.d.ts
-	$(BIN)/node node_modules/typescript/bin/tsc
+	$(STEP) $(BIN)/node node_modules/typescript/bin/tsc
 
 format: $(VENV)/.tested
 	$(BIN)/ruff check --fix $(PYTHON_FILES)

@@ -298,7 +298,7 @@ class FakeEndpoint:
             case "snap":
                 self.state["snapped"] = message["camera"]
             case "before":
-                self.state["compared"] = {**self.state["compared"], "is_before_shown": message["shown"]}
+                self.state["compared"] = dict(self.state["compared"], is_before_shown=message["shown"])
         await self.broadcast(self.state)
 
     async def review(self, message):

@@ -73,7 +73,7 @@ def test_blocks_against_finite_differences(kind, model, seed):
     gradient = np.array([a.cost - b.cost for a, b in sides]) / (2 * h)
     np.testing.assert_allclose(found.gradient, gradient, atol=(0.02 if model is ARM and kind != "points" else 1e-7))
     # Where nothing is left over, Gauss-Newton's second derivative is the second derivative.
-    if kind == "points":
+    if isinstance(block, PointTargets):
         block = PointTargets(block.points, model.points_world(values)[block.points], block.weights)
     else:
         block = replace(block, pose=values)
