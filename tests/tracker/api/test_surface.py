@@ -7,11 +7,17 @@ from pathlib import Path
 import tracker
 from tracker.api.pose_series import PoseSeries
 from tracker.api.work import Found, Tracked
+from tracker.estimation.acquisition.from_contours import Acquisition
+from tracker.evaluation.judging.judge import Judgement
 from tracker.evaluation.metric import ComparedJoints, Metric
+from tracker.evaluation.metrics import Evaluation
 from tracker.interchange.exports.export_format import ExportFormat
+from tracker.session.session import Session
 
 SURFACE = Path(__file__).with_name("surface.txt")
-RESULTS = (ComparedJoints, ExportFormat, Found, Metric, PoseSeries, Tracked)
+RESULTS = (
+    Acquisition, ComparedJoints, Evaluation, ExportFormat, Found, Judgement, Metric, PoseSeries, Session, Tracked,
+)  # fmt: skip
 
 
 def arguments(function):
@@ -28,7 +34,8 @@ def surface():
         found = getattr(tracker, name)
         lines.append(f"tracker.{name}{arguments(found) if inspect.isfunction(found) else ''}")
     for kind in RESULTS:
-        lines += [f"{kind.__name__}.{f.name}" for f in dataclasses.fields(kind)]
+        names = kind._fields if issubclass(kind, tuple) else [f.name for f in dataclasses.fields(kind)]
+        lines += [f"{kind.__name__}.{name}" for name in names]
     return "\n".join(lines) + "\n"
 
 
