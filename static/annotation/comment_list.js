@@ -1,5 +1,6 @@
 /** Comments: written at the selected limb, listed, gone to, and resolved. */
 
+import { frameRow } from "../inspector/parts.js";
 import { make, textButton } from "../widgets/elements.js";
 import { lineForm } from "./parts.js";
 
@@ -34,18 +35,16 @@ export function commentList({ store, send }, review, visits) {
   let showsResolved = false;
 
   const entry = (/** @type {Comment} */ comment) => {
-    const row = make("li", comment.resolved ? "is-resolved" : "");
     const people = store.facts.session?.people ?? [];
     const where = [people.length > 1 ? people[comment.person]?.name : "", comment.limb].filter(Boolean).join(", ");
-    const go = textButton("", `Go to frame ${comment.frame}`, () => visits.go(comment));
     const words = make("span", {}, `${where ? `${where}: ` : ""}${comment.text}`, make("span", "quiet", comment.author ? ` ${comment.author}` : ""));
-    go.append(make("span", "observed-frame", String(comment.frame)), words);
-    go.dataset.noCommand = "";
+    const row = frameRow(comment.frame, false, `Go to frame ${comment.frame}`, () => visits.go(comment), words);
+    row.classList.toggle("is-resolved", comment.resolved);
     const done = textButton(comment.resolved ? "Reopen" : "Resolve", comment.resolved ? "Open this comment again" : "This comment is done", () =>
       send({ type: "annotation", action: comment.resolved ? "reopen" : "resolve", uid: comment.uid }),
     );
     done.dataset.noCommand = "";
-    row.append(go, done);
+    row.append(done);
     return row;
   };
 

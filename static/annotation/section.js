@@ -81,7 +81,7 @@ export function annotationSection(context, review, visits) {
   let marked = review.here.person; // whose task the list marks
 
   store.on(["annotation", "session"], showAll);
-  store.on(["target"], tasks.show);
+  store.on(["target"], () => tasks.show());
   store.on(["target", "state"], () => {
     if (review.here.person !== marked) tasks.show();
     marked = review.here.person;

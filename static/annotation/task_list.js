@@ -1,6 +1,7 @@
 /** The counter, the strip of states, and the list of tasks with its filter. */
 
-import { make, textButton } from "../widgets/elements.js";
+import { frameRow, longList } from "../inspector/parts.js";
+import { make } from "../widgets/elements.js";
 import { TASK_STATES, countStates } from "../model/tasks.js";
 import { capital, count } from "../widgets/text.js";
 
@@ -32,15 +33,18 @@ export function taskList(store, review, visits) {
   const filter = make("select", { "aria-label": "Tasks to list and to go through", title: "Tasks to list and to go through" }, ...FILTERS.map(([value, text]) => new Option(text, value)));
   filter.addEventListener("change", () => {
     review.filter = /** @type {Filter} */ (filter.value);
-    listed = FEW_LISTED;
-    show();
+    show(true);
   });
   const list = make("ol", "plan-tasks");
-  const more = textButton("More", "List more tasks", () => {
-    listed = Infinity;
-    show();
+  const tasks = longList(list, FEW_LISTED, "List more tasks", (/** @type {Task} */ task) => {
+    const { person, frame } = review.here;
+    const people = store.facts.session?.people ?? [];
+    const who = [people.length > 1 ? people[task.person]?.name : "", task.annotator || "anybody"].filter(Boolean).join(", ");
+    const words = `${who}${task.is_disagreement ? ", two copies disagree" : ""}${task.comment ? `: ${task.comment}${task.by ? ` (${task.by})` : ""}` : ""}`;
+    const state = make("span", `plan-state is-${task.state}`, task.state);
+    const isHere = task.person === person && task.frame === frame;
+    return frameRow(task.frame, isHere, `Go to frame ${task.frame}`, () => visits.go(task), make("span", {}, words), state);
   });
-  let listed = FEW_LISTED;
 
   const showProgress = () => {
     const counts = countStates(review.tasks);
@@ -59,33 +63,11 @@ export function taskList(store, review, visits) {
     counter.hidden = strip.hidden = filter.hidden = total === 0;
   };
 
-  const show = () => {
+  const show = (isNew = false) => {
     showProgress();
-    const found = review.listed;
-    const { person, frame } = review.here;
-    list.replaceChildren(...found.slice(0, listed).map((task) => entry(task, task.person === person && task.frame === frame)));
-    list.hidden = found.length === 0;
-    more.hidden = found.length <= listed;
-    more.textContent = `${count(found.length - listed)} more`;
+    tasks.show(review.listed, isNew);
     list.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
   };
 
-  /**
-   * @param {Task} task
-   * @param {boolean} isHere
-   */
-  const entry = (task, isHere) => {
-    const row = make("li");
-    const people = store.facts.session?.people ?? [];
-    const who = [people.length > 1 ? people[task.person]?.name : "", task.annotator || "anybody"].filter(Boolean).join(", ");
-    const words = `${who}${task.is_disagreement ? ", two copies disagree" : ""}${task.comment ? `: ${task.comment}${task.by ? ` (${task.by})` : ""}` : ""}`;
-    const go = textButton("", `Go to frame ${task.frame}`, () => visits.go(task));
-    go.append(make("span", "observed-frame", String(task.frame)), make("span", "", words), make("span", `plan-state is-${task.state}`, task.state));
-    go.dataset.noCommand = "";
-    if (isHere) go.setAttribute("aria-current", "true");
-    row.append(go);
-    return row;
-  };
-
-  return { head: [counter, strip], filter, body: [list, more], show };
+  return { head: [counter, strip], filter, body: tasks.elements, show };
 }

@@ -1,5 +1,7 @@
 /** Go to a person on a frame, with a limb selected and the views zoomed to it once the frame is drawn. */
 
+import { zoomOnArrival } from "../panes/arrival_zoom.js";
+
 /** @typedef {{person: number, frame: number, limb?: string}} Goal limb: name for display; empty or missing for none */
 
 /** Limb of shoulders and hips in proposals. */
@@ -7,9 +9,7 @@ const TRUNK = "trunk";
 
 export class Visits {
   #context;
-  #panes;
-  /** @type {{person: number, frame: number, points: string[]} | null} the joints to zoom to */
-  #zoom = null;
+  #zoomTo;
 
   /**
    * @param {import("../model/index.js").Context} context
@@ -17,8 +17,7 @@ export class Visits {
    */
   constructor(context, panes) {
     this.#context = context;
-    this.#panes = panes;
-    context.store.on(["overlay", "target"], () => this.#zoomNow());
+    this.#zoomTo = zoomOnArrival(context.store, panes.grid);
   }
 
   /** @param {Goal} goal */
@@ -32,15 +31,7 @@ export class Visits {
     const point = points.filter((one) => !info.minor.includes(one)).at(-1) ?? points.at(-1) ?? null;
     const { state } = store.facts;
     if (state?.person !== person || (point && state.point !== point)) actions.selectPerson(person, point);
-    this.#zoom = points.length ? { person, frame, points } : null;
-    this.#zoomNow();
+    this.#zoomTo(points.length ? { person, frame, points } : null);
   }
 
-  #zoomNow() {
-    const { overlay, shown, target } = this.#context.store.facts;
-    if (this.#zoom && target !== this.#zoom.frame) this.#zoom = null;
-    if (!this.#zoom || overlay?.frame !== this.#zoom.frame || shown?.frame !== this.#zoom.frame) return;
-    this.#panes.grid.frameJoints(this.#zoom.person, this.#zoom.points);
-    this.#zoom = null;
-  }
 }

@@ -2,6 +2,7 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { capital } from "../widgets/text.js";
+import { workRow } from "./parts.js";
 import { choiceRow } from "./rows.js";
 
 /**
@@ -38,16 +39,9 @@ export function acquisitionView({ store, send }) {
     ],
     change: (/** @type {Method} */ value) => (method = value),
   });
-  const stop = textButton("Stop", "Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }));
-  const progress = make("progress");
-  const status = make("span");
-  status.className = "acquisition-status";
-  status.setAttribute("aria-live", "polite");
-  const work = make("div");
-  work.className = "acquisition-work";
-  work.append(progress, stop);
+  const work = workRow("Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }));
   const result = make("div");
-  element.append(choice.element, start, work, status, result);
+  element.append(choice.element, start, work.element, work.status, result);
   /** @type {Result | null} */
   let drawn = null;
 
@@ -55,15 +49,14 @@ export function acquisitionView({ store, send }) {
     element,
     update(active) {
       person = active;
-      const { acquisition, people } = { acquisition: store.facts.acquisition, people: store.facts.session?.people ?? [] };
+      const { acquisition, session } = store.facts;
+      const people = session?.people ?? [];
       const running = acquisition?.running ?? false;
       start.hidden = choice.element.hidden = running;
-      work.hidden = !running;
-      progress.value = acquisition?.share ?? 0;
       const name = people[acquisition?.person ?? 0]?.name ?? "";
-      status.textContent = !acquisition ? "" : running ? `${name}: ${acquisition.stage}` : acquisition.person === person ? acquisition.message : "";
-      status.hidden = !status.textContent;
-      const found = acquisition && acquisition.person === person && !running ? acquisition.result : null;
+      const isOwn = acquisition?.person === person;
+      work.show(acquisition, running ? `${name}: ${acquisition?.stage}` : isOwn ? acquisition.message : "");
+      const found = acquisition && isOwn && !running ? acquisition.result : null;
       result.hidden = !found;
       if (found && found !== drawn) result.replaceChildren(...describe(found));
       drawn = found ?? drawn;
@@ -76,11 +69,8 @@ export function acquisitionView({ store, send }) {
 function describe(result) {
   const { frames, cost_before_px: before, cost_after_px: after } = result;
   const summary = make("p", { className: "section-note", title: "Frames that the sizes were fitted to, and their mean cost with the body before and after" }, `Frames ${frames.join(", ")}: ${before.toFixed(2)} → ${after.toFixed(2)} px`);
-  const pictures = make("div");
-  pictures.className = "acquisition-pictures";
-  pictures.append(picture(result, result.front, "Front"), picture(result, result.side, "Side"));
-  const legend = make("p");
-  legend.className = "section-note acquisition-legend";
+  const pictures = make("div", "acquisition-pictures", picture(result, result.front, "Front"), picture(result, result.side, "Side"));
+  const legend = make("p", "section-note acquisition-legend");
   for (const kind of ["before", "after"]) {
     legend.append(make("span", `is-${kind}`, kind));
   }

@@ -92,12 +92,8 @@ export class BodySection {
     this.#former = textButton("Previous", "Enter the sizes before the present ones; Apply sets them", () =>
       this.#edit({ action: "previous" }),
     );
-    const buttons = make("div");
-    buttons.className = "section-buttons";
-    buttons.append(this.#apply, this.#discard, this.#former);
-    const foot = make("div");
-    foot.className = "section-foot";
-    foot.append(this.#keyframes.element, this.#note, buttons);
+    const buttons = make("div", "section-buttons", this.#apply, this.#discard, this.#former);
+    const foot = make("div", "section-foot", this.#keyframes.element, this.#note, buttons);
     this.body.append(this.#person, this.#model.element, this.#height.element, this.#alike.element, this.#acquisition.element, this.#table, foot);
     store.on(["bodySizes", "state", "session"], () => this.#show());
     store.on(["acquisition", "bodySizes", "session"], () => this.#acquisition.update(store.facts.bodySizes?.person ?? 0));

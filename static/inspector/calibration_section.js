@@ -4,6 +4,8 @@ import { make, textButton } from "../widgets/elements.js";
 import { KEYFRAME } from "../model/cells.js";
 import { earlierCalibration, hasTrack } from "../model/selectors.js";
 import { count } from "../widgets/text.js";
+import { command, group, workRow } from "./parts.js";
+import { sectionNote } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").CameraCheck} CameraCheck
@@ -38,13 +40,7 @@ export function calibrationSection({ store, send, notify }) {
   const act = (/** @type {Action} */ action) => send({ type: "calibration_check", action });
   const start = textButton("Check the cameras", "Compare contours of the tracked people with the calibration; changes nothing", () => act("start"));
   start.className = "is-primary";
-  const stop = textButton("Stop", "Stop the check; nothing is changed", () => act("stop"));
-  const progress = make("progress");
-  const work = make("div");
-  work.className = "acquisition-work";
-  work.append(progress, stop);
-  const status = note();
-  status.setAttribute("role", "status");
+  const work = workRow("Stop the check; nothing is changed", () => act("stop"));
   const result = make("div");
   const preview = textButton("Preview", "Show the people and cameras as corrected, on the shown frame", () =>
     act(store.facts.calibration?.is_previewed ? "leave" : "preview"),
@@ -53,11 +49,11 @@ export function calibrationSection({ store, send, notify }) {
   const misfits = textButton("Misfits", "Show in each view how the edges lie off the contours, magnified: all one way for a turned camera, round for a rolled one, outwards or inwards for a zoomed one", () =>
     store.set({ showsMisfits: !store.facts.showsMisfits }),
   ); // prettier-ignore
-  const buttons = make("div", "acquisition-work", misfits, preview, apply);
-  const fit = note();
-  const outdated = note();
+  const buttons = group(misfits, preview, apply);
+  const fit = sectionNote();
+  const outdated = sectionNote();
   const again = textButton("Track again", "Track the frames of an earlier calibration with the present one; keyframes stay", () => act("track_again"));
-  const body = make("div", "acquisition", start, work, status, result, buttons, fit, outdated, again);
+  const body = make("div", "acquisition", start, work.element, work.status, result, buttons, fit, outdated, again);
 
   let wasCurrent = true;
   const isNamed = () => !!store.facts.calibration?.cameras.some(({ kinds }) => kinds.length);
@@ -66,11 +62,7 @@ export function calibrationSection({ store, send, notify }) {
   const show = (found) => {
     const named = isNamed();
     start.hidden = found.running;
-    work.hidden = !found.running;
-    progress.value = found.share;
-    status.textContent = found.running ? `${found.stage} …` : found.message;
-    status.hidden = !status.textContent;
-    status.classList.toggle("is-failed", found.failed);
+    work.show(found);
     result.hidden = !found.is_checked;
     if (found.is_checked) result.replaceChildren(...describe(found));
     buttons.hidden = !found.is_checked;
@@ -99,16 +91,8 @@ export function calibrationSection({ store, send, notify }) {
     body,
     bindings(reveal) {
       const noCamera = () => (isNamed() ? null : "No camera is known to be off. Check the cameras first.");
-      const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({
-        keys: [],
-        label,
-        words: `${words} calibration`,
-        why,
-        run: () => {
-          reveal();
-          run();
-        },
-      });
+      const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
+        command(label, `${words} calibration`, () => (reveal(), run()), why);
       const notChecked = () => (store.facts.calibration?.is_checked ? null : "There is no check. Check the cameras first.");
       /** @type {[string, string, Action | (() => Action), () => string | null][]} */
       const actions = [
@@ -169,7 +153,7 @@ function fitText(found, frame) {
 /** @param {Calibration} found */
 function describe(found) {
   const said = found.sentences.length ? found.sentences.map(capital) : ["No camera is off: the contours agree with the calibration."];
-  const notes = said.map((text) => Object.assign(note(), { textContent: text }));
+  const notes = said.map((text) => sectionNote(text));
   const table = make("table", "calibration-cameras");
   const head = table.createTHead().insertRow();
   for (const [text, title] of [
@@ -191,7 +175,7 @@ function describe(found) {
     const lines = mended(camera);
     cell.replaceChildren(...lines.map(({ text, title }) => make("div", { title }, text)));
   }
-  const used = Object.assign(note(), { textContent: `Frames used: ${found.frames.join(", ")}` });
+  const used = sectionNote(`Frames used: ${found.frames.join(", ")}`);
   return [...notes, table, used];
 }
 
@@ -236,10 +220,6 @@ function mended(camera) {
  */
 function signed(value, digits) {
   return value.toFixed(digits).replace("-", "−");
-}
-
-function note() {
-  return make("p", "section-note");
 }
 
 /** @param {string} text */

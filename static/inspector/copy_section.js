@@ -3,6 +3,7 @@
 import { make, textButton } from "../widgets/elements.js";
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
+import { command, frameRow, group, longList } from "./parts.js";
 import { numberRow, sectionNote } from "./rows.js";
 
 /**
@@ -25,6 +26,7 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
     const { state } = store.facts;
     if (state) send({ type: "other_copy", action, person: state.person, frame: state.frame });
   };
+  const leaveCopy = () => send({ type: "other_copy", action: "leave", person: 0, frame: 0 });
   const form = make("form", "copy-form");
   const label = make("label", { className: "import-field", title: "Folder of another annotator's copy of this session, on the machine of the program" });
   const input = make("input", { type: "text", className: "query-field", name: "copy", id: "copy-folder" });
@@ -54,19 +56,21 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
   const buttons = group(keep, take, mean);
   const previous = textButton("Previous", "Previous frame where the copies differ (Alt+Shift+C)", () => step(-1));
   const next = textButton("Next", "Next frame where the copies differ (Alt+S)", () => step(1));
-  const leave = textButton("End", "End the comparison; nothing is changed", () => send({ type: "other_copy", action: "leave", person: 0, frame: 0 }));
+  const leave = textButton("End", "End the comparison; nothing is changed", leaveCopy);
   const ways = group(previous, next, leave);
   const worst = make("ol", { className: "observed-worst", "aria-label": "Differences, largest first" });
-  const more = textButton("More", "List smaller differences too", () => {
-    limit = Infinity;
-    listed = "";
-    show();
+  const differences = longList(worst, FEW_LISTED, "List smaller differences too", (/** @type {Difference} */ one) => {
+    const { frame, person, joint, distance_mm } = one;
+    const people = store.facts.session?.people ?? [];
+    const who = people.length > 1 ? `${people[person].name}, ` : "";
+    const title = `Go to frame ${frame} and select the ${displayName(joint)}`;
+    const apart = make("span", "quiet", `${Math.round(distance_mm)} mm`);
+    return frameRow(frame, frame === store.facts.state?.frame, title, () => visit(one), make("span", {}, who + displayName(joint)), apart);
   });
-  const compared = make("div", "acquisition", summary, tolerance.element, ways, here, buttons, worst, more);
+  const compared = make("div", "acquisition", summary, tolerance.element, ways, here, buttons, ...differences.elements);
   const body = make("div", "acquisition", form, answer, compared);
 
   let isBusy = false;
-  let limit = FEW_LISTED;
   let listed = "";
   const refuse = (/** @type {string} */ text) => {
     answer.textContent = text;
@@ -132,14 +136,9 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
       : isPosed
         ? `Frame ${state.frame}: the other pose is drawn; not annotated by both.`
         : `Frame ${state.frame}: ${copy.name} has no pose.`;
-    const news = JSON.stringify([apart, state.frame, limit]);
-    if (news === listed) return;
+    const news = JSON.stringify([apart, state.frame]);
+    if (news !== listed) differences.show(apart);
     listed = news;
-    const several = session.people.length > 1;
-    worst.replaceChildren(...apart.slice(0, limit).map((one) => differenceRow(one, several ? session.people[one.person].name : "", one.frame === state.frame, () => visit(one))));
-    worst.hidden = apart.length === 0;
-    more.hidden = apart.length <= limit;
-    more.textContent = `${count(apart.length - limit)} more`;
   };
   refuse("");
   show();
@@ -153,53 +152,19 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
       const noCopy = () => (store.facts.otherCopy ? null : NO_COPY);
       const none = () => noCopy() ?? (copyDifferences(store.facts).length ? null : "The copies differ nowhere by more than the tolerance.");
       const off = (/** @type {HTMLButtonElement} */ which) => () => noCopy() ?? (which.disabled ? here.textContent : null);
-      const command = (/** @type {string} */ text, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({
-        keys: [],
-        label: text,
-        words: "annotator agreement copy compare disagreement difference",
-        why,
-        run,
-      });
+      const words = "annotator agreement copy compare disagreement difference";
       return [
-        command("Compare with another copy of the session…", () => null, () => {
-          reveal();
-          input.focus();
-        }),
-        command("Other copy: keep my pose", off(keep), () => decide("keep")),
-        command("Other copy: take their pose", off(take), () => decide("take")),
-        command("Other copy: take the mean of both poses", off(mean), () => decide("mean")),
-        command("Other copy: go to the largest difference", none, () => {
+        command("Compare with another copy of the session…", words, () => (reveal(), input.focus())),
+        command("Other copy: keep my pose", words, () => decide("keep"), off(keep)),
+        command("Other copy: take their pose", words, () => decide("take"), off(take)),
+        command("Other copy: take the mean of both poses", words, () => decide("mean"), off(mean)),
+        command("Other copy: go to the largest difference", words, () => {
           reveal();
           const [largest] = copyDifferences(store.facts).sort((a, b) => b.distance_mm - a.distance_mm);
           visit(largest);
-        }),
-        command("End the comparison with the other copy", noCopy, () => send({ type: "other_copy", action: "leave", person: 0, frame: 0 })),
+        }, none),
+        command("End the comparison with the other copy", words, leaveCopy, noCopy),
       ];
     },
   };
-}
-
-/**
- * @param {Difference} difference
- * @param {string} who name of the person, empty for the only one
- * @param {boolean} isHere
- * @param {() => void} visit
- */
-function differenceRow({ frame, joint, distance_mm }, who, isHere, visit) {
-  const row = make("li");
-  const go = textButton("", `Go to frame ${frame} and select the ${displayName(joint)}`, visit);
-  go.append(
-    make("span", "observed-frame", String(frame)),
-    make("span", {}, `${who && `${who}, `}${displayName(joint)}`),
-    make("span", "quiet", `${Math.round(distance_mm)} mm`),
-  );
-  go.dataset.noCommand = "";
-  if (isHere) go.setAttribute("aria-current", "true");
-  row.append(go);
-  return row;
-}
-
-/** @param {HTMLElement[]} parts */
-function group(...parts) {
-  return make("div", "acquisition-work", ...parts);
 }

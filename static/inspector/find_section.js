@@ -1,6 +1,7 @@
 /** Find people: one button from a new recording to a tracked one, its progress, and what was found. */
 
 import { make, textButton } from "../widgets/elements.js";
+import { workRow } from "./parts.js";
 import { sectionNote } from "./rows.js";
 
 /** Number of the latest sentences that are shown. */
@@ -22,17 +23,10 @@ export function findSection({ store, send, layers }) {
     network("detect_track");
   });
   const offer = sectionNote("No camera has a background or masks: let a network find the people, or find them by what moves.");
-  const stop = textButton("Stop", "Stop; what was found and tracked stays", () => (store.facts.finding?.running ? find("stop") : network("stop")));
-  const progress = make("progress");
-  const work = make("div");
-  work.className = "acquisition-work";
-  work.append(progress, stop);
-  const status = sectionNote();
-  status.setAttribute("role", "status");
-  const notes = make("ul");
-  notes.className = "find-notes";
+  const work = workRow("Stop; what was found and tracked stays", () => (store.facts.finding?.running ? find("stop") : network("stop")));
+  const notes = make("ul", "find-notes");
   const details = make("details", {}, make("summary", { title: "Each frame that was tried, and who was found" }, "Details"), notes);
-  const body = make("div", "acquisition", offer, detect, start, work, status, details);
+  const body = make("div", "acquisition", offer, detect, start, work.element, work.status, details);
 
   /** Whether the last work that was begun here is that of a network. */
   let isDetecting = false;
@@ -47,11 +41,7 @@ export function findSection({ store, send, layers }) {
     start.hidden = detect.hidden = running;
     start.classList.toggle("is-primary", hasOutlines);
     detect.classList.toggle("is-primary", !hasOutlines);
-    work.hidden = !running;
-    progress.value = now?.share ?? 0;
-    status.textContent = !now ? "" : running ? `${now.stage} …` : now.message;
-    status.hidden = !status.textContent;
-    status.classList.toggle("is-failed", now?.failed ?? false);
+    work.show(now);
     details.hidden = !finding?.notes.length;
     if (running !== wasRunning) details.open = !running && !finding?.failed; // sentences on the people who were found
     wasRunning = running;

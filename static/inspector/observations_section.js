@@ -4,6 +4,8 @@ import { make, textButton } from "../widgets/elements.js";
 import { download } from "../widgets/downloads.js";
 import { capital, count, displayName, percent } from "../widgets/text.js";
 import { importForm } from "./import_form.js";
+import { zoomOnArrival } from "../panes/arrival_zoom.js";
+import { command, frameRow, group, longList, workRow } from "./parts.js";
 import { sectionNote } from "./rows.js";
 
 /**
@@ -47,19 +49,18 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   const evidence = make("select", { title: "Evidence of the run. For poses by the key points alone, take them as poses", "aria-label": "Evidence" }, new Option("contours and points", "track"), new Option("contours alone", "track_contours"));
   const track = textButton("Track by", "Find who has no pose by these points, acquire their sizes, and track everybody on all frames; one step to undo", () => startTrack());
   const tracking = group(track, evidence);
-  const stop = textButton("Stop", "Stop this work", () => (found()?.running ? act("stop") : send({ type: "find_people", action: "stop" })));
-  const progress = make("progress");
-  const work = group(progress, stop);
-  const status = sectionNote();
-  status.setAttribute("role", "status");
+  const work = workRow("Stop this work", () => (found()?.running ? act("stop") : send({ type: "find_people", action: "stop" })));
   const verdict = make("div");
   const worst = make("ol", "observed-worst");
-  const more = textButton("More", "List less severe entries too", () => {
-    listed = Infinity;
-    showWorst();
-  });
+  const entryRow = (/** @type {JudgedLimb} */ { frame, person, joint, reason, probability }, /** @type {number} */ rank) => {
+    const people = store.facts.session?.people ?? [];
+    const who = people.length > 1 ? `${people[person]?.name}, ` : "";
+    const title = `Go to frame ${frame} and select the ${displayName(joint)}`;
+    return frameRow(frame, rank === at, title, () => visit(rank), make("span", {}, who + reason), make("span", "quiet", percent(probability)));
+  };
+  const entries = longList(worst, FEW_LISTED, "List less severe entries too", entryRow);
   const form = importForm(store, sessions, () => act("discard"));
-  const body = make("div", "acquisition", none, list, detecting, buttons, tracking, work, status, verdict, worst, more, form.element);
+  const body = make("div", "acquisition", none, list, detecting, buttons, tracking, work.element, work.status, verdict, ...entries.elements, form.element);
 
   /** Whether the last search for people was begun here. */
   let isTracking = false;
@@ -68,12 +69,10 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     act(/** @type {Action} */ (evidence.value), current());
   };
 
-  let listed = FEW_LISTED;
   let at = -1;
-  /** @type {JudgedLimb[] | null} the entries that are listed */
-  let entries = null;
-  /** @type {JudgedLimb | null} the entry whose joint is zoomed to once its frame is drawn */
-  let zoom = null;
+  /** The entries that are listed. */
+  let listed = "";
+  const zoomTo = zoomOnArrival(store, panes.grid);
 
   /**
    * @param {string} address of a file
@@ -101,25 +100,14 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     const info = entry && session?.people[entry.person];
     if (!entry || !info) return;
     at = rank;
-    if (rank >= listed) listed = Infinity;
     if (observations.shown !== observations.judged) act("show", observations.judged);
     navigation.pause();
     navigation.goTo(entry.frame);
     const point = info.points.includes(entry.joint) ? entry.joint : null;
     if (state?.person !== entry.person || state.point !== point) actions.selectPerson(entry.person, point);
-    zoom = entry;
-    zoomNow();
+    const limb = info.point_limbs[entry.joint]?.name;
+    zoomTo({ ...entry, points: info.points.filter((one) => limb && info.point_limbs[one]?.name === limb) });
     showWorst();
-  };
-
-  const zoomNow = () => {
-    const { overlay, shown, session, target } = store.facts;
-    if (zoom && target !== zoom.frame) zoom = null;
-    if (!zoom || overlay?.frame !== zoom.frame || shown?.frame !== zoom.frame) return;
-    const info = session?.people[zoom.person];
-    const limb = info?.point_limbs[zoom.joint]?.name;
-    panes.grid.frameJoints(zoom.person, info?.points.filter((point) => limb && info.point_limbs[point]?.name === limb) ?? []);
-    zoom = null;
   };
 
   const showSets = (/** @type {Observations} */ { sets, shown }) => {
@@ -147,35 +135,11 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     const isSearching = finding?.running ?? false;
     buttons.hidden = tracking.hidden = !current() || now.running || isSearching;
     detecting.hidden = now.running || isSearching;
-    work.hidden = !search.running;
-    progress.value = search.share;
-    status.textContent = search.running ? `${capital(search.stage)} …` : search.message;
-    status.hidden = !status.textContent;
-    status.classList.toggle("is-failed", search.failed);
+    work.show({ ...search, stage: capital(search.stage) });
   };
 
-  const showWorst = () => {
-    const all = found()?.worst ?? [];
-    const several = (store.facts.session?.people.length ?? 1) > 1;
-    worst.replaceChildren(
-      ...all.slice(0, listed).map((entry, rank) => {
-        const row = make("li");
-        const who = several ? `${store.facts.session?.people[entry.person]?.name}, ` : "";
-        const go = textButton("", `Go to frame ${entry.frame} and select the ${displayName(entry.joint)}`, () => visit(rank));
-        go.append(
-          make("span", "observed-frame", String(entry.frame)),
-          make("span", {}, `${who}${entry.reason}`),
-          make("span", "quiet", percent(entry.probability)),
-        );
-        go.dataset.noCommand = "";
-        if (rank === at) go.setAttribute("aria-current", "true");
-        row.append(go);
-        return row;
-      }),
-    );
-    worst.hidden = all.length === 0;
-    more.hidden = all.length <= listed;
-    more.textContent = `${count(all.length - listed)} more`;
+  const showWorst = (isNew = false) => {
+    entries.show(found()?.worst ?? [], isNew, at);
     worst.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
   };
 
@@ -188,18 +152,16 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     report.hidden = !now.judged;
     verdict.replaceChildren(...now.people.flatMap((person) => describe(person, now)));
     const news = JSON.stringify(now.worst);
-    if (news !== JSON.stringify(entries)) {
-      [entries, listed, at] = [now.worst, FEW_LISTED, -1];
-      showWorst();
+    if (news !== listed) {
+      [listed, at] = [news, -1];
+      showWorst(true);
     }
     form.show();
   };
   showAll();
-  body.hidden = false;
 
   store.on(["observations", "session"], showAll);
   store.on(["finding"], () => found() && showWork(/** @type {Observations} */ (found())));
-  store.on(["overlay", "target"], zoomNow);
   return {
     id: "observations",
     title: "Observations",
@@ -210,16 +172,8 @@ export function observationsSection({ store, send, notify, navigation, actions, 
       const busy = () => (found()?.running ? "Work on observations is under way." : store.facts.finding?.running ? "A search for people is under way." : noSet());
       const noEntry = () => (found()?.worst.length ? null : found()?.judged ? "No imported limb is off." : "Nothing was judged. Judge the observations first.");
       const step = (/** @type {1 | -1} */ way) => visit(Math.max(0, Math.min((found()?.worst.length ?? 0) - 1, at + way)));
-      const command = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({
-        keys: [],
-        label,
-        words: `${words} observations imported detector`,
-        why,
-        run: () => {
-          reveal();
-          run();
-        },
-      });
+      const own = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
+        command(label, `${words} observations imported detector`, () => (reveal(), run()), why);
       return [
         {
           keys: ["Alt J"],
@@ -230,13 +184,13 @@ export function observationsSection({ store, send, notify, navigation, actions, 
         },
         { keys: ["Alt Shift ↓"], label: "Next imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(1) },
         { keys: ["Alt Shift ↑"], label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(-1) },
-        command("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
-        command("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
-        command("Take the observations as poses", "store mend correct", busy, () => act("take", current())),
-        command("Track with the observations", "contours evidence find people", busy, startTrack),
-        command("Send the observations back as they came", "export save file mended", noSet, () => void save(`export/like/${encodeURIComponent(current())}`, "The export")),
-        command("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
-        command("Import observations…", "key points joints masks files openpose trc", () => null, form.open),
+        own("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
+        own("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
+        own("Take the observations as poses", "store mend correct", busy, () => act("take", current())),
+        own("Track with the observations", "contours evidence find people", busy, startTrack),
+        own("Send the observations back as they came", "export save file mended", noSet, () => void save(`export/like/${encodeURIComponent(current())}`, "The export")),
+        own("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
+        own("Import observations…", "key points joints masks files openpose trc", () => null, form.open),
       ];
     },
   };
@@ -251,9 +205,4 @@ function describe({ name, share_in_order, frames, sentences }, { people, judged,
   const limbs = people.length > 1 ? "" : off ? `; ${count(off)} ${off === 1 ? "limb is" : "limbs are"} off` : "";
   const texts = [`${who}: ${percent(share_in_order)} of ${count(frames)} frames in order${limbs}.`, ...sentences.map((text) => `${capital(text)}.`)];
   return texts.map(sectionNote);
-}
-
-/** @param {HTMLElement[]} parts */
-function group(...parts) {
-  return make("div", "acquisition-work", ...parts);
 }

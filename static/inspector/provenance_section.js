@@ -4,6 +4,7 @@ import { make, textButton } from "../widgets/elements.js";
 import { KINDS, annotatorName, pointPhrases, poseLines } from "../model/provenance.js";
 import { tasksAt } from "../model/tasks.js";
 import { capital, count, displayName } from "../widgets/text.js";
+import { command, group } from "./parts.js";
 import { choiceRow, sectionNote } from "./rows.js";
 
 /** @typedef {import("../model/provenance.js").Filter} Filter */
@@ -26,7 +27,7 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
   const previous = textButton("Previous", "Go to the previous frame of this kind (Alt+Shift+Q)", () => step(-1));
   const next = textButton("Next", "Go to the next frame of this kind (Alt+Q)", () => step(1));
   const number = make("span", "section-note");
-  const steps = make("div", "acquisition-work", previous, next, number);
+  const steps = group(previous, next, number);
   const pose = make("div");
   const list = make("ul", { className: "provenance-joints", "aria-label": "Joints" });
   const body = make("div", {}, filter.element, steps, pose, list);
@@ -102,18 +103,11 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
     hint: "Who or what made this pose and each joint; filter the timeline by it",
     body,
     bindings(reveal) {
-      const command = (/** @type {string} */ label, /** @type {Filter | null} */ wanted) => ({
-        keys: [],
-        label,
-        words: "provenance timeline dim source made",
-        run: () => {
-          reveal();
-          choose(wanted);
-        },
-      });
+      const choice = (/** @type {string} */ label, /** @type {import("../model/provenance.js").Filter | null} */ wanted) =>
+        command(label, "provenance timeline dim source made", () => (reveal(), choose(wanted)));
       return [
-        ...KINDS.map(({ kind, label }) => command(`Filter the timeline: poses ${label}`, { kind })),
-        command("Filter the timeline: all poses", null),
+        ...KINDS.map(({ kind, label }) => choice(`Filter the timeline: poses ${label}`, { kind })),
+        choice("Filter the timeline: all poses", null),
       ];
     },
   };

@@ -60,10 +60,7 @@ export const MEASURES = [
  */
 export function reasonTable({ point, zoom }) {
   const element = make("div", "reason-scroll");
-  const table = make("table");
-  table.className = "reason-table";
-  table.setAttribute("role", "grid");
-  table.setAttribute("aria-label", "Parts by views");
+  const table = make("table", { className: "reason-table", role: "grid", "aria-label": "Parts by views" });
   element.append(table);
   /** @type {HTMLTableCellElement[][]} cells by row and view */
   let rows = [];
@@ -171,9 +168,7 @@ const STEPS = new Map([
  * @param {string[]} texts
  */
 function line(kind, name, texts) {
-  const row = make("tr");
-  row.append(make("th", { scope: "row" }, name), ...texts.map((text) => make(kind, { title: text }, text)));
-  return row;
+  return make("tr", {}, make("th", { scope: "row" }, name), ...texts.map((text) => make(kind, { title: text }, text)));
 }
 
 /**

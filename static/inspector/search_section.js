@@ -97,9 +97,7 @@ export function searchSection({ store, send, notify }) {
     const { settings } = store.facts;
     if (settings) set(settings.search_default);
   });
-  const note = make("p");
-  note.className = "section-note";
-  note.textContent = "The search drawer (B) has bounds and steps of single stages.";
+  const note = make("p", "section-note", "The search drawer (B) has bounds and steps of single stages.");
   const body = make("div", {}, ...numbers.map(({ row }) => row.element), passes.element, theta.element, outliers.element, apart.element, note, reset);
 
   const show = () => {

@@ -103,10 +103,7 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
     format: String,
     change: (value) => set({ trail_frames: value }),
   });
-  const points = make("div");
-  points.className = "trail-points";
-  points.setAttribute("role", "group");
-  points.setAttribute("aria-label", "Points with a trail");
+  const points = make("div", { className: "trail-points", role: "group", "aria-label": "Points with a trail" });
   const noTrails = textButton("No trails", "Remove all trails", () => set({ trail_points: [] }));
   const body = make("div");
   const [bodies, ...others] = layers.map(({ row }) => row.element);

@@ -86,11 +86,8 @@ export class ImageToneMenu {
   }
 
   #buildFoot() {
-    const foot = make("div");
-    foot.className = "popover-foot";
-    const all = make("button", { type: "button" }, "All cameras");
-    all.title = "Apply these settings to all cameras";
-    all.addEventListener("click", () => this.#imageTones.setAll(this.#tone));
+    const foot = make("div", "popover-foot");
+    const all = make("button", { type: "button", title: "Apply these settings to all cameras", onclick: () => this.#imageTones.setAll(this.#tone) }, "All cameras");
     this.#reset.type = "button";
     this.#reset.title = "Show the original image";
     this.#reset.addEventListener("click", () => this.#imageTones.set(this.#camera, PLAIN));

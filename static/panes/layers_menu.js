@@ -101,9 +101,7 @@ export class LayersMenu {
   }
 
   #colors() {
-    const choice = make("fieldset");
-    choice.className = "segmented popover-choice";
-    choice.setAttribute("aria-label", "Colours of the contours");
+    const choice = make("fieldset", { className: "segmented popover-choice", "aria-label": "Colours of the contours" });
     for (const [value, label, title] of /** @type {const} */ ([
       ["person", "by person", "Colour contours by person"],
       ["part", "by part", "Colour contours by body part"],
@@ -118,15 +116,9 @@ export class LayersMenu {
   }
 
   #buildFoot() {
-    const foot = make("div");
-    foot.className = "popover-foot";
-    const hint = make("span", {}, "Saved in this browser for this session");
-    const reset = make("button", { type: "button" });
-    reset.id = "reset-layers";
-    reset.textContent = "Reset layers";
-    reset.title = "Restore the default layers and opacities";
-    reset.addEventListener("click", () => this.#layers.reset());
-    foot.append(hint, reset);
+    const foot = make("div", "popover-foot");
+    const reset = make("button", { type: "button", id: "reset-layers", title: "Restore the default layers and opacities", onclick: () => this.#layers.reset() }, "Reset layers");
+    foot.append(make("span", {}, "Saved in this browser for this session"), reset);
     this.#panel.append(foot);
   }
 }

@@ -125,10 +125,5 @@ function keysOf(camera) {
  * @param {string} name for screen readers
  */
 function toolButton(text, title, name) {
-  const button = make("button");
-  button.type = "button";
-  button.textContent = text;
-  button.title = title;
-  button.setAttribute("aria-label", name);
-  return button;
+  return make("button", { type: "button", title, "aria-label": name }, text);
 }

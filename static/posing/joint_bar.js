@@ -145,11 +145,8 @@ export class JointBar {
       step: (factor) => this.#posing.turn(factor),
     });
     entry.element.addEventListener("focus", () => this.#posing.selectDof(dof));
-    const unit = make("span");
-    unit.className = "dof-unit";
-    unit.textContent = UNITS[info.unit];
-    const lock = make("button", { type: "button" });
-    lock.className = "is-lock";
+    const unit = make("span", "dof-unit", UNITS[info.unit]);
+    const lock = make("button", { type: "button", className: "is-lock" });
     lock.addEventListener("click", (event) => {
       if (event.detail > 0) lock.blur();
       this.#posing.toggleLock([dof]);

@@ -44,10 +44,7 @@ export class ReplayBar {
       this.#pause();
       this.#send({ type: "replay", run: null, step: 0 });
     });
-    const group = make("div");
-    group.className = "group";
-    group.append(...this.#buttons);
-    byId("replay-bar", HTMLElement).append(group, slider, this.#text, this.#leave);
+    byId("replay-bar", HTMLElement).append(make("div", "group", ...this.#buttons), slider, this.#text, this.#leave);
   }
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */

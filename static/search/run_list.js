@@ -51,10 +51,8 @@ export class RunList {
     });
     look.className = "run-name";
     look.prepend(lineSwatch(number - 1));
-    const figures = make("div");
-    figures.className = "run-figures";
-    const differs = make("div");
-    differs.className = "run-differs";
+    const figures = make("div", "run-figures");
+    const differs = make("div", "run-differs");
     const compare = textButton("Compare", `Show the pose found by run ${number} in the views, dashed`, () => {
       const isOn = this.#store.facts.searchRuns?.compared === number;
       this.#send({ type: "compare", run: isOn ? null : number });

@@ -93,13 +93,8 @@ export class SearchPanel {
   }
 
   #build() {
-    const group = make("div");
-    group.className = "group";
-    group.setAttribute("role", "group");
-    group.setAttribute("aria-label", "Search");
-    group.append(...Object.values(this.#buttons));
-    const speed = make("label", "search-field");
-    speed.title = "Search speed in expansions per second. Changes take effect immediately";
+    const group = make("div", { className: "group", role: "group", "aria-label": "Search" }, ...Object.values(this.#buttons));
+    const speed = make("label", { className: "search-field", title: "Search speed in expansions per second. Changes take effect immediately" });
     this.#speed.append(...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
     this.#speed.setAttribute("aria-label", "Expansions per second");
     this.#speed.addEventListener("change", () => {

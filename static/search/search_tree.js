@@ -62,10 +62,7 @@ export class SearchTree {
       this.#built = shape;
       this.#cells.clear();
       this.#fields = [];
-      const table = make("div");
-      table.className = "tree-table";
-      table.style.setProperty("--passes", String(setup.passes.length));
-      table.append(...this.#head(setup));
+      const table = make("div", { className: "tree-table", "--passes": String(setup.passes.length) }, ...this.#head(setup));
       session.people.forEach((person, index) => {
         const leaves = setup.leaves.filter((leaf) => leaf.person === index);
         const dofs = leaves.reduce((sum, leaf) => sum + leaf.dofs.length, 0);
@@ -170,10 +167,7 @@ export class SearchTree {
     });
     this.#fields.push({ field: patience, read: (now) => now.patience }, { field: max, read: (now) => now.max_expansions });
     const passes = make("label", { className: "search-field", title: "Step factors: all stages are searched once per factor. The paper uses 1" });
-    const text = make("input");
-    text.type = "text";
-    text.value = setup.passes.join(" ");
-    text.setAttribute("aria-label", passes.title);
+    const text = make("input", { type: "text", value: setup.passes.join(" "), "aria-label": passes.title });
     text.addEventListener("change", () => {
       const factors = text.value.split(/[\s,;]+/).filter(Boolean).map(Number);
       this.#change({ passes: factors.map((factor) => (Number.isFinite(factor) ? factor : 0)) });

@@ -80,16 +80,12 @@ export function statusSwatch(status) {
 
 /** Sample of a pose of an earlier calibration for the legend. */
 export function earlierSwatch() {
-  const mark = make("i");
-  mark.className = "earlier-mark";
-  return mark;
+  return make("i", "earlier-mark");
 }
 
 /** Sample of a keyframe for the legend. */
 export function diamondSwatch() {
-  const mark = make("i");
-  mark.className = "keyframe-mark";
-  return mark;
+  return make("i", "keyframe-mark");
 }
 
 /** Colours of the states of tasks. Besides its colour, each has its own shape. */

@@ -129,8 +129,7 @@ export class DoubtList {
     const image = make("img", { alt: "", draggable: false });
     const cost = this.#cellsOf(person)?.costs[worst] ?? 0;
     this.#loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}-${calibration?.revision ?? 1}`);
-    const text = make("span");
-    text.className = "doubt-text";
+    const text = make("span", "doubt-text");
     const frames = `${first === last ? `frame ${first}` : `frames ${first}–${last}`}${spans.length > 1 ? `, in ${spans.length} stretches` : ""}`;
     const remark = this.#cellsOf(person)?.get(worst)?.remark ?? "";
     const why =

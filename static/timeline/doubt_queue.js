@@ -1,5 +1,6 @@
 /** Walk through doubtful and lost poses and doubted keyframes by severity, and accept those that are right. */
 
+import { zoomOnArrival } from "../panes/arrival_zoom.js";
 import { displayName } from "../widgets/text.js";
 import { listDoubts } from "./doubts.js";
 
@@ -7,9 +8,7 @@ export class DoubtQueue {
   #store;
   #navigation;
   #actions;
-  #grid;
-  /** @type {{person: number, frame: number, points: string[]} | null} the joints to zoom to once their frame is drawn */
-  #zoom = null;
+  #zoomTo;
   /** @type {import("./doubts.js").Doubt[] | null} null if it must be listed again */
   #listed = null;
   /** Rank of the entry that was visited last. When it is resolved, the next one takes its place. */
@@ -25,9 +24,8 @@ export class DoubtQueue {
     this.#store = store;
     this.#navigation = navigation;
     this.#actions = actions;
-    this.#grid = grid;
+    this.#zoomTo = zoomOnArrival(store, grid);
     store.on(["timeline", "lanes", "session", "keyframeDoubts"], () => (this.#listed = null));
-    store.on(["overlay", "target"], () => this.#zoomNow());
   }
 
   /** The unresolved doubts, the most severe first. */
@@ -85,16 +83,7 @@ export class DoubtQueue {
     const point = far ?? points.at(-1) ?? null;
     const { state } = this.#store.facts;
     if (state?.person !== person || state.point !== point) this.#actions.selectPerson(person, point);
-    this.#zoom = points.length ? { person, frame, points } : null;
-    this.#zoomNow();
-  }
-
-  #zoomNow() {
-    const { overlay, shown, target } = this.#store.facts;
-    if (this.#zoom && target !== this.#zoom.frame) this.#zoom = null;
-    if (!this.#zoom || overlay?.frame !== this.#zoom.frame || shown?.frame !== this.#zoom.frame) return;
-    this.#grid.frameJoints(this.#zoom.person, this.#zoom.points);
-    this.#zoom = null;
+    this.#zoomTo(points.length ? { person, frame, points } : null);
   }
 
   /**

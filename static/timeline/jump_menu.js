@@ -56,9 +56,7 @@ export class JumpMenu {
 
   #build() {
     const rows = KINDS.map(({ kind, label, title, key, more }) => {
-      const row = make("div");
-      row.className = "jump-row";
-      row.title = title;
+      const row = make("div", { className: "jump-row", title });
       const name = make("span", {}, label);
       const number = make("output", { "aria-label": `Number of frames: ${label}` });
       const keyOf = (/** @type {boolean} */ back) => (key ? ` (${back ? previousKey(key) : key.replace(" ", "+")})` : "");
@@ -66,10 +64,7 @@ export class JumpMenu {
         iconButton(PREVIOUS, `Previous ${more}${keyOf(true)}`, () => this.#jumps.go(kind, -1)),
         iconButton(NEXT, `Next ${more}${keyOf(false)}`, () => this.#jumps.go(kind, 1)),
       ];
-      const group = make("div");
-      group.className = "group";
-      group.append(...buttons);
-      row.append(name, number, make("kbd", {}, key.replace(" ", "+")), group);
+      row.append(name, number, make("kbd", {}, key.replace(" ", "+")), make("div", "group", ...buttons));
       this.#rows.set(kind, { count: number, buttons });
       return row;
     });

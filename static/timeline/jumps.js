@@ -9,57 +9,33 @@ import { copyDifferences, earlierCalibration } from "../model/selectors.js";
 /** @type {{kind: Kind, label: string, title: string, key: string, more: string}[]} */
 export const KINDS = [
   {
-    kind: "doubt",
-    label: "Doubtful or lost",
+    kind: "doubt", label: "Doubtful or lost", key: "N", more: "doubtful or lost frame",
     title: "Frames whose pose the tracker is not sure of, and that nobody has confirmed or reviewed",
-    key: "N",
-    more: "doubtful or lost frame",
   },
   {
-    kind: "ambiguous",
-    label: "Ambiguous",
+    kind: "ambiguous", label: "Ambiguous", key: "Alt A", more: "ambiguous frame",
     title: "Frames where another pose, drawn dashed, fits about as well. Shift+X uses it, K keeps the current pose",
-    key: "Alt A",
-    more: "ambiguous frame",
   },
+  { kind: "unreviewed", label: "Not reviewed", title: "Frames whose pose nobody has confirmed or reviewed", key: "Alt N", more: "unreviewed frame" },
   {
-    kind: "unreviewed",
-    label: "Not reviewed",
-    title: "Frames whose pose nobody has confirmed or reviewed",
-    key: "Alt N",
-    more: "unreviewed frame",
-  },
-  {
-    kind: "disagreeing",
-    label: "Inconsistent",
+    kind: "disagreeing", label: "Inconsistent", key: "D", more: "frame inconsistent with its neighbours",
     title: "Frames where the body jumps, for example between two runs or next to a keyframe",
-    key: "D",
-    more: "frame inconsistent with its neighbours",
   },
   {
-    kind: "earlier",
-    label: "Earlier calibration",
+    kind: "earlier", label: "Earlier calibration", key: "", more: "frame of an earlier calibration",
     title: "Frames with a pose that was made before the cameras were corrected",
-    key: "",
-    more: "frame of an earlier calibration",
   },
   {
-    kind: "copy",
-    label: "Other copy differs",
+    kind: "copy", label: "Other copy differs", key: "Alt S", more: "frame where the copies differ",
     title: "Frames on which the copy that the inspector compares differs by more than the tolerance, and nobody has decided",
-    key: "Alt S",
-    more: "frame where the copies differ",
   },
   {
-    kind: "chosen",
-    label: "Filtered by provenance",
+    kind: "chosen", label: "Filtered by provenance", key: "Alt Q", more: "frame of the chosen provenance",
     title: "Frames that the filter of the inspector's section Provenance lets through",
-    key: "Alt Q",
-    more: "frame of the chosen provenance",
   },
   { kind: "keyframe", label: "Keyframes", title: "Frames whose pose a person has set or confirmed", key: "W", more: "keyframe" },
   { kind: "empty", label: "Without a pose", title: "Frames that have no pose", key: "", more: "frame without a pose" },
-];
+]; // prettier-ignore
 
 const DOUBT = STATUSES.indexOf("doubtful");
 

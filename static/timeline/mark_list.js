@@ -51,10 +51,7 @@ export function markSection() {
 
 /** Samples of all states of a task, side by side. */
 function taskSamples() {
-  const samples = make("span");
-  samples.className = "task-samples";
-  samples.append(...TASK_STATES.map(taskSwatch));
-  return samples;
+  return make("span", "task-samples", ...TASK_STATES.map(taskSwatch));
 }
 
 /**

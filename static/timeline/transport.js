@@ -120,14 +120,7 @@ export class Transport {
       SOURCES.filter((source) => sources.has(source)).map((source) => entry(source, sourceSwatch(source))),
     ];
     this.#legend.title = `${[...shown, ...earlier, ...sources].join(", ")}. Click for all marks and lines`;
-    this.#legend.replaceChildren(
-      ...rows.map((swatches) => {
-        const row = make("span");
-        row.className = "legend-row";
-        row.append(...swatches);
-        return row;
-      }),
-    );
+    this.#legend.replaceChildren(...rows.map((swatches) => make("span", "legend-row", ...swatches)));
   }
 }
 

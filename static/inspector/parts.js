@@ -1,0 +1,102 @@
+/** Pieces that sections share: work that goes on, long lists of frames, and commands of the palette. */
+
+import { make, textButton } from "../widgets/elements.js";
+import { count } from "../widgets/text.js";
+
+/** @param {HTMLElement[]} children in one line */
+export function group(...children) {
+  return make("div", "acquisition-work", ...children);
+}
+
+/**
+ * Make a bar and a button to stop for work while it goes on, and the line that says how far it is or how it ended.
+ *
+ * @param {string} title of the button
+ * @param {() => void} stop
+ */
+export function workRow(title, stop) {
+  const progress = make("progress");
+  const element = group(progress, textButton("Stop", title, stop));
+  const status = make("p", { className: "section-note", role: "status" });
+  return {
+    element,
+    status,
+    /**
+     * @param {{running: boolean, share: number, stage: string, message: string, failed?: boolean} | null} work
+     * @param {string} [text]
+     */
+    show(work, text = !work ? "" : work.running ? `${work.stage} …` : work.message) {
+      element.hidden = !work?.running;
+      progress.value = work?.share ?? 0;
+      status.textContent = text;
+      status.hidden = !text;
+      status.classList.toggle("is-failed", work?.failed ?? false);
+    },
+  };
+}
+
+/**
+ * Make an entry of a list that goes to a frame.
+ *
+ * @param {number} frame
+ * @param {boolean} isHere
+ * @param {string} title
+ * @param {() => void} visit
+ * @param {HTMLElement[]} cells
+ */
+export function frameRow(frame, isHere, title, visit, ...cells) {
+  const go = textButton("", title, visit, { "data-no-command": "", ...(isHere ? { "aria-current": "true" } : {}) });
+  go.append(make("span", "observed-frame", String(frame)), ...cells);
+  return make("li", {}, go);
+}
+
+/**
+ * Show the first entries of a list, and the others after a button.
+ *
+ * @template Entry
+ * @param {HTMLElement} list
+ * @param {number} few number of the first entries
+ * @param {string} title of the button
+ * @param {(entry: Entry, rank: number) => HTMLElement} row
+ */
+export function longList(list, few, title, row) {
+  let limit = few;
+  /** @type {Entry[]} */
+  let entries = [];
+  const draw = () => {
+    list.replaceChildren(...entries.slice(0, limit).map(row));
+    list.hidden = entries.length === 0;
+    more.hidden = entries.length <= limit;
+    more.textContent = `${count(entries.length - limit)} more`;
+  };
+  const more = textButton("More", title, () => {
+    limit = Infinity;
+    draw();
+  });
+  return {
+    elements: [list, more],
+    /**
+     * @param {Entry[]} all
+     * @param {boolean} [isNew] whether to begin with the first entries again
+     * @param {number} [reached] rank of an entry that has to be shown
+     */
+    show(all, isNew = false, reached = 0) {
+      entries = all;
+      limit = isNew ? few : reached >= limit ? Infinity : limit;
+      draw();
+    },
+  };
+}
+
+/**
+ * Make a command that only the palette has.
+ *
+ * @param {string} label
+ * @param {string} words further words that it is found by
+ * @param {() => void} run
+ * @param {() => string | null} [why] why it is unavailable
+ * @returns {import("../widgets/key_matching.js").Command}
+ */
+export function command(label, words, run, why) {
+  return { keys: [], label, words, run, why };
+}
