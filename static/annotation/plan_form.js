@@ -12,7 +12,7 @@ const WAYS = [
 ];
 
 /** @param {import("../model/index.js").Context} context */
-export function planForm({ store, send, notify }) {
+export function planForm({ store, send, say }) {
   const form = make("form", "plan-form");
   const way = select("Frames", WAYS);
   const number = field("N", "15", "Distance of the frames, or number of poses");
@@ -31,7 +31,7 @@ export function planForm({ store, send, notify }) {
     frames.label.hidden = way.input.value !== "frames";
     eachLabel.hidden = names().length < 2;
   };
-  const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "error", text });
+  const refuse = (/** @type {string} */ text) => say(text, "error");
   form.addEventListener("input", enable);
   form.addEventListener("submit", (event) => {
     event.preventDefault();

@@ -59,7 +59,7 @@ export class Review {
   step(way) {
     const task = nextTask(this.listed, this.here, way);
     if (task) this.#visits.go(task);
-    else this.#say("This is the only listed task.");
+    else this.#context.say("This is the only listed task.");
   }
 
   accept() {
@@ -89,11 +89,6 @@ export class Review {
     if (action === "withdraw") return;
     const next = nextTask(filterTasks(this.tasks, "review", ""), { person, frame }, 1);
     if (next) this.#visits.go(next);
-    else this.#say("No annotated pose is left to review.");
-  }
-
-  /** @param {string} text */
-  #say(text) {
-    this.#context.notify({ type: "notice", level: "info", text });
+    else this.#context.say("No annotated pose is left to review.");
   }
 }

@@ -1,6 +1,6 @@
 /** Sizes from the footage: start and stop an acquisition, its progress, and the body before and after. */
 
-import { make, textButton } from "../widgets/elements.js";
+import { make, makeSvg, textButton } from "../widgets/elements.js";
 import { capital } from "../widgets/text.js";
 import { workRow } from "./parts.js";
 import { choiceRow } from "./rows.js";
@@ -12,7 +12,6 @@ import { choiceRow } from "./rows.js";
  * @typedef {NonNullable<import("../model/protocol.js").AcquireSizes["method"]>} Method
  */
 
-const SVG = "http://www.w3.org/2000/svg";
 /** Number of sizes that are listed: those that changed most. */
 const LISTED = 8;
 
@@ -83,19 +82,10 @@ function describe(result) {
  * @param {string} name
  */
 function picture({ size_px: [width, height] }, { before, after }, name) {
-  const svg = document.createElementNS(SVG, "svg");
-  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", `${name}: the body before and after`);
-  for (const [lines, kind] of /** @type {const} */ ([
-    [before, "is-before"],
-    [after, "is-after"],
-  ])) {
-    const path = document.createElementNS(SVG, "path");
-    path.setAttribute("class", kind);
-    path.setAttribute("d", lines.map(([x0, y0, x1, y1]) => `M${x0} ${y0}L${x1} ${y1}`).join(""));
-    svg.append(path);
-  }
+  const outline = (/** @type {number[][]} */ lines, /** @type {string} */ kind) =>
+    makeSvg("path", { class: kind, d: lines.map(([x0, y0, x1, y1]) => `M${x0} ${y0}L${x1} ${y1}`).join("") });
+  const place = { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${name}: the body before and after` };
+  const svg = makeSvg("svg", place, outline(before, "is-before"), outline(after, "is-after"));
   return make("figure", {}, svg, make("figcaption", {}, name));
 }
 

@@ -45,11 +45,11 @@ export class BodySection {
 
   /** @param {import("../model/index.js").Context} context */
   constructor(context) {
-    const { store, send, notify } = context;
+    const { store, send, say } = context;
     this.#acquisition = acquisitionView(context);
     this.#store = store;
     this.#send = send;
-    this.#refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
+    this.#refuse = say;
     this.#model = choiceRow({
       label: "Body",
       title:

@@ -36,7 +36,7 @@ const NUMBERS = {
  * @param {import("../model/index.js").Context} context
  * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
  */
-export function calibrationSection({ store, send, notify }) {
+export function calibrationSection({ store, send, say }) {
   const act = (/** @type {Action} */ action) => send({ type: "calibration_check", action });
   const start = textButton("Check the cameras", "Compare contours of the tracked people with the calibration; changes nothing", () => act("start"));
   start.className = "is-primary";
@@ -80,7 +80,7 @@ export function calibrationSection({ store, send, notify }) {
     outdated.textContent = sentences(tracked, keyframes).join(" ");
     const isNews = tracked > 0 && wasCurrent && store.facts.timeline.size > 0; // cells tell keyframes from the others
     if (isNews || tracked === 0) wasCurrent = !isNews;
-    if (isNews) notify({ type: "notice", level: "info", text: `${sentences(tracked, 0)[0]} Track them again in the inspector (Alt+I), section Calibration.` });
+    if (isNews) say(`${sentences(tracked, 0)[0]} Track them again in the inspector (Alt+I), section Calibration.`);
   };
 
   store.on(["calibration", "showsMisfits", "state", "timeline", "lanes"], () => store.facts.calibration && show(store.facts.calibration));

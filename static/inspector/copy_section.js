@@ -21,7 +21,7 @@ const NO_COPY = "No copy is compared. Open one first.";
  * @param {import("./import_form.js").PathFields} paths
  * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
  */
-export function copySection({ store, send, notify, navigation, actions }, { jumps }, paths) {
+export function copySection({ store, send, say, navigation, actions }, { jumps }, paths) {
   const decide = (/** @type {Action} */ action) => {
     const { state } = store.facts;
     if (state) send({ type: "other_copy", action, person: state.person, frame: state.frame });
@@ -48,7 +48,7 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
     high: 10000,
     step: 5,
     change: (value) => value !== null && send({ type: "other_copy", action: "tolerance", tolerance_mm: value }),
-    refuse: (text) => notify({ type: "notice", level: "info", text }),
+    refuse: say,
   });
   const keep = textButton("Keep mine", "Keep this session's pose as a keyframe, and count the difference as decided", () => decide("keep"));
   const take = textButton("Take theirs", "Take the pose of the other copy as a keyframe; can be undone", () => decide("take"));

@@ -1,5 +1,6 @@
 /** Inspector: a column with collapsible sections beside the views. Open sections are stored. */
 
+import { stored } from "../widgets/stored.js";
 import { button, byId, make } from "../widgets/elements.js";
 
 const STORED = "quadrille.inspector";
@@ -92,11 +93,6 @@ export class Inspector {
 
 /** @returns {{open: boolean, sections: string[]}} */
 function restored() {
-  try {
-    const found = JSON.parse(localStorage.getItem(STORED) ?? "null");
-    if (found && Array.isArray(found.sections)) return { open: found.open === true, sections: found.sections };
-  } catch {
-    // Something else has written it.
-  }
-  return { open: false, sections: ["body"] };
+  const found = stored(STORED);
+  return Array.isArray(found?.sections) ? { open: found.open === true, sections: found.sections } : { open: false, sections: ["body"] };
 }

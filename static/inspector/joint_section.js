@@ -19,14 +19,13 @@ const MAX_CM = 1e5;
  * @returns {import("./inspector.js").Section & {openMap: () => void}}
  */
 export function jointSection(context, { posing }) {
-  const { store, notify } = context;
+  const { store, say: refuse } = context;
   const body = make("div");
   const expectedError = make("p", { className: "section-note", title: "Root mean square error of the joint that tracking expects. The layer Error ellipses draws it in the views" });
   const map = costMap(context, posing);
   /** @type {Row[]} */
   let rows = [];
   let built = "";
-  const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
 
   /**
    * @param {import("../model/protocol.js").DofInfo} info

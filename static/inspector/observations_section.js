@@ -24,7 +24,7 @@ const NO_SET = "No observations were imported. Import them first.";
  * @param {import("./import_form.js").PathFields} sessions
  * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
  */
-export function observationsSection({ store, send, notify, navigation, actions, layers }, panes, sessions) {
+export function observationsSection({ store, send, say, navigation, actions, layers }, panes, sessions) {
   const act = (/** @type {Action} */ action, name = "") => send({ type: "observations", action, name });
   const found = () => store.facts.observations;
   /** Name of the set that buttons concern: the shown one, else the first that can be read. */
@@ -81,10 +81,10 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   const save = async (address, what) => {
     try {
       const name = await download(address);
-      notify({ type: "notice", level: "info", text: `Saved ${name}.` });
+      say(`Saved ${name}.`);
     } catch (error) {
       const reason = error instanceof TypeError ? "the program cannot be reached" : String(/** @type {Error} */ (error).message);
-      notify({ type: "notice", level: "error", text: `${what} failed: ${reason}` });
+      say(`${what} failed: ${reason}`, "error");
     }
   };
   const writeReport = async () => {

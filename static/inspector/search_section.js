@@ -42,10 +42,9 @@ const NUMBERS = [
  * @param {import("../model/index.js").Context} context
  * @returns {import("./inspector.js").Section}
  */
-export function searchSection({ store, send, notify }) {
+export function searchSection({ store, send, say: refuse }) {
   const set = (/** @type {Partial<SearchValues>} */ changes) =>
     send({ type: "search_settings", changes: /** @type {import("../model/protocol.js").SearchChanges} */ (changes) });
-  const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
   const numbers = NUMBERS.map(({ name, factor, ...options }) => ({
     name,
     factor,

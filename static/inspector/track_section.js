@@ -13,9 +13,8 @@ import { checkRow, choiceRow, numberRow } from "./rows.js";
  * @param {import("../model/index.js").Context} context
  * @returns {import("./inspector.js").Section}
  */
-export function trackSection({ store, send, notify }) {
+export function trackSection({ store, send, say: refuse }) {
   const set = (/** @type {TrackChanges} */ changes) => send({ type: "track_settings", changes });
-  const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
   const choices = make("div");
   const options = make("div");
   /** @type {ReturnType<typeof choiceRow> | null} */

@@ -1,5 +1,7 @@
 /** Views of each session that the browser keeps. */
 
+import { store, stored } from "../widgets/stored.js";
+
 /**
  * @typedef {"views" | "filled-pane" | "pane-shares" | "drawer"} Kind zoom of each view by the name of its camera; name of the
  *   camera whose pane fills the grid, or null; shares of the panes by arrangement; open tab of the drawer, or null
@@ -11,11 +13,7 @@
  * @returns {unknown} undefined if nothing valid is stored
  */
 export function kept(kind, session) {
-  try {
-    return JSON.parse(localStorage.getItem(keyOf(kind, session)) ?? "");
-  } catch {
-    return undefined;
-  }
+  return stored(keyOf(kind, session));
 }
 
 /**
@@ -36,7 +34,7 @@ export function keptByName(kind, session) {
  * @param {unknown} value
  */
 export function keep(kind, session, value) {
-  localStorage.setItem(keyOf(kind, session), JSON.stringify(value));
+  store(keyOf(kind, session), value);
 }
 
 /**

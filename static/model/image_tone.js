@@ -1,5 +1,7 @@
 /** Brightness, contrast and gamma of each camera's image, stored in this browser per session. */
 
+import { stored } from "../widgets/stored.js";
+
 /**
  * @typedef {{brightness: number, contrast: number, gamma: number}} ImageTone
  *   brightness and contrast from -100 to 100, gamma from 0.2 to 5
@@ -66,22 +68,16 @@ export class ImageTones {
     const { session } = this.#store.facts;
     if (!session) return;
     this.#session = session.name;
-    /** @type {Record<string, Partial<ImageTone>>} */
-    let stored = {};
-    try {
-      stored = JSON.parse(localStorage.getItem(STORED + session.name) ?? "{}") ?? {};
-    } catch {
-      // Settings that cannot be read are ignored.
-    }
-    this.#store.set({ imageTones: session.cameras.map(({ name }) => restored(stored[name])) });
+    const found = stored(STORED + session.name);
+    this.#store.set({ imageTones: session.cameras.map(({ name }) => restored(found?.[name])) });
   }
 }
 
-/** @param {Partial<ImageTone> | undefined} stored */
-function restored(stored) {
+/** @param {Partial<ImageTone> | undefined} found */
+function restored(found) {
   const tone = { ...PLAIN };
   for (const field of /** @type {(keyof ImageTone)[]} */ (Object.keys(BOUNDS))) {
-    const value = stored?.[field];
+    const value = found?.[field];
     const [min, max] = BOUNDS[field];
     if (typeof value === "number" && value >= min && value <= max) tone[field] = value;
   }

@@ -33,12 +33,13 @@ export function mount() {
   /** @type {((notice: NoticeMessage) => void)[]} */
   const noticeListeners = [];
   const notify = (/** @type {NoticeMessage} */ notice) => noticeListeners.forEach((listener) => listener(notice));
+  const say = (/** @type {string} */ text, /** @type {NoticeMessage["level"]} */ level = "info") => notify({ type: "notice", level, text });
   /** @type {Connection | null} */
   let connection = null;
   const send = (/** @type {ClientMessage} */ message) => {
     const { session } = store.facts;
     if (session && !isAllowed(message, session)) {
-      if (isAsked(message)) notify({ type: "notice", level: "info", text: refusalOf(session, store.facts.presence?.link ?? session.role) });
+      if (isAsked(message)) say(refusalOf(session, store.facts.presence?.link ?? session.role));
       return;
     }
     if (MOVING.includes(message.type)) navigation.expectMove();
@@ -50,6 +51,7 @@ export function mount() {
     store,
     send,
     notify,
+    say,
     latency,
     recentImages,
     actions: new Actions(store, send),

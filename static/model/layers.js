@@ -2,6 +2,8 @@
  * Layers of the panes: visibility, opacity and defaults. Each browser stores its own choice per session.
  */
 
+import { stored } from "../widgets/stored.js";
+
 /**
  * @typedef {import("./protocol.js").Layer} Layer
  * @typedef {"person" | "part"} ContourColors
@@ -147,25 +149,16 @@ export class Layers {
     const { name = "", people = [] } = this.#store.facts.session ?? {};
     if (name === this.#session) return;
     this.#session = name;
-    this.#store.set({ layers: restored(localStorage.getItem(STORED + name), people.length) });
+    this.#store.set({ layers: restored(stored(STORED + name) ?? {}, people.length) });
   }
 }
 
 /**
- * Parse stored settings and ignore unknown ones, which another version may have written.
- *
- * @param {string | null} stored
- * @param {number} people number of people of the session
+ * @param {Partial<LayerChoice>} found
+ * @param {number} people
  */
-function restored(stored, people) {
+function restored(found, people) {
   const layers = defaultLayers(people);
-  /** @type {Partial<LayerChoice>} */
-  let found;
-  try {
-    found = JSON.parse(stored ?? "{}") ?? {};
-  } catch {
-    return layers;
-  }
   for (const { id } of LAYERS) {
     const [isShown, opacity] = [found.shown?.[id], found.opacity?.[id]];
     if (typeof isShown === "boolean") layers.shown[id] = isShown;

@@ -1,5 +1,6 @@
 /** Draw a pane: pictures, and vectors over them. All sizes on the screen are CSS pixels. */
 
+import { setText } from "../widgets/canvas.js";
 import { OFF_DASH, imageColor } from "../widgets/image_colors.js";
 
 /**
@@ -151,9 +152,7 @@ export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
 export function drawGhostRanks(context, view, overlay, camera, opacity) {
   const ghosts = overlay.paths.filter((path) => path.camera === camera && path.kind === "alternative");
   context.globalAlpha = opacity;
-  context.font = "600 11px system-ui, sans-serif";
-  context.textAlign = "center";
-  context.textBaseline = "middle";
+  setText(context, "center", "middle", "600 11px");
   ghosts.forEach(({ first, count, color }, rank) => {
     if (count === 0) return;
     const lines = overlay.segments.subarray(4 * first, 4 * (first + count));

@@ -21,8 +21,7 @@ import { PoseLegend } from "./pose_legend.js";
  *
  * @param {import("../model/index.js").Context} context
  */
-export function mount({ store, send, notify, latency, layers, imageTones, recentImages }) {
-  const say = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
+export function mount({ store, send, say, latency, layers, imageTones, recentImages }) {
   const gestures = new Gestures(store, send, latency);
   const layersMenu = new LayersMenu(store, layers);
   const toneMenu = new ImageToneMenu(store, imageTones);

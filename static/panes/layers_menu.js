@@ -1,6 +1,6 @@
 /** Popover of all layers, and switches of the most important ones in the top bar. */
 
-import { byId, make } from "../widgets/elements.js";
+import { byId, make, onChange } from "../widgets/elements.js";
 import { BY_KEY, LAYERS } from "../model/layers.js";
 import { opensPopover, slider, togglePopover } from "../widgets/popovers.js";
 
@@ -47,10 +47,7 @@ export class LayersMenu {
     const bar = byId("quick-layers", HTMLElement);
     for (const { label, title, ids } of QUICK) {
       const { element, input } = checkbox(label, title);
-      input.addEventListener("change", () => {
-        input.blur();
-        this.#layers.toggle(ids, input.checked);
-      });
+      onChange(input, () => this.#layers.toggle(ids, input.checked));
       this.#show.push(() => {
         const { shown } = this.#store.facts.layers;
         input.checked = ids.some((id) => shown[id]);

@@ -31,14 +31,7 @@ export function drawAxes(context, view, { finding, layers, state }, camera) {
       path.lineTo(to.x, to.y);
       const isLast = round === lines.length - 1;
       context.globalAlpha = layers.opacity.axes * (isLast ? 1 : FIRST + ((1 - FIRST) * round) / lines.length);
-      if (isLast) {
-        context.strokeStyle = imageColor("outline");
-        context.lineWidth = 4;
-        context.stroke(path);
-      }
-      context.strokeStyle = imageColor("mark");
-      context.lineWidth = isLast ? 2 : 1.25;
-      context.stroke(path);
+      stroke(context, path, imageColor("mark"), isLast ? 2 : 1.25, isLast);
     });
   }
   context.restore();

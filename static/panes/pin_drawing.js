@@ -1,5 +1,6 @@
 /** Draw the pins of a view, their distance to the model, and their triangulated point. All sizes are CSS pixels. */
 
+import { drawLabel, stroke } from "./drawing.js";
 import { displayName } from "../widgets/text.js";
 import { OFF_DASH, imageColor } from "../widgets/image_colors.js";
 
@@ -75,7 +76,7 @@ export function drawPins(context, view, facts, camera, paneWidth) {
   const named = placed.find(({ pin }) => isSame(pin, pinHover));
   if (named && !facts.heldPin) {
     const hint = "drag to move, right-click or Delete to remove";
-    label(context, named.headX, named.headY, [describe(named.pin), hint], paneWidth);
+    drawLabel(context, [describe(named.pin), hint], { x: named.headX, y: named.headY }, paneWidth);
   }
 }
 
@@ -100,7 +101,7 @@ function drawError(context, view, { pin, x, y }) {
   line.moveTo(x, y);
   line.lineTo(model.x, model.y);
   context.setLineDash(OFF_DASH);
-  strokeOutlined(context, line, imageColor("off"), 1.5);
+  stroke(context, line, imageColor("off"), 1.5);
   context.setLineDash([]);
 }
 
@@ -115,7 +116,7 @@ function drawPin(context, { x, y, headX, headY }, color, isGrown) {
   const stem = new Path2D();
   stem.moveTo(x, y);
   stem.lineTo(headX, headY);
-  strokeOutlined(context, stem, "#fff", 1.5);
+  stroke(context, stem, "#fff", 1.5);
   const head = new Path2D();
   head.arc(headX, headY, radius, 0, 2 * Math.PI);
   context.strokeStyle = imageColor("outline");
@@ -147,48 +148,6 @@ function drawMeeting(context, view, overlay, camera, paneWidth) {
   diamond.lineTo(x, y + MEETING_RADIUS);
   diamond.lineTo(x - MEETING_RADIUS, y);
   diamond.closePath();
-  strokeOutlined(context, diamond, imageColor("mark"), 1.5);
-  if (mark.error_px !== null) label(context, x, y + 16, [`${mark.error_px.toFixed(1)} px`], paneWidth);
-}
-
-/**
- * Stroke with a dark outline, so that the line is visible on any image.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {Path2D} line
- * @param {string} color
- * @param {number} width
- */
-function strokeOutlined(context, line, color, width) {
-  context.lineCap = context.lineJoin = "round";
-  context.strokeStyle = imageColor("outline");
-  context.lineWidth = width + 2;
-  context.stroke(line);
-  context.strokeStyle = color;
-  context.lineWidth = width;
-  context.stroke(line);
-}
-
-/**
- * Draw lines of text beside a position, on the side with more room. The first line is brighter.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {number} x
- * @param {number} y centre of the first line
- * @param {string[]} lines
- * @param {number} paneWidth
- */
-function label(context, x, y, lines, paneWidth) {
-  context.font = "500 12px system-ui, sans-serif";
-  context.textBaseline = "middle";
-  const width = Math.max(...lines.map((text) => context.measureText(text).width)) + 12;
-  const left = x + 10 + width < paneWidth ? x + 10 : Math.max(0, x - 10 - width);
-  context.fillStyle = "rgba(12, 13, 15, 0.85)";
-  context.beginPath();
-  context.roundRect(left, y - 10, width, 4 + 16 * lines.length, 4);
-  context.fill();
-  lines.forEach((text, index) => {
-    context.fillStyle = index === 0 ? "#fff" : "#c3c8cf";
-    context.fillText(text, left + 6, y + 0.5 + 16 * index);
-  });
+  stroke(context, diamond, imageColor("mark"), 1.5);
+  if (mark.error_px !== null) drawLabel(context, [`${mark.error_px.toFixed(1)} px`], { x, y: y + 16 }, paneWidth);
 }

@@ -1,6 +1,6 @@
 /** Legend of the poses that the panes show besides the stored ones: replayed, tested, compared, previewed, alternative. */
 
-import { byId, make } from "../widgets/elements.js";
+import { byId, make, makeSvg } from "../widgets/elements.js";
 import { shownMisfits } from "../model/selectors.js";
 import { LINE_STYLES } from "./drawing.js";
 
@@ -83,15 +83,7 @@ function entry(text, line) {
  */
 export function sampleOf(kind, color) {
   const { width, dash } = LINE_STYLES[kind];
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", `0 0 ${SAMPLE_PX} 8`);
-  svg.setAttribute("aria-hidden", "true");
-  svg.setAttribute("class", "line-sample over-image");
-  const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  path.setAttribute("d", `M0 4H${SAMPLE_PX}`);
-  path.setAttribute("stroke", color);
-  path.setAttribute("stroke-width", String(width));
-  path.setAttribute("stroke-dasharray", dash.join(" "));
-  svg.append(path);
-  return svg;
+  const line = { d: `M0 4H${SAMPLE_PX}`, stroke: color, "stroke-width": width, "stroke-dasharray": dash.join(" ") };
+  const place = { viewBox: `0 0 ${SAMPLE_PX} 8`, "aria-hidden": "true", class: "line-sample over-image" };
+  return makeSvg("svg", place, makeSvg("path", line));
 }

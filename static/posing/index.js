@@ -22,13 +22,13 @@ import { epipolarBindings, noteBindings, pinBindings, posingBindings } from "./p
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
  */
-export function mount({ store, send, notify, reasons, actions }, { grid }) {
-  const pinning = new Pinning(store, send, notify);
+export function mount({ store, send, say, reasons, actions }, { grid }) {
+  const pinning = new Pinning(store, send, say);
   grid.addPointerTarget(pinning);
   const epipolar = new EpipolarCheck(store, send);
   grid.addPointerTarget(epipolar); // before pins and joints
   const posing = new Posing(store, send);
-  const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, notify);
+  const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, say);
   new FrameCard(store, posing);
   new PinBar(store, pinning);
   const notes = new PoseNotes({ store, actions, pinning, grid });

@@ -2,13 +2,13 @@
 
 import { CopyMenu } from "./copy_menu.js";
 import { meaning, shortName } from "./dof_names.js";
-import { button, byId, make } from "../widgets/elements.js";
+import { button, byId, icon, make, onChange } from "../widgets/elements.js";
 import { numberField } from "../widgets/number_field.js";
 import { makeScrubber } from "../widgets/scrubber.js";
 import { displayName } from "../widgets/text.js";
 
-const LOCK = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V5.2a2.5 2.5 0 0 1 5 0v2.3" />';
-const UNLOCKED = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V4.2a2.5 2.5 0 0 1 4.7-1.2" />';
+const LOCK = "M4 7.5h8v5.5H4zM5.5 7.5V5.2a2.5 2.5 0 0 1 5 0v2.3";
+const UNLOCKED = "M4 7.5h8v5.5H4zM5.5 7.5V4.2a2.5 2.5 0 0 1 4.7-1.2";
 const UNITS = { deg: "°", cm: "cm" };
 /** Change of a value per CSS pixel when its name is dragged sideways. */
 const PER_PIXEL = { deg: 0.5, cm: 0.2 };
@@ -17,7 +17,7 @@ const PER_PIXEL = { deg: 0.5, cm: 0.2 };
 export class JointBar {
   #store;
   #posing;
-  #notify;
+  #say;
   #joint = byId("joint-name", HTMLSelectElement);
   #list = byId("joint-dofs", HTMLElement);
   #lock = byId("lock-joint", HTMLButtonElement);
@@ -30,21 +30,18 @@ export class JointBar {
    * @param {HTMLElement} element
    * @param {import("../model/store.js").Store} store
    * @param {import("./posing.js").Posing} posing
-   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+   * @param {(text: string) => void} say
    */
-  constructor(element, store, posing, notify) {
+  constructor(element, store, posing, say) {
     this.#store = store;
     this.#posing = posing;
-    this.#notify = notify;
+    this.#say = say;
     button("previous-joint", () => posing.toJoint(-1));
     button("next-joint", () => posing.toJoint(1));
     button("lock-joint", () => posing.toggleLock(posing.dofs));
     button("mirror-pose", () => posing.mirror());
     button("reset-limb", () => posing.resetLimb());
-    this.#joint.addEventListener("change", () => {
-      posing.selectPoint(this.#joint.value);
-      this.#joint.blur();
-    });
+    onChange(this.#joint, () => posing.selectPoint(this.#joint.value));
     new CopyMenu(store, posing);
     this.#addStep("step-cm", "cm", "Step of the arrow keys in centimetres (Shift: ×10, Ctrl: ×0.1)");
     this.#addStep("step-deg", "deg", "Step of + and - in degrees");
@@ -84,7 +81,7 @@ export class JointBar {
         this.#posing.setSteps({ [unit]: step });
         return null;
       },
-      refuse: (text) => this.#notify({ type: "notice", level: "info", text }),
+      refuse: this.#say,
       step: null,
     });
     entry.element.title = name;
@@ -141,7 +138,7 @@ export class JointBar {
     const entry = numberField({
       name: `${displayName(info.joint)} ${info.name}, ${UNITS[info.unit]}`,
       take: (text) => this.#take(info, dof, text),
-      refuse: (text) => this.#notify({ type: "notice", level: "info", text }),
+      refuse: this.#say,
       step: (factor) => this.#posing.turn(factor),
     });
     entry.element.addEventListener("focus", () => this.#posing.selectDof(dof));
@@ -226,5 +223,5 @@ function showLock(lock, isLocked, what) {
   if (lock.title === title) return;
   lock.title = title;
   lock.setAttribute("aria-label", title);
-  lock.innerHTML = `<svg viewBox="0 0 16 16" aria-hidden="true">${isLocked ? LOCK : UNLOCKED}</svg>`;
+  lock.replaceChildren(icon(isLocked ? LOCK : UNLOCKED));
 }

@@ -1,6 +1,6 @@
 /** Pins of the selected joint: their number, error and actions. */
 
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, onChange } from "../widgets/elements.js";
 import { Menu } from "../widgets/menu.js";
 import { displayName } from "../widgets/text.js";
 
@@ -27,10 +27,7 @@ export class PinBar {
     this.#fit = button("pin-fit", () => pinning.fit());
     this.#clear = button("pin-clear", () => pinning.clear());
     new Menu(this.#choices, byId("fit-menu", HTMLElement), () => ({ items: this.#fits() }));
-    this.#live.addEventListener("change", () => {
-      pinning.toggleLive();
-      this.#live.blur();
-    });
+    onChange(this.#live, () => pinning.toggleLive());
     /** @type {(keyof import("../model/store.js").Facts)[]} */
     store.on(["state", "connected", "overlay", "pinning", "livePins", "scope"], () => this.#show());
   }

@@ -20,7 +20,7 @@ const RESPONSE_MS = 600;
 export class Pinning {
   #store;
   #send;
-  #notify;
+  #say;
   /** @type {Held | null} */
   #held = null;
   #moveScheduled = false;
@@ -28,12 +28,12 @@ export class Pinning {
   /**
    * @param {import("../model/store.js").Store} store
    * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+   * @param {(text: string) => void} say
    */
-  constructor(store, send, notify) {
+  constructor(store, send, say) {
     this.#store = store;
     this.#send = send;
-    this.#notify = notify;
+    this.#say = say;
     store.on(["connected"], () => this.#release(false));
     store.on(["overlay"], () => !this.#held && store.facts.heldPin && store.set({ heldPin: null }));
     store.on(["state"], () => store.facts.pinning && !store.facts.state?.point && store.set({ pinning: false }));
@@ -305,10 +305,5 @@ export class Pinning {
     held.pane.surface.classList.remove("is-dragging");
     this.#store.set({ dragging: false, ...(isKept ? {} : { heldPin: null }) });
     setTimeout(() => !this.#held && this.#store.facts.heldPin && this.#store.set({ heldPin: null }), RESPONSE_MS);
-  }
-
-  /** @param {string} text */
-  #say(text) {
-    this.#notify({ type: "notice", level: "info", text });
   }
 }

@@ -1,5 +1,6 @@
 /** Edit poses without a drag: selection, steps, mirror, copies, resets and locks. */
 
+import { stored } from "../widgets/stored.js";
 import { alternativesOf } from "../model/selectors.js";
 
 /** Minimum interval of messages while a key is held down. */
@@ -296,11 +297,7 @@ export class Posing {
 
 /** @returns {Steps} */
 function restoredSteps() {
-  try {
-    const found = JSON.parse(localStorage.getItem(STEPS_KEY) ?? "{}");
-    const good = (/** @type {"cm" | "deg"} */ unit) => (found[unit] > 0 ? Number(found[unit]) : DEFAULT_STEPS[unit]);
-    return { cm: good("cm"), deg: good("deg") };
-  } catch {
-    return DEFAULT_STEPS;
-  }
+  const found = stored(STEPS_KEY);
+  const good = (/** @type {"cm" | "deg"} */ unit) => (found?.[unit] > 0 ? Number(found[unit]) : DEFAULT_STEPS[unit]);
+  return { cm: good("cm"), deg: good("deg") };
 }

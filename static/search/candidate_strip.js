@@ -1,7 +1,6 @@
 /** Best candidates of a search as stick figures, in the view where they differ most. */
 
-import { prepare } from "../panes/drawing.js";
-import { imageColor } from "../widgets/image_colors.js";
+import { prepare, stroke } from "../panes/drawing.js";
 import { byId, make } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
 import { selectedRun } from "../model/search_runs.js";
@@ -120,13 +119,7 @@ export class CandidateStrip {
         line.moveTo(...a);
         line.lineTo(...b);
       }
-      context.lineCap = "round";
-      context.strokeStyle = imageColor("outline");
-      context.lineWidth = 3.5;
-      context.stroke(line);
-      context.strokeStyle = person.color;
-      context.lineWidth = 1.75;
-      context.stroke(line);
+      stroke(context, line, person.color, 1.75);
       first += 2 * found.people[p];
     });
   }

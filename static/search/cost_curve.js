@@ -2,6 +2,7 @@
  * Plot of best and tested costs by number of poses evaluated, with stages and other runs. A click replays that step.
  */
 
+import { setText } from "../widgets/canvas.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
 import { byId, make } from "../widgets/elements.js";
@@ -199,9 +200,7 @@ function drawTested(context, plot, steps, style) {
  * @param {CSSStyleDeclaration} style
  */
 function drawStages(context, plot, run, steps, style) {
-  context.font = "10.5px system-ui, sans-serif";
-  context.textAlign = "left";
-  context.textBaseline = "top";
+  setText(context, "left", "top");
   let free = -Infinity;
   for (let i = 0; i < steps.count; i += 1) {
     if (i > 0 && steps.stages[i] === steps.stages[i - 1]) continue;

@@ -2,7 +2,7 @@
 
 import { colorName, dashOf, lineSwatch } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
-import { byId, make, textButton } from "../widgets/elements.js";
+import { byId, make, onChange, textButton } from "../widgets/elements.js";
 import { Plot } from "../widgets/plot.js";
 import { displayName } from "../widgets/text.js";
 
@@ -34,10 +34,7 @@ export class CostLandscape {
   constructor(store, send) {
     this.#store = store;
     this.#send = send;
-    this.#choice.addEventListener("change", () => {
-      send({ type: "landscape", dof: this.#choice.value });
-      this.#choice.blur();
-    });
+    onChange(this.#choice, () => send({ type: "landscape", dof: this.#choice.value }));
     this.#toMinimum = textButton("To minimum", "Set this degree of freedom to the minimum of the cost", () => {
       const found = store.facts.landscape;
       if (found) this.#setTo(found.values[indexOfMin(found.total)]);

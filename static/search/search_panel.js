@@ -3,7 +3,7 @@
 import { hasSearch, hasTrack, stopTitle } from "../model/selectors.js";
 import { CandidateStrip } from "./candidate_strip.js";
 import { CostCurve } from "./cost_curve.js";
-import { byId, make, textButton } from "../widgets/elements.js";
+import { byId, make, onChange, textButton } from "../widgets/elements.js";
 import { ReplayBar } from "./replay_bar.js";
 import { RunList } from "./run_list.js";
 import { SearchTree } from "./search_tree.js";
@@ -97,10 +97,7 @@ export class SearchPanel {
     const speed = make("label", { className: "search-field", title: "Search speed in expansions per second. Changes take effect immediately" });
     this.#speed.append(...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
     this.#speed.setAttribute("aria-label", "Expansions per second");
-    this.#speed.addEventListener("change", () => {
-      this.#send({ type: "search_speed", per_second: Number(this.#speed.value) || null });
-      this.#speed.blur();
-    });
+    onChange(this.#speed, () => this.#send({ type: "search_speed", per_second: Number(this.#speed.value) || null }));
     speed.append("Speed", this.#speed);
     this.#figures.className = "search-figures";
     this.#figures.setAttribute("aria-label", "Progress of the search");

@@ -3,7 +3,7 @@
  * stage, and the running stage.
  */
 
-import { byId, make } from "../widgets/elements.js";
+import { byId, make, onChange } from "../widgets/elements.js";
 import { selectedRun } from "../model/search_runs.js";
 import { makeNumber } from "./search_widgets.js";
 import { count, displayName } from "../widgets/text.js";
@@ -177,10 +177,7 @@ export class SearchTree {
     passes.append("Passes", text);
     const apart = make("label", { className: "search-field", title: "Search the limbs of a group separately, not together as in the paper" });
     const box = make("input", { type: "checkbox", checked: setup.limbs_apart });
-    box.addEventListener("change", () => {
-      this.#change({ limbs_apart: box.checked });
-      box.blur();
-    });
+    onChange(box, () => this.#change({ limbs_apart: box.checked }));
     apart.append(box, "separate limbs");
     line.append(passes, patience.element, max.element, apart);
     return line;

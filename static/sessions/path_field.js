@@ -1,9 +1,9 @@
 /** Fields that take a path: completion as one types, and a button that opens the path picker. */
 
-import { make } from "../widgets/elements.js";
+import { iconButton, make } from "../widgets/elements.js";
 import { completePaths } from "./session_requests.js";
 
-const FOLDER_ICON = '<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M2 4.5v8h12V6H8L6.5 4.5z" /></svg>';
+const FOLDER = "M2 4.5v8h12V6H8L6.5 4.5z";
 
 /**
  * Complete the field of a label and give it its button.
@@ -19,8 +19,7 @@ export function makePathField(input, browse) {
   completePaths(input, list);
   const label = input.closest("label") ?? input.labels?.[0]; // a form that is not in the page yet has no labels
   const title = `Browse for ${label?.textContent?.toLowerCase()}`;
-  const button = make("button", { type: "button", className: "is-icon", title, innerHTML: FOLDER_ICON, "aria-label": title });
+  const button = iconButton(FOLDER, title, browse);
   Object.assign(button.dataset, { browse: input.name, noCommand: "" });
-  button.addEventListener("click", browse);
   input.after(list, button);
 }

@@ -1,5 +1,7 @@
 /** Drawings of where calibrated cameras stand and look: from above, and from the side. */
 
+import { makeSvg } from "../widgets/elements.js";
+
 /**
  * @typedef {number[]} Point of three coordinates, metres
  *
@@ -63,6 +65,7 @@ function drawView(svg, label, rig, across, upwards, isSide) {
   const middle = [(low[0] + low[1]) / 2, (high[0] + high[1]) / 2];
   const place = (/** @type {number[]} */ [x, y]) => [WIDTH / 2 + scale * (x - middle[0]), (HEIGHT + BAND) / 2 - scale * (y - middle[1])];
 
+  /** @type {SVGElement[]} */
   const parts = [text(label, 6, 12, "rig-label")];
   if (isSide) {
     const [x, floor] = place([feet, 0]);
@@ -71,7 +74,7 @@ function drawView(svg, label, rig, across, upwards, isSide) {
   if (rig.point) {
     const to = place(flat(rig.point));
     parts.push(...centers.map((from) => line(place(from), to, "rig-sight")));
-    parts.push(element("circle", { cx: to[0], cy: to[1], r: 3, class: "rig-point" }));
+    parts.push(makeSvg("circle", { cx: to[0], cy: to[1], r: 3, class: "rig-point" }));
   }
   rig.axes.forEach((axis, i) => {
     const [x, y] = place(centers[i]);
@@ -131,21 +134,8 @@ function camera(x, y, dx, dy, title) {
   const side = [-dy * 0.45, dx * 0.45];
   const corner = (/** @type {number} */ sign) => [x + CAMERA_PX * (dx + sign * side[0]), y + CAMERA_PX * (dy + sign * side[1])];
   const points = [[x, y], corner(1), corner(-1)].map((p) => p.map((v) => v.toFixed(1)).join(",")).join(" ");
-  const group = element("g", { class: "rig-camera" });
-  const tip = element("title", {});
-  tip.textContent = title;
-  group.append(tip, element("polygon", { points }), element("circle", { cx: x, cy: y, r: 3 }));
-  return group;
-}
-
-/**
- * @param {string} tag
- * @param {Record<string, string | number>} attributes
- */
-function element(tag, attributes) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
-  return made;
+  const parts = [makeSvg("title", {}, title), makeSvg("polygon", { points }), makeSvg("circle", { cx: x, cy: y, r: 3 })];
+  return makeSvg("g", { class: "rig-camera" }, ...parts);
 }
 
 /**
@@ -154,7 +144,7 @@ function element(tag, attributes) {
  * @param {string} kind
  */
 function line([x1, y1], [x2, y2], kind) {
-  return element("line", { x1, y1, x2, y2, class: kind });
+  return makeSvg("line", { x1, y1, x2, y2, class: kind });
 }
 
 /**
@@ -164,9 +154,7 @@ function line([x1, y1], [x2, y2], kind) {
  * @param {string} kind
  */
 function text(words, x, y, kind) {
-  const made = element("text", { x, y, class: kind });
-  made.textContent = words;
-  return made;
+  return makeSvg("text", { x, y, class: kind }, words);
 }
 
 /** @param {number[]} values */

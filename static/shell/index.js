@@ -88,9 +88,8 @@ export function mount(context, rooms) {
  * @param {import("../widgets/key_matching.js").Binding[]} table
  * @param {HTMLIFrameElement} frame of the 3-D view
  */
-function obeyKeys({ store, notify }, table, frame) {
+function obeyKeys({ store, say }, table, frame) {
   const isDragging = () => store.facts.dragging;
-  const say = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
   watchTyping(document);
   leaveFields(document);
   listen(document, table, { viser: false, isDragging, say });

@@ -1,5 +1,6 @@
 /** Command palette: find commands by a few letters, run them with Enter. */
 
+import { stored } from "../widgets/stored.js";
 import { buttonCommands, contextCommands, keyCommands, settingCommands, suitingLabels } from "./commands.js";
 import { byId, keyCaps, make } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
@@ -154,10 +155,6 @@ function option({ area, label, keys, why }, mark, index) {
 
 /** @returns {string[]} */
 function recentIds() {
-  try {
-    const found = JSON.parse(localStorage.getItem(RECENT) ?? "[]");
-    return Array.isArray(found) ? found : [];
-  } catch {
-    return [];
-  }
+  const found = stored(RECENT);
+  return Array.isArray(found) ? found : [];
 }

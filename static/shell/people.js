@@ -1,6 +1,6 @@
 /** People of the session: active person, visibility, solo, and the people that searches move. */
 
-import { button, byId, iconButton, make } from "../widgets/elements.js";
+import { button, byId, iconButton, make, onChange } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 
 const EYE = "M1.5 8S4 3.5 8 3.5 14.5 8 14.5 8 12 12.5 8 12.5 1.5 8 1.5 8zM8 6a2 2 0 1 0 .01 0z";
@@ -35,10 +35,7 @@ export class People {
     this.#posing = posing;
     this.#solo = button("solo", () => actions.toggleSolo());
     opensPopover(this.#panel, this.#open, () => this.toggle());
-    this.#scope.addEventListener("change", () => {
-      store.set({ scope: this.#scope.value === "one" ? "one" : "all" });
-      this.#scope.blur();
-    });
+    onChange(this.#scope, () => store.set({ scope: this.#scope.value === "one" ? "one" : "all" }));
     store.on(["session"], () => this.#build());
     store.on(["session", "state", "connected", "scope"], () => this.#show());
   }

@@ -1,5 +1,6 @@
 /** Draw plots of curves below one another, on the axis of the timeline. Sizes are CSS pixels. */
 
+import { drawWithin, setText } from "../widgets/canvas.js";
 import { roundUp } from "../widgets/frame_axis.js";
 import { extent, trace } from "../model/series.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
@@ -38,20 +39,17 @@ export function drawCurves(context, axis, height, curves, labels, hidden, keyfra
     const scale = scaleOf(plot.unit, series.map(({ values }) => values), top, top + each);
     drawFrame(context, axis, scale, style);
     drawKeyframes(context, keys, scale, style);
-    context.save();
-    context.beginPath();
-    context.rect(axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
-    context.clip();
-    context.lineWidth = 1.4;
-    context.lineJoin = "round";
-    for (const { label, values } of series) {
-      const path = new Path2D();
-      trace(path, values, axis, (value) => toY(scale, value));
-      context.strokeStyle = style.getPropertyValue(colorName(labels.indexOf(label)));
-      context.setLineDash(dashOf(labels.indexOf(label)));
-      context.stroke(path);
-    }
-    context.restore();
+    drawWithin(context, { ...scale, left: axis.left, right: axis.right }, () => {
+      context.lineWidth = 1.4;
+      context.lineJoin = "round";
+      for (const { label, values } of series) {
+        const path = new Path2D();
+        trace(path, values, axis, (value) => toY(scale, value));
+        context.strokeStyle = style.getPropertyValue(colorName(labels.indexOf(label)));
+        context.setLineDash(dashOf(labels.indexOf(label)));
+        context.stroke(path);
+      }
+    });
     drawTitle(context, axis, top, `${plot.title}, ${UNITS[plot.unit]}`, style);
   });
   drawFrameNumbers(context, axis, height, style);
@@ -96,9 +94,7 @@ function drawFrame(context, axis, scale, style) {
   context.fillStyle = style.getPropertyValue("--plot");
   context.fillRect(axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
   const step = roundUp(((scale.max - scale.min) * TICK_GAP) / (scale.bottom - scale.top));
-  context.font = "10.5px system-ui, sans-serif";
-  context.textAlign = "right";
-  context.textBaseline = "middle";
+  setText(context, "right", "middle");
   for (let value = Math.ceil(scale.min / step) * step; value <= scale.max; value += step) {
     const y = Math.round(toY(scale, value));
     context.fillStyle = style.getPropertyValue("--line");
@@ -118,9 +114,7 @@ function drawFrame(context, axis, scale, style) {
  * @param {CSSStyleDeclaration} style
  */
 function drawTitle(context, axis, top, text, style) {
-  context.font = "600 11px system-ui, sans-serif";
-  context.textAlign = "left";
-  context.textBaseline = "top";
+  setText(context, "left", "top", "600 11px");
   const width = context.measureText(text).width;
   context.fillStyle = style.getPropertyValue("--plot");
   context.globalAlpha = 0.8;
@@ -151,9 +145,7 @@ function drawKeyframes(context, xs, { top, bottom }, style) {
  * @param {CSSStyleDeclaration} style
  */
 function drawFrameNumbers(context, axis, height, style) {
-  context.font = "10.5px system-ui, sans-serif";
-  context.textAlign = "center";
-  context.textBaseline = "bottom";
+  setText(context, "center", "bottom");
   context.fillStyle = style.getPropertyValue("--muted");
   for (const frame of axis.ticks(70)) {
     context.fillRect(axis.middle(frame) - 0.5, height - TICKS_HEIGHT, 1, 3);

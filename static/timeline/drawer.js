@@ -6,7 +6,7 @@
 import { keep, kept } from "../layout/kept_views.js";
 import { hasSearch } from "../model/selectors.js";
 import { listDoubts } from "./doubts.js";
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, onChange } from "../widgets/elements.js";
 import { makeSeparator, showPosition } from "../widgets/separator.js";
 
 /** @type {readonly import("../model/protocol.js").CurveGroup[]} */
@@ -42,10 +42,7 @@ export class Drawer {
     this.#toggle = button("show-curves", () => this.#open(this.#isOpen ? null : this.#lastTab));
     button("close-drawer", () => this.#open(null));
     for (const tab of this.#tabs) {
-      tab.addEventListener("change", () => {
-        this.#open(/** @type {import("../model/series.js").Tab} */ (tab.value));
-        tab.blur();
-      });
+      onChange(tab, () => this.#open(/** @type {import("../model/series.js").Tab} */ (tab.value)));
     }
     makeSeparator(this.#grip, {
       position: () => -this.#stage.clientHeight,

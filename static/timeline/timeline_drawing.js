@@ -3,6 +3,7 @@
  * are CSS pixels.
  */
 
+import { drawWithin, setText } from "../widgets/canvas.js";
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
 import { TASK_STATES } from "../model/tasks.js";
 import { trace } from "../model/series.js";
@@ -66,9 +67,7 @@ export function layout(people, hasTasks = false, hasCopy = false) {
  * @param {Band | null} copy lane of the differences from another copy
  */
 export function drawLabels(context, axis, style, lanes, people, copy) {
-  context.font = "10.5px system-ui, sans-serif";
-  context.textAlign = "right";
-  context.textBaseline = "middle";
+  setText(context, "right", "middle");
   context.fillStyle = style.getPropertyValue("--muted");
   /** @type {[string, Band][]} */
   const rows = [["cost", COST], ["status", STATUS]]; // prettier-ignore
@@ -273,9 +272,7 @@ export function drawReviewed(context, axis, cells, style, { top, bottom }) {
  * @param {Band} lane
  */
 export function drawTasks(context, axis, tasks, style, { top, bottom }) {
-  context.font = "10.5px system-ui, sans-serif";
-  context.textAlign = "right";
-  context.textBaseline = "middle";
+  setText(context, "right", "middle");
   context.fillStyle = style.getPropertyValue("--muted");
   context.fillText("tasks", axis.left - 8, (top + bottom) / 2);
   // The states that need work last: where frames share a pixel, they stay visible.
@@ -323,16 +320,10 @@ export function drawCosts(context, axis, cells, style) {
   const max = Math.max(1e-6, ordered[Math.floor(0.98 * (ordered.length - 1))]);
   const path = new Path2D();
   trace(path, cells.costs, axis, (value) => COST.bottom - (COST.bottom - COST.top) * Math.min(1, value / max));
-  context.save();
-  context.beginPath();
-  context.rect(axis.left, 0, axis.right - axis.left, STATUS.top);
-  context.clip();
-  context.strokeStyle = style.getPropertyValue("--text");
-  context.globalAlpha = 0.75;
-  context.lineWidth = 1.25;
-  context.lineJoin = "round";
-  context.stroke(path);
-  context.restore();
+  drawWithin(context, { left: axis.left, top: 0, right: axis.right, bottom: STATUS.top }, () => {
+    Object.assign(context, { strokeStyle: style.getPropertyValue("--text"), globalAlpha: 0.75, lineWidth: 1.25, lineJoin: "round" });
+    context.stroke(path);
+  });
 }
 
 /**

@@ -1,7 +1,7 @@
 /** Buttons for tracking. */
 
 import { hasTrack } from "../model/selectors.js";
-import { button, byId } from "../widgets/elements.js";
+import { button, byId, onChange } from "../widgets/elements.js";
 
 export class TrackBar {
   #store;
@@ -21,10 +21,7 @@ export class TrackBar {
     this.#forward = button("track-forward", () => actions.track("forward"));
     this.#pause = button("track-pause", () => actions.togglePause());
     this.#stop = button("track-stop", () => actions.stopTracking());
-    this.#follow.addEventListener("change", () => {
-      actions.follow(this.#follow.checked);
-      this.#follow.blur();
-    });
+    onChange(this.#follow, () => actions.follow(this.#follow.checked));
     store.on(["state", "connected", "range"], () => this.#showRun());
   }
 

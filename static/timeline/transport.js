@@ -1,6 +1,6 @@
 /** Transport row above the timeline: playback, current frame, its marks and source, and the legend. */
 
-import { button, byId, make } from "../widgets/elements.js";
+import { button, byId, make, onChange } from "../widgets/elements.js";
 import { clock } from "../widgets/text.js";
 import { earlierCalibration, personCells } from "../model/selectors.js";
 import { SOURCES, STATUSES as CELL_STATUSES } from "../model/cells.js";
@@ -39,10 +39,7 @@ export class Transport {
     this.#every = button("every-frame", () => playback.toggleEveryFrame());
     this.#keyframe = button("toggle-keyframe", () => actions.toggleMark("keyframe"));
     this.#reviewed = button("toggle-reviewed", () => actions.toggleMark("reviewed"));
-    this.#rate.addEventListener("change", () => {
-      playback.setRate(Number(this.#rate.value));
-      this.#rate.blur();
-    });
+    onChange(this.#rate, () => playback.setRate(Number(this.#rate.value)));
     this.#frame.addEventListener("focus", () => this.#frame.select());
     this.#frame.addEventListener("change", () => {
       const wanted = this.#frame.valueAsNumber;

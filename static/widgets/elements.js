@@ -79,6 +79,19 @@ function onPress(element, run) {
 }
 
 /**
+ * Call a function when a field has changed, which then loses focus, so that Space still plays.
+ *
+ * @param {HTMLSelectElement | HTMLInputElement} field
+ * @param {() => void} act
+ */
+export function onChange(field, act) {
+  field.addEventListener("change", () => {
+    act();
+    field.blur();
+  });
+}
+
+/**
  * Find a button and call a function on click.
  *
  * @param {string} id

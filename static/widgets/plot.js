@@ -1,5 +1,6 @@
 /** Plot with two numeric axes. Sizes are CSS pixels. */
 
+import { drawWithin, setText } from "./canvas.js";
 import { roundUp } from "./frame_axis.js";
 
 const LEFT = 44;
@@ -58,9 +59,7 @@ export class Plot {
   drawFrame(context, style, unit) {
     context.fillStyle = style.getPropertyValue("--plot");
     context.fillRect(this.left, this.top, this.right - this.left, this.bottom - this.top);
-    context.font = "10.5px system-ui, sans-serif";
-    context.textAlign = "right";
-    context.textBaseline = "middle";
+    setText(context, "right", "middle");
     for (const value of ticks(this.ys, TICK_Y / (this.bottom - this.top))) {
       const y = Math.round(this.y(value));
       context.fillStyle = style.getPropertyValue("--line");
@@ -110,12 +109,7 @@ export class Plot {
    * @param {() => void} draw
    */
   within(context, draw) {
-    context.save();
-    context.beginPath();
-    context.rect(this.left, this.top, this.right - this.left, this.bottom - this.top);
-    context.clip();
-    draw();
-    context.restore();
+    drawWithin(context, this, draw);
   }
 }
 
