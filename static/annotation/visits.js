@@ -33,5 +33,4 @@ export class Visits {
     if (state?.person !== person || (point && state.point !== point)) actions.selectPerson(person, point);
     this.#zoomTo(points.length ? { person, frame, points } : null);
   }
-
 }

@@ -42,8 +42,6 @@ export class PaneCorner {
     this.#label.append(number, title, this.#joint);
     this.#label.title = `Camera ${camera + 1}, ${name}: press ${keysOf(camera)} or double-click to fill the grid`;
 
-
-
     this.#scale.append("0", make("i"), this.#limit);
     this.#fit = toolButton("Whole", "Show the whole image (0)", `Show the whole image of ${name}`);
     this.#fit.classList.add("pane-reset");

@@ -11,7 +11,6 @@ import { KINDS } from "./jumps.js";
  * @typedef {import("./playback.js").Playback} Playback
  */
 
-
 /**
  * @param {import("../model/navigation.js").Navigation} navigation
  * @param {Playback} playback
