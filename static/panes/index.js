@@ -5,14 +5,14 @@
  */
 
 import { byId } from "../widgets/elements.js";
-import { ViewRequest } from "../model/view_request.js";
+import { requestViews } from "../model/view_request.js";
 import { Gestures } from "./gestures.js";
 import { ImageToneMenu } from "./image_tone_menu.js";
 import { LayersMenu } from "./layers_menu.js";
 import { paneBindings } from "./pane_keys.js";
 import { PaneGrid } from "./pane_grid.js";
-import { PlaceholderFrames } from "./placeholder_frames.js";
-import { PoseLegend } from "./pose_legend.js";
+import { showPlaceholders } from "./placeholder_frames.js";
+import { mountPoseLegend } from "./pose_legend.js";
 
 /** @typedef {ReturnType<typeof mount>} Panes */
 
@@ -27,8 +27,8 @@ export function mount({ store, send, say, latency, layers, imageTones, recentIma
   const toneMenu = new ImageToneMenu(store, imageTones);
   const grid = new PaneGrid(byId("panes", HTMLElement), store, latency, toneMenu.toggle.bind(toneMenu));
   grid.addPointerTarget(gestures);
-  new PlaceholderFrames(store, recentImages);
-  new ViewRequest(store, send);
-  new PoseLegend(store);
+  showPlaceholders(store, recentImages);
+  requestViews(store, send);
+  mountPoseLegend(store);
   return { grid, gestures, bindings: paneBindings({ store, grid, gestures, layers, layersMenu, say }) };
 }

@@ -26,19 +26,14 @@ const NAMES = {
   other_copy: (_state, _calibration, copy) => copy || "other copy",
 };
 
-export class PoseLegend {
-  #store;
-  #element = byId("pose-legend", HTMLElement);
-  #shown = "";
+/** @param {import("../model/store.js").Store} store */
+export function mountPoseLegend(store) {
+  const element = byId("pose-legend", HTMLElement);
+  let shown = "";
+  store.on(["state", "overlay", "calibration", "showsMisfits", "layers"], show);
 
-  /** @param {import("../model/store.js").Store} store */
-  constructor(store) {
-    this.#store = store;
-    store.on(["state", "overlay", "calibration", "showsMisfits", "layers"], () => this.#show());
-  }
-
-  #show() {
-    const { state, overlay, layers, session, calibration, otherCopy } = this.#store.facts;
+  function show() {
+    const { state, overlay, layers, session, calibration, otherCopy } = store.facts;
     if (!state || !overlay) return;
     const replay = state.replay && `Replay of run ${state.replay.run}, step ${state.replay.step + 1} of ${state.replay.steps}`;
     /** @type {Map<Kind, string>} colours of the kinds that are visible */
@@ -54,13 +49,13 @@ export class PoseLegend {
     if (replay && colors.has("model")) {
       lines.unshift({ kind: "model", color: session?.people[state.person].color ?? "#fff", text: "best pose so far" });
     }
-    const misfits = shownMisfits(this.#store.facts).length > 0 ? `misfit × ${calibration?.misfit_factor}` : "";
+    const misfits = shownMisfits(store.facts).length > 0 ? `misfit × ${calibration?.misfit_factor}` : "";
     const texts = [misfits, replay, ...(replay && !colors.has("model") ? ["contours are hidden"] : []), replay && "Esc exits"];
     const described = JSON.stringify([texts, lines]);
-    if (described === this.#shown) return;
-    this.#shown = described;
-    this.#element.hidden = !replay && !misfits && lines.length === 0;
-    this.#element.replaceChildren(...texts.filter(Boolean).map((text) => entry(text ?? "")), ...lines.map((line) => entry(line.text, line)));
+    if (described === shown) return;
+    shown = described;
+    element.hidden = !replay && !misfits && lines.length === 0;
+    element.replaceChildren(...texts.filter(Boolean).map((text) => entry(text ?? "")), ...lines.map((line) => entry(line.text, line)));
   }
 }
 

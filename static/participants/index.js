@@ -8,7 +8,7 @@ import { byId } from "../widgets/elements.js";
 import { inArea } from "../widgets/key_matching.js";
 import { Here } from "./here.js";
 import { joinForm } from "./join_form.js";
-import { PlaceMarks } from "./place_marks.js";
+import { mountPlaceMarks } from "./place_marks.js";
 import { showRole } from "./role_badge.js";
 
 /** @typedef {ReturnType<typeof mount>} ParticipantsRoom */
@@ -21,7 +21,7 @@ import { showRole } from "./role_badge.js";
 export function mount(context) {
   showRole(context.store);
   const here = new Here(context, joinForm(context, "panel"));
-  new PlaceMarks(byId("timeline", HTMLElement), context.store);
+  mountPlaceMarks(byId("timeline", HTMLElement), context.store);
   const bar = byId("join-bar", HTMLElement);
   bar.append(joinForm(context, "bar").form);
   context.store.on(["presence", "session"], () => {

@@ -9,27 +9,20 @@ const WIDTH_PX = 22;
 /** Distance of one below the other, and the number of steps at most: the timeline has no more room. */
 const [STEP_PX, MAX_STEPS] = [13, 2];
 
-export class PlaceMarks {
-  #timeline;
-  #store;
-  #layer = make("div", "place-marks");
+/**
+ * @param {HTMLElement} timeline
+ * @param {import("../model/store.js").Store} store
+ */
+export function mountPlaceMarks(timeline, store) {
+  const layer = make("div", "place-marks");
+  layer.setAttribute("aria-hidden", "true"); // the list of people says the same
+  timeline.append(layer);
+  new ResizeObserver(() => show()).observe(timeline);
+  store.on(["presence", "session", "visible"], show);
 
-  /**
-   * @param {HTMLElement} timeline
-   * @param {import("../model/store.js").Store} store
-   */
-  constructor(timeline, store) {
-    this.#timeline = timeline;
-    this.#store = store;
-    this.#layer.setAttribute("aria-hidden", "true"); // the list of people says the same
-    timeline.append(this.#layer);
-    new ResizeObserver(() => this.#show()).observe(timeline);
-    store.on(["presence", "session", "visible"], () => this.#show());
-  }
-
-  #show() {
-    const { presence, session, visible } = this.#store.facts;
-    const axis = new FrameAxis(this.#timeline.clientWidth, session?.n_frames ?? 1, visible);
+  function show() {
+    const { presence, session, visible } = store.facts;
+    const axis = new FrameAxis(timeline.clientWidth, session?.n_frames ?? 1, visible);
     const others = (presence?.people ?? []).map((person, index) => ({ person, index })).filter(({ person }) => !person.is_self);
     const shown = others.filter(({ person }) => axis.shows(person.frame));
     const marks = shown.map(({ person, index }, at) => {
@@ -40,6 +33,6 @@ export class PlaceMarks {
       mark.style.setProperty("--participant", colorOf(index));
       return mark;
     }); // prettier-ignore
-    this.#layer.replaceChildren(...marks);
+    layer.replaceChildren(...marks);
   }
 }

@@ -2,30 +2,23 @@
 
 import { personCells } from "../model/selectors.js";
 import { byId } from "../widgets/elements.js";
-import { Menu } from "../widgets/menu.js";
+import { mountMenu } from "../widgets/menu.js";
 
 const MAX_KEYFRAMES = 12;
 
-export class CopyMenu {
-  #store;
-  #posing;
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("./posing.js").Posing} posing
-   */
-  constructor(store, posing) {
-    this.#store = store;
-    this.#posing = posing;
-    new Menu(byId("copy-pose", HTMLButtonElement), byId("copy-menu", HTMLElement), () => this.#items());
-  }
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("./posing.js").Posing} posing
+ */
+export function mountCopyMenu(store, posing) {
+  mountMenu(byId("copy-pose", HTMLButtonElement), byId("copy-menu", HTMLElement), () => items());
 
   /** @returns {{items: import("../widgets/menu.js").MenuItem[], note?: string}} */
-  #items() {
-    const { shown, session, state } = this.#store.facts;
+  function items() {
+    const { shown, session, state } = store.facts;
     if (!shown || !session) return { items: [] };
     const here = shown.frame;
-    const cells = personCells(this.#store.facts);
+    const cells = personCells(store.facts);
     const keyframes = [...cells]
       .filter(([frame, cell]) => cell.keyframe && frame !== here)
       .map(([frame]) => frame)
@@ -34,10 +27,10 @@ export class CopyMenu {
       .sort((a, b) => a - b);
     const others = [...session.people.entries()].filter(([person]) => person !== (state?.person ?? 0));
     const items = [
-      ...others.map(([person, { name }]) => this.#ofPerson(name, person)),
-      this.#item("Previous frame", "Alt+,", here - 1, cells.has(here - 1)),
-      this.#item("Next frame", "Alt+.", here + 1, cells.has(here + 1)),
-      ...keyframes.map((frame) => this.#item(`Keyframe ${frame}`, away(frame - here), frame, true)),
+      ...others.map(([person, { name }]) => ofPerson(name, person)),
+      item("Previous frame", "Alt+,", here - 1, cells.has(here - 1)),
+      item("Next frame", "Alt+.", here + 1, cells.has(here + 1)),
+      ...keyframes.map((frame) => item(`Keyframe ${frame}`, away(frame - here), frame, true)),
     ];
     const note = keyframes.length ? undefined : "No other keyframes. A frame becomes a keyframe when you edit its pose.";
     return { items, note };
@@ -49,18 +42,18 @@ export class CopyMenu {
    * @param {number} frame
    * @param {boolean} hasPose
    */
-  #item(text, note, frame, hasPose) {
+  function item(text, note, frame, hasPose) {
     const title = hasPose ? `Copy the pose of frame ${frame}` : `Frame ${frame} has no pose`;
-    return { text, note: hasPose ? note : "no pose", title, isDisabled: !hasPose, run: () => this.#posing.copyFrom(frame) };
+    return { text, note: hasPose ? note : "no pose", title, isDisabled: !hasPose, run: () => posing.copyFrom(frame) };
   }
 
   /**
    * @param {string} name
    * @param {number} person
    */
-  #ofPerson(name, person) {
+  function ofPerson(name, person) {
     const title = `Copy the joint angles of ${name}; position and orientation stay`;
-    return { text: name, note: "this frame", title, run: () => this.#posing.copyPerson(person) };
+    return { text: name, note: "this frame", title, run: () => posing.copyPerson(person) };
   }
 }
 

@@ -9,47 +9,41 @@ const STORED_OPEN = "quadrille.parts-open";
 /** Cost of a full bar; higher costs look the same. */
 const FULL_PX = 6;
 
-export class FrameCard {
-  #store;
-  #card = byId("frame-card", HTMLDetailsElement);
-  #badge = byId("frame-status", HTMLElement);
-  #remark = byId("frame-remark", HTMLElement);
-  #why = byId("show-reason", HTMLButtonElement);
-  #parts = byId("frame-parts", HTMLElement);
-  #other;
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("./posing.js").Posing} posing
+ */
+export function mountFrameCard(store, posing) {
+  const card = byId("frame-card", HTMLDetailsElement);
+  const statusBadge = byId("frame-status", HTMLElement);
+  const remarkText = byId("frame-remark", HTMLElement);
+  const why = byId("show-reason", HTMLButtonElement);
+  const parts = byId("frame-parts", HTMLElement);
+  const other = button("take-alternative", () => posing.takeAlternative());
+  card.open = localStorage.getItem(STORED_OPEN) === "yes";
+  card.addEventListener("toggle", () => {
+    localStorage.setItem(STORED_OPEN, card.open ? "yes" : "no");
+    show();
+  });
+  store.on(["state", "keyframeDoubts", "reason"], show);
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("./posing.js").Posing} posing
-   */
-  constructor(store, posing) {
-    this.#store = store;
-    this.#other = button("take-alternative", () => posing.takeAlternative());
-    this.#card.open = localStorage.getItem(STORED_OPEN) === "yes";
-    this.#card.addEventListener("toggle", () => {
-      localStorage.setItem(STORED_OPEN, this.#card.open ? "yes" : "no");
-      this.#show();
-    });
-    store.on(["state", "keyframeDoubts", "reason"], () => this.#show());
-  }
-
-  #show() {
-    const { state, session } = this.#store.facts;
+  function show() {
+    const { state, session } = store.facts;
     if (!state || !session) return;
     const { status, remark, part_costs_px, person, people } = state;
-    this.#other.hidden = !people.some(({ alternatives, shown }) => alternatives > 0 && shown);
-    const doubt = keyframeDoubt(this.#store.facts, state.frame, person);
-    this.#card.hidden = !doubt && status === "" && part_costs_px.length === 0;
-    this.#badge.className = `status-badge is-${doubt ? "doubtful" : status}`;
-    this.#badge.textContent = doubt ? "check" : state.is_checked ? "being assessed" : status || "not assessed";
-    this.#remark.textContent = doubt
+    other.hidden = !people.some(({ alternatives, shown }) => alternatives > 0 && shown);
+    const doubt = keyframeDoubt(store.facts, state.frame, person);
+    card.hidden = !doubt && status === "" && part_costs_px.length === 0;
+    statusBadge.className = `status-badge is-${doubt ? "doubtful" : status}`;
+    statusBadge.textContent = doubt ? "check" : state.is_checked ? "being assessed" : status || "not assessed";
+    remarkText.textContent = doubt
       ? `This keyframe disagrees ${contradictions(doubt, session).join("; ")}. Correct it, or keep it (Alt+Enter).`
-      : [remark, reasonOf(this.#store.facts)].filter(Boolean).join(" · ");
-    this.#why.hidden = status !== "doubtful" && status !== "lost" && !doubt;
-    if (this.#card.hidden || !this.#card.open) return;
+      : [remark, reasonOf(store.facts)].filter(Boolean).join(" · ");
+    why.hidden = status !== "doubtful" && status !== "lost" && !doubt;
+    if (card.hidden || !card.open) return;
     const names = session.people[person].parts;
     const cells = leftBesideRight(names).flatMap((part) => (part === null ? gap() : row(names[part], part_costs_px[part] ?? null)));
-    this.#parts.replaceChildren(...(part_costs_px.length ? cells : []));
+    parts.replaceChildren(...(part_costs_px.length ? cells : []));
   }
 }
 

@@ -6,10 +6,10 @@
 
 import { byId } from "../widgets/elements.js";
 import { EpipolarCheck } from "./epipolar_check.js";
-import { FrameCard } from "./frame_card.js";
+import { mountFrameCard } from "./frame_card.js";
 import { JointBar } from "./joint_bar.js";
 import { PoseNotes } from "./pose_notes.js";
-import { PinBar } from "./pin_bar.js";
+import { mountPinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
 import { epipolarBindings, noteBindings, pinBindings, posingBindings } from "./posing_keys.js";
@@ -29,8 +29,8 @@ export function mount({ store, send, say, reasons, actions }, { grid }) {
   grid.addPointerTarget(epipolar); // before pins and joints
   const posing = new Posing(store, send);
   const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, say);
-  new FrameCard(store, posing);
-  new PinBar(store, pinning);
+  mountFrameCard(store, posing);
+  mountPinBar(store, pinning);
   const notes = new PoseNotes({ store, actions, pinning, grid });
   const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...epipolarBindings(epipolar, reasons.away), ...noteBindings(notes, reasons.away)];
   return { posing, pinning, epipolar, bindings };

@@ -1,6 +1,6 @@
 /** Bar below the views: selected joint, degrees of freedom as numbers, locks, step sizes and edits of the whole pose. */
 
-import { CopyMenu } from "./copy_menu.js";
+import { mountCopyMenu } from "./copy_menu.js";
 import { meaning, shortName } from "./dof_names.js";
 import { button, byId, icon, make, onChange } from "../widgets/elements.js";
 import { numberField } from "../widgets/number_field.js";
@@ -42,7 +42,7 @@ export class JointBar {
     button("mirror-pose", () => posing.mirror());
     button("reset-limb", () => posing.resetLimb());
     onChange(this.#joint, () => posing.selectPoint(this.#joint.value));
-    new CopyMenu(store, posing);
+    mountCopyMenu(store, posing);
     this.#addStep("step-cm", "cm", "Step of the arrow keys in centimetres (Shift: ×10, Ctrl: ×0.1)");
     this.#addStep("step-deg", "deg", "Step of + and - in degrees");
     // The wheel scrolls a long row of fields sideways.

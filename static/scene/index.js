@@ -9,7 +9,7 @@ import { drawsInSoftware } from "../widgets/webgl.js";
 import { loadScene } from "./appearance.js";
 import { CameraView } from "./camera_view.js";
 import { Floor } from "./floor.js";
-import { ScenePause } from "./pause.js";
+import { pauseScene } from "./pause.js";
 import { sceneBindings } from "./scene_keys.js";
 
 /** @typedef {ReturnType<typeof mount>} SceneRoom */
@@ -28,7 +28,7 @@ export function mount({ store, send, reasons }, { grid }) {
   const floor = new Floor(byId("panes", HTMLElement), store, grid, send);
   const cameraView = new CameraView(store, grid, send);
   const isSoftware = drawsInSoftware();
-  if (isSoftware) new ScenePause(frame, store);
+  if (isSoftware) pauseScene(frame, store);
   loadLate(frame, store, isSoftware);
   return { frame, floor, isSoftware, bindings: sceneBindings(cameraView, floor, reasons.away) };
 }

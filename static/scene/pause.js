@@ -10,49 +10,42 @@ const SETTLED_MS = 250;
 /** No delay for this long after loading, when the view fades in, and after resizing, when it is empty. */
 const [LOADED_MS, RESIZED_MS] = [8000, 500];
 
-export class ScenePause {
-  #scene;
-  #store;
-  #sought = -Infinity;
-  #drawn = -Infinity;
-  #freeUntil = -Infinity;
-
-  /**
-   * @param {HTMLIFrameElement} scene
-   * @param {import("../model/store.js").Store} store
-   */
-  constructor(scene, store) {
-    this.#scene = scene;
-    this.#store = store;
-    store.on(["target", "shown"], () => (this.#sought = performance.now()));
-    scene.addEventListener("load", () => {
-      this.#release(LOADED_MS);
-      if (scene.contentWindow) this.#holdBack(scene.contentWindow);
-    });
-    new ResizeObserver(() => this.#release(RESIZED_MS)).observe(scene);
-  }
+/**
+ * @param {HTMLIFrameElement} scene
+ * @param {import("../model/store.js").Store} store
+ */
+export function pauseScene(scene, store) {
+  let sought = -Infinity;
+  let drawn = -Infinity;
+  let freeUntil = -Infinity;
+  store.on(["target", "shown"], () => (sought = performance.now()));
+  scene.addEventListener("load", () => {
+    release(LOADED_MS);
+    if (scene.contentWindow) holdBack(scene.contentWindow);
+  });
+  new ResizeObserver(() => release(RESIZED_MS)).observe(scene);
 
   /** @param {number} forMs */
-  #release(forMs) {
-    this.#freeUntil = Math.max(this.#freeUntil, performance.now() + forMs);
+  function release(forMs) {
+    freeUntil = Math.max(freeUntil, performance.now() + forMs);
   }
 
   /** Whether an animation frame must wait. */
-  get #waits() {
-    const { state, dragging, shown, target } = this.#store.facts;
-    if (this.#scene.closest(".is-scene-folded")) return true;
+  function waits() {
+    const { state, dragging, shown, target } = store.facts;
+    if (scene.closest(".is-scene-folded")) return true;
     const now = performance.now();
-    if (now < this.#freeUntil) return false;
+    if (now < freeUntil) return false;
     if (dragging) return true;
     // No delay while the user works with it, or while it shows a camera's view together with the image.
-    if (this.#scene.matches(":hover") || (state?.snapped ?? null) !== null) return false;
-    const isPassing = shown?.frame !== target || now < this.#sought + SETTLED_MS;
+    if (scene.matches(":hover") || (state?.snapped ?? null) !== null) return false;
+    const isPassing = shown?.frame !== target || now < sought + SETTLED_MS;
     const isAtWork = state?.job.running || state?.track.running;
-    return (isPassing || isAtWork) && now < this.#drawn + THROTTLE_MS;
+    return (isPassing || isAtWork) && now < drawn + THROTTLE_MS;
   }
 
   /** @param {Window} view whose animation frames are delayed until it is reloaded */
-  #holdBack(view) {
+  function holdBack(view) {
     const request = view.requestAnimationFrame.bind(view);
     const cancel = view.cancelAnimationFrame.bind(view);
     /** @type {Map<number, number>} delayed requests, with the browser's current number for each */
@@ -60,12 +53,12 @@ export class ScenePause {
     view.requestAnimationFrame = (callback) => {
       const attempt = () =>
         request((time) => {
-          if (this.#waits) {
+          if (waits()) {
             waiting.set(number, attempt());
             return;
           }
           waiting.delete(number);
-          this.#drawn = performance.now();
+          drawn = performance.now();
           callback(time);
         });
       const number = attempt();

@@ -10,122 +10,113 @@ import { displayName } from "../widgets/text.js";
 
 const UNITS = { rad: { factor: 180 / Math.PI, sign: "°" }, m: { factor: 100, sign: " cm" } };
 
-export class CostLandscape {
-  #store;
-  #send;
-  #element = byId("landscape", HTMLElement);
-  #controls = byId("landscape-controls", HTMLElement);
-  #canvas = make("canvas");
-  #choice = make("select", { title: "Degree of freedom to vary; all others stay fixed", "aria-label": "Degree of freedom" });
-  #legend = make("div", "landscape-legend");
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ */
+export function mountCostLandscape(store, send) {
+  const element = byId("landscape", HTMLElement);
+  const controls = byId("landscape-controls", HTMLElement);
+  const canvas = make("canvas");
+  const choice = make("select", { title: "Degree of freedom to vary; all others stay fixed", "aria-label": "Degree of freedom" });
+  const legend = make("div", "landscape-legend");
   /** Text shown until there is a landscape. */
-  #waiting = make("p", "landscape-waiting");
-  #toMinimum;
-  #hovered = /** @type {number | null} */ (null);
-  #plot = /** @type {Plot | null} */ (null);
-  #isOpen = false;
+  const waiting = make("p", "landscape-waiting");
+  let hovered = /** @type {number | null} */ (null);
+  let lastPlot = /** @type {Plot | null} */ (null);
+  let isShown = false;
   /** The names that the list of degrees of freedom was built for. */
-  #listed = "";
+  let listed = "";
+  onChange(choice, () => send({ type: "landscape", dof: choice.value }));
+  const toMinimum = textButton("To minimum", "Set this degree of freedom to the minimum of the cost", () => {
+    const found = store.facts.landscape;
+    if (found) setTo(found.values[indexOfMin(found.total)]);
+  });
+  controls.append(choice, toMinimum, legend);
+  element.append(canvas, waiting);
+  store.subscribe((changed) => {
+    if (changed.has("drawer")) open();
+    if (!isShown) return;
+    if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "landscape" });
+    if (changed.has("drawer") || changed.has("dof") || changed.has("connected")) followSelection();
+    if (changed.has("landscape") || changed.has("session")) show();
+  });
+  new ResizeObserver(() => draw()).observe(element);
+  store.on(["theme"], show);
+  listen();
+  open();
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   */
-  constructor(store, send) {
-    this.#store = store;
-    this.#send = send;
-    onChange(this.#choice, () => send({ type: "landscape", dof: this.#choice.value }));
-    this.#toMinimum = textButton("To minimum", "Set this degree of freedom to the minimum of the cost", () => {
-      const found = store.facts.landscape;
-      if (found) this.#setTo(found.values[indexOfMin(found.total)]);
-    });
-    this.#controls.append(this.#choice, this.#toMinimum, this.#legend);
-    this.#element.append(this.#canvas, this.#waiting);
-    store.subscribe((changed) => {
-      if (changed.has("drawer")) this.#open();
-      if (!this.#isOpen) return;
-      if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "landscape" });
-      if (changed.has("drawer") || changed.has("dof") || changed.has("connected")) this.#followSelection();
-      if (changed.has("landscape") || changed.has("session")) this.#show();
-    });
-    new ResizeObserver(() => this.#draw()).observe(this.#element);
-    store.on(["theme"], () => this.#show());
-    this.#listen();
-    this.#open();
-  }
-
-  #open() {
-    const { drawer, connected } = this.#store.facts;
+  function open() {
+    const { drawer, connected } = store.facts;
     const isOpen = drawer === "landscape";
-    this.#element.hidden = this.#controls.hidden = !isOpen;
-    if (isOpen === this.#isOpen) return;
-    this.#isOpen = isOpen;
-    if (connected && (isOpen || drawer !== "search")) this.#send({ type: "watch", tab: isOpen ? "landscape" : null });
-    if (isOpen) this.#show();
+    element.hidden = controls.hidden = !isOpen;
+    if (isOpen === isShown) return;
+    isShown = isOpen;
+    if (connected && (isOpen || drawer !== "search")) send({ type: "watch", tab: isOpen ? "landscape" : null });
+    if (isOpen) show();
   }
 
   /** Show the degree of freedom that the keys change, if a joint is selected. */
-  #followSelection() {
-    const { state, session, dof, connected } = this.#store.facts;
+  function followSelection() {
+    const { state, session, dof, connected } = store.facts;
     const info = state?.point && dof !== null ? session?.people[state.person].dofs[dof] : undefined;
-    if (info && connected) this.#send({ type: "landscape", dof: `${info.joint}.${info.name}` });
+    if (info && connected) send({ type: "landscape", dof: `${info.joint}.${info.name}` });
   }
 
-  #listen() {
-    const element = this.#element;
+  function listen() {
     element.addEventListener("pointermove", (event) => {
-      const found = this.#store.facts.landscape;
-      if (!found || !this.#plot) return;
-      const value = this.#plot.valueAt(event.clientX - element.getBoundingClientRect().left) / UNITS[found.unit].factor;
-      this.#hovered = nearest(found.values, value);
-      requestAnimationFrame(() => this.#draw());
+      const found = store.facts.landscape;
+      if (!found || !lastPlot) return;
+      const value = lastPlot.valueAt(event.clientX - element.getBoundingClientRect().left) / UNITS[found.unit].factor;
+      hovered = nearest(found.values, value);
+      requestAnimationFrame(() => draw());
     });
     element.addEventListener("pointerleave", () => {
-      this.#hovered = null;
-      this.#draw();
+      hovered = null;
+      draw();
     });
     element.addEventListener("click", () => {
-      const found = this.#store.facts.landscape;
-      if (found && this.#hovered !== null) this.#setTo(found.values[this.#hovered]);
+      const found = store.facts.landscape;
+      if (found && hovered !== null) setTo(found.values[hovered]);
     });
   }
 
   /** @param {number} value rad or metres */
-  #setTo(value) {
-    const found = this.#store.facts.landscape;
-    if (found) this.#send({ type: "landscape_set", person: found.person, dof: found.dof, value });
+  function setTo(value) {
+    const found = store.facts.landscape;
+    if (found) send({ type: "landscape_set", person: found.person, dof: found.dof, value });
   }
 
-  #show() {
-    const { landscape: found, session, state } = this.#store.facts;
-    this.#toMinimum.disabled = this.#choice.disabled = !found;
-    this.#waiting.hidden = Boolean(found);
-    this.#waiting.textContent = state?.compiling
+  function show() {
+    const { landscape: found, session, state } = store.facts;
+    toMinimum.disabled = choice.disabled = !found;
+    waiting.hidden = Boolean(found);
+    waiting.textContent = state?.compiling
       ? "The cost is sampled once the kernels are compiled."
       : "Sampling the cost along one degree of freedom…";
-    if (found && found.names.join() !== this.#listed) {
-      this.#listed = found.names.join();
+    if (found && found.names.join() !== listed) {
+      listed = found.names.join();
       const groups = new Map(found.names.map((name) => [name.split(".")[0], make("optgroup")]));
       for (const [joint, group] of groups) group.label = displayName(joint);
       for (const name of found.names) groups.get(name.split(".")[0])?.append(new Option(displayName(name).replace(".", " "), name));
-      this.#choice.replaceChildren(...groups.values());
+      choice.replaceChildren(...groups.values());
     }
     if (found) {
-      this.#choice.value = found.names[found.dof];
+      choice.value = found.names[found.dof];
       const labels = ["mean", ...(session?.cameras.map(({ name }) => name) ?? [])];
-      this.#legend.replaceChildren(...["", ...labels].map((label, index) => legendEntry(label, index - 1)));
+      legend.replaceChildren(...["", ...labels].map((label, index) => legendEntry(label, index - 1)));
     }
-    this.#draw();
+    draw();
   }
 
-  #draw() {
-    const { clientWidth, clientHeight } = this.#element;
-    if (clientWidth === 0 || !this.#isOpen) return;
-    const context = prepare(this.#canvas, clientWidth, clientHeight, true);
-    const found = this.#store.facts.landscape;
+  function draw() {
+    const { clientWidth, clientHeight } = element;
+    if (clientWidth === 0 || !isShown) return;
+    const context = prepare(canvas, clientWidth, clientHeight, true);
+    const found = store.facts.landscape;
     if (!found) return;
     const { factor, sign } = UNITS[found.unit];
-    const style = getComputedStyle(this.#element);
+    const style = getComputedStyle(element);
     const curves = [found.total, ...found.views];
     const known = curves.flatMap((curve) => [...curve].filter(Number.isFinite));
     const [min, max] = [Math.min(...known, found.current_px ?? Infinity), Math.max(...known)];
@@ -134,7 +125,7 @@ export class CostLandscape {
     const range = { min: xs[0], max: xs[xs.length - 1] };
     const costs = { min: Math.max(0, min - margin), max: max + margin };
     const plot = new Plot(clientWidth, clientHeight, range, costs);
-    this.#plot = plot;
+    lastPlot = plot;
     plot.drawFrame(context, style, sign);
     plot.within(context, () => {
       curves.slice(1).forEach((curve, view) => {
@@ -148,8 +139,8 @@ export class CostLandscape {
       context.lineWidth = 2.25;
       plot.drawLine(context, xs, found.total);
     });
-    this.#drawMarks(context, plot, found, factor, style);
-    this.#readOut(found, this.#hovered, factor, sign);
+    drawMarks(context, plot, found, factor, style);
+    readOut(found, hovered, factor, sign);
   }
 
   /**
@@ -161,7 +152,7 @@ export class CostLandscape {
    * @param {number} factor
    * @param {CSSStyleDeclaration} style
    */
-  #drawMarks(context, plot, found, factor, style) {
+  function drawMarks(context, plot, found, factor, style) {
     const height = plot.bottom - plot.top;
     const now = plot.x(found.current * factor);
     context.fillStyle = context.strokeStyle = style.getPropertyValue("--text");
@@ -177,9 +168,9 @@ export class CostLandscape {
     context.arc(x, y, 4.5, 0, 2 * Math.PI);
     context.lineWidth = 2;
     context.stroke();
-    if (this.#hovered !== null) {
+    if (hovered !== null) {
       context.globalAlpha = 0.5;
-      context.fillRect(plot.x(found.values[this.#hovered] * factor) - 0.5, plot.top, 1, height);
+      context.fillRect(plot.x(found.values[hovered] * factor) - 0.5, plot.top, 1, height);
       context.globalAlpha = 1;
     }
   }
@@ -190,17 +181,17 @@ export class CostLandscape {
    * @param {number} factor
    * @param {string} sign
    */
-  #readOut(found, hovered, factor, sign) {
+  function readOut(found, hovered, factor, sign) {
     const min = indexOfMin(found.total);
     const at = hovered ?? nearest(found.values, found.current);
     const value = hovered === null ? found.current : found.values[at];
-    const outputs = this.#legend.querySelectorAll("output");
+    const outputs = legend.querySelectorAll("output");
     const costs = [found.total, ...found.views].map((curve) => (Number.isFinite(curve[at]) ? curve[at].toFixed(2) : "–"));
     const texts = [`${(value * factor).toFixed(1)}${sign}`, ...costs];
     outputs.forEach((output, index) => (output.textContent = texts[index] ?? ""));
     const best = `${(found.values[min] * factor).toFixed(1)}${sign}`;
-    this.#toMinimum.title = `Set it to ${best}, the minimum of the mean cost (${found.total[min].toFixed(2)} px). Can be undone`;
-    this.#element.title = hovered === null ? "" : "Click to set the value";
+    toMinimum.title = `Set it to ${best}, the minimum of the mean cost (${found.total[min].toFixed(2)} px). Can be undone`;
+    element.title = hovered === null ? "" : "Click to set the value";
   }
 }
 

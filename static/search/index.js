@@ -4,10 +4,10 @@
  * The room imports `widgets`, `model`, `panes` and `timeline`.
  */
 
-import { CostLandscape } from "./cost_landscape.js";
-import { RunComparison } from "./run_comparison.js";
+import { mountCostLandscape } from "./cost_landscape.js";
+import { mountRunComparison } from "./run_comparison.js";
 import { searchBindings } from "./search_keys.js";
-import { SearchPanel } from "./search_panel.js";
+import { mountSearchPanel } from "./search_panel.js";
 
 /** @typedef {ReturnType<typeof mount>} SearchRoom */
 
@@ -18,8 +18,8 @@ import { SearchPanel } from "./search_panel.js";
  * @param {import("../timeline/index.js").TimelineRoom} timeline
  */
 export function mount({ store, send, actions, navigation, reasons }, { drawer }) {
-  new SearchPanel(store, actions, send);
-  new CostLandscape(store, send);
-  new RunComparison(store, navigation, actions, () => drawer.open("runs"));
+  mountSearchPanel(store, actions, send);
+  mountCostLandscape(store, send);
+  mountRunComparison(store, navigation, actions, () => drawer.open("runs"));
   return { bindings: searchBindings(store, actions, reasons) };
 }

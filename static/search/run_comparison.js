@@ -11,121 +11,108 @@ import { capital, count, displayName } from "../widgets/text.js";
 /** Smallest difference of costs that counts, px: as much as is displayed. */
 const LEAST_PX = 0.005;
 
-export class RunComparison {
-  #store;
-  #navigation;
-  #actions;
-  #open;
-  #panel = byId("run-comparison", HTMLElement);
-  #controls = byId("run-comparison-controls", HTMLElement);
-  #text = byId("run-comparison-text", HTMLElement);
-  #empty = byId("run-comparison-empty", HTMLElement);
-  #table = byId("run-comparison-table", HTMLTableElement);
-  #rows = byId("run-comparison-rows", HTMLElement);
-  #heads = [byId("run-comparison-now", HTMLElement), byId("run-comparison-other", HTMLElement)];
-  #take;
-  #end;
-  #stretches = byId("run-stretches", HTMLElement);
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../model/navigation.js").Navigation} navigation
+ * @param {import("../model/actions.js").Actions} actions
+ * @param {() => void} open opens the tab
+ */
+export function mountRunComparison(store, navigation, actions, open) {
+  const panel = byId("run-comparison", HTMLElement);
+  const controls = byId("run-comparison-controls", HTMLElement);
+  const text = byId("run-comparison-text", HTMLElement);
+  const empty = byId("run-comparison-empty", HTMLElement);
+  const table = byId("run-comparison-table", HTMLTableElement);
+  const rows = byId("run-comparison-rows", HTMLElement);
+  const heads = [byId("run-comparison-now", HTMLElement), byId("run-comparison-other", HTMLElement)];
+  const stretchList = byId("run-stretches", HTMLElement);
   /** Stretches of the last run that the user has kept, by person and first frame. @type {Set<string>} */
-  #kept = new Set();
+  const kept = new Set();
   /** @type {number | null | undefined} the last run; undefined before the first message */
-  #run;
-  #wasRunning = false;
+  let lastRun;
+  let wasRunning = false;
   /** @type {import("../model/series.js").Tab | null | undefined} the open tab at the end of a run whose comparison may follow */
-  #tabAtEnd;
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("../model/navigation.js").Navigation} navigation
-   * @param {import("../model/actions.js").Actions} actions
-   * @param {() => void} open opens the tab
-   */
-  constructor(store, navigation, actions, open) {
-    this.#store = store;
-    this.#actions = actions;
-    this.#open = open;
-    this.#navigation = navigation;
-    this.#take = button("run-comparison-take", () => actions.takeReplaced());
-    this.#end = button("run-comparison-end", () => actions.compareRange(false));
-    store.subscribe((changed) => {
-      if (changed.has("state")) this.#followWork();
-      if (changed.has("rangeComparison")) this.#followRun();
-      else if (changed.has("drawer") && store.facts.drawer === null && this.#run) actions.compareRange(false);
-      const isOpen = store.facts.drawer === "runs";
-      this.#panel.hidden = this.#controls.hidden = !isOpen;
-      if (!isOpen) return;
-      if (["drawer", "rangeComparison", "state", "connected"].some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) this.#show();
-      if (changed.has("drawer") || changed.has("rangeComparison") || changed.has("target")) this.#mark();
-    });
-  }
+  let tabAtEnd;
+  const take = button("run-comparison-take", () => actions.takeReplaced());
+  const end = button("run-comparison-end", () => actions.compareRange(false));
+  store.subscribe((changed) => {
+    if (changed.has("state")) followWork();
+    if (changed.has("rangeComparison")) followRun();
+    else if (changed.has("drawer") && store.facts.drawer === null && lastRun) actions.compareRange(false);
+    const isOpen = store.facts.drawer === "runs";
+    panel.hidden = controls.hidden = !isOpen;
+    if (!isOpen) return;
+    if (["drawer", "rangeComparison", "state", "connected"].some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) show();
+    if (changed.has("drawer") || changed.has("rangeComparison") || changed.has("target")) mark();
+  });
 
   /** Note the open tab when a run ends: its comparison follows, but a tab that is opened meanwhile stays. */
-  #followWork() {
-    const isRunning = this.#isRunning;
-    if (this.#wasRunning && !isRunning) this.#tabAtEnd = this.#store.facts.drawer;
-    this.#wasRunning = isRunning;
+  function followWork() {
+    const isRunning = isAtWork();
+    if (wasRunning && !isRunning) tabAtEnd = store.facts.drawer;
+    wasRunning = isRunning;
   }
 
-  get #isRunning() {
-    const { state } = this.#store.facts;
+  function isAtWork() {
+    const { state } = store.facts;
     return !!state?.range?.running || !!state?.track.running;
   }
 
   /** Open the tab when a run has replaced poses by better or worse ones. Closing the drawer ends it. */
-  #followRun() {
-    const run = this.#store.facts.rangeComparison?.run ?? null;
-    const isFirst = this.#run === undefined; // the page was opened after the run
-    if (run === this.#run) return;
-    this.#run = run;
+  function followRun() {
+    const run = store.facts.rangeComparison?.run ?? null;
+    const isFirst = lastRun === undefined; // the page was opened after the run
+    if (run === lastRun) return;
+    lastRun = run;
     if (isFirst || run === null) return;
-    this.#kept.clear();
-    const isOther = this.#tabAtEnd !== undefined && this.#tabAtEnd !== this.#store.facts.drawer;
-    this.#tabAtEnd = undefined;
-    if (!isOther) this.#open();
+    kept.clear();
+    const isOther = tabAtEnd !== undefined && tabAtEnd !== store.facts.drawer;
+    tabAtEnd = undefined;
+    if (!isOther) open();
   }
 
-  #show() {
-    const { rangeComparison, state, session, connected } = this.#store.facts;
+  function show() {
+    const { rangeComparison, state, session, connected } = store.facts;
     const person = state?.person ?? 0;
     const poses = rangeComparison?.people[person] ?? [];
     const name = (session?.people.length ?? 1) > 1 ? ` of ${session?.people[person].name}` : "";
-    const isBusy = !connected || this.#isRunning;
-    this.#take.disabled = isBusy || poses.length === 0;
-    this.#end.disabled = !connected || !rangeComparison;
-    this.#empty.hidden = poses.length > 0;
-    this.#table.hidden = poses.length === 0;
-    this.#empty.textContent = rangeComparison
+    const isBusy = !connected || isAtWork();
+    take.disabled = isBusy || poses.length === 0;
+    end.disabled = !connected || !rangeComparison;
+    empty.hidden = poses.length > 0;
+    table.hidden = poses.length === 0;
+    empty.textContent = rangeComparison
       ? `No pose${name} in this range replaced another.`
       : "Track a range by one method, then by the other. Mark the range in the timeline and press Compare.";
     const stretches = (rangeComparison?.stretches ?? []).filter((one) => one.person === person);
     const isRun = (rangeComparison?.run ?? null) !== null;
-    this.#text.textContent = poses.length > 0 ? (isRun ? gain(stretches, poses.length, name) : summary(poses, name)) : "";
-    const open = stretches.filter((one) => !this.#kept.has(keyOf(one)));
-    this.#stretches.hidden = !isRun || open.length === 0;
-    this.#stretches.replaceChildren(...open.map((one) => this.#stretch(one, isBusy)));
-    this.#heads[0].textContent = `Present: ${methods(poses.map(({ method }) => method))}, cost in px and status`;
-    this.#heads[1].textContent = `Replaced: ${methods(poses.map(({ other_method }) => other_method))}, cost in px and status`;
+    text.textContent = poses.length > 0 ? (isRun ? gain(stretches, poses.length, name) : summary(poses, name)) : "";
+    const open = stretches.filter((one) => !kept.has(keyOf(one)));
+    stretchList.hidden = !isRun || open.length === 0;
+    stretchList.replaceChildren(...open.map((one) => stretch(one, isBusy)));
+    heads[0].textContent = `Present: ${methods(poses.map(({ method }) => method))}, cost in px and status`;
+    heads[1].textContent = `Replaced: ${methods(poses.map(({ other_method }) => other_method))}, cost in px and status`;
     const largest = Math.max(1, ...poses.map(({ apart_mm }) => apart_mm));
-    this.#rows.replaceChildren(...poses.map((pose) => this.#row(pose, largest)));
-    this.#mark();
+    rows.replaceChildren(...poses.map((pose) => makeRow(pose, largest)));
+    mark();
   }
 
   /**
    * @param {Stretch} stretch
    * @param {boolean} isBusy
    */
-  #stretch(stretch, isBusy) {
+  function stretch(stretch, isBusy) {
     const { first, last, person, verdict, frames } = stretch;
     const item = make("li", `is-${verdict}`);
     const named = first === last ? `frame ${first}` : `frames ${first}–${last}`;
-    const go = small(capital(named), `Go to frame ${first}`, () => this.#navigation.goTo(first));
+    const go = small(capital(named), `Go to frame ${first}`, () => navigation.goTo(first));
     const text = make("span", {}, `${verdict} on ${count(frames)}`);
     const keep = small("Keep", `Keep the new poses of ${named}`, () => {
-      this.#kept.add(keyOf(stretch));
-      this.#show();
+      kept.add(keyOf(stretch));
+      show();
     });
     const back = small("Take back", `Put the replaced poses of ${named} back; keyframes stay. Again takes the new ones`, () =>
-      this.#actions.takeReplaced({ person, first, last }),
+      actions.takeReplaced({ person, first, last }),
     );
     back.disabled = isBusy;
     item.append(go, text, keep, back);
@@ -136,8 +123,8 @@ export class RunComparison {
    * @param {ComparedPose} pose
    * @param {number} largest mean distance of all rows, mm
    */
-  #row(pose, largest) {
-    const row = make("tr", { "data-frame": String(pose.frame), onclick: () => this.#navigation.goTo(pose.frame) });
+  function makeRow(pose, largest) {
+    const row = make("tr", { "data-frame": String(pose.frame), onclick: () => navigation.goTo(pose.frame) });
     const head = make("th", { scope: "row" }, make("button", { type: "button", title: `Go to frame ${pose.frame}` }, String(pose.frame)));
     const [now, other] = [pose.cost_px, pose.other_cost_px];
     const apart = cell(pose.apart_mm.toFixed(1));
@@ -155,9 +142,9 @@ export class RunComparison {
     return row;
   }
 
-  #mark() {
-    const { target } = this.#store.facts;
-    for (const row of this.#rows.children) {
+  function mark() {
+    const { target } = store.facts;
+    for (const row of rows.children) {
       const isCurrent = /** @type {HTMLElement} */ (row).dataset.frame === String(target);
       if (row.classList.contains("is-current") === isCurrent) continue;
       row.classList.toggle("is-current", isCurrent);

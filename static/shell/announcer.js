@@ -4,33 +4,26 @@ import { displayName } from "../widgets/text.js";
 
 const SETTLED_MS = 400;
 
-export class Announcer {
-  #store;
-  #region;
+/**
+ * @param {HTMLElement} region
+ * @param {import("../model/store.js").Store} store
+ */
+export function mountAnnouncer(region, store) {
   /** @type {import("../model/protocol.js").StateMessage | null} what was last announced */
-  #announced = null;
-  #timer = 0;
+  let announced = null;
+  let timer = 0;
+  store.on(["state"], () => {
+    announced ??= store.facts.state;
+    clearTimeout(timer);
+    // Wait until a sequence of changes has ended.
+    timer = setTimeout(() => announce(), SETTLED_MS);
+  });
 
-  /**
-   * @param {HTMLElement} region
-   * @param {import("../model/store.js").Store} store
-   */
-  constructor(region, store) {
-    this.#region = region;
-    this.#store = store;
-    store.on(["state"], () => {
-      this.#announced ??= store.facts.state;
-      clearTimeout(this.#timer);
-      // Wait until a sequence of changes has ended.
-      this.#timer = setTimeout(() => this.#announce(), SETTLED_MS);
-    });
-  }
-
-  #announce() {
-    const { state, session, playing, dragging } = this.#store.facts;
+  function announce() {
+    const { state, session, playing, dragging } = store.facts;
     if (!state || playing || dragging || state.track.running) return;
-    const before = this.#announced ?? state;
-    this.#announced = state;
+    const before = announced ?? state;
+    announced = state;
     const words = [];
     if (state.person !== before.person) words.push(session?.people[state.person]?.name ?? "");
     if (state.point !== before.point && state.point) words.push(`${displayName(state.point)} selected`);
@@ -42,6 +35,6 @@ export class Announcer {
     }
     if (state.job.message && state.job.message !== before.job.message) words.push(state.job.message);
     if (state.track.message && state.track.message !== before.track.message) words.push(state.track.message);
-    if (words.length) this.#region.textContent = `${words.join("; ")}.`;
+    if (words.length) region.textContent = `${words.join("; ")}.`;
   }
 }

@@ -7,65 +7,58 @@ import { px } from "../widgets/text.js";
 /** Smallest change that is listed with its direction, in pixels: as much as is displayed. */
 const LEAST_PX = 0.005;
 
-export class Comparison {
-  #store;
-  #before = byId("show-comparison", HTMLButtonElement);
-  #toggle;
-  #toggleHere;
-  #cost = /** @type {HTMLElement} */ (document.querySelector(".cost"));
-  #badge = byId("before-badge", HTMLElement);
-  #panel = byId("comparison-panel", HTMLElement);
-  #title = byId("comparison-title", HTMLElement);
-  #views = byId("comparison-views", HTMLElement);
-  #warning = byId("comparison-warning", HTMLElement);
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../model/actions.js").Actions} actions
+ */
+export function mountComparison(store, actions) {
+  const beforeButton = byId("show-comparison", HTMLButtonElement);
+  const cost = /** @type {HTMLElement} */ (document.querySelector(".cost"));
+  const badge = byId("before-badge", HTMLElement);
+  const panel = byId("comparison-panel", HTMLElement);
+  const title = byId("comparison-title", HTMLElement);
+  const views = byId("comparison-views", HTMLElement);
+  const warning = byId("comparison-warning", HTMLElement);
+  const toggle = button("toggle-before", () => actions.toggleBefore());
+  const toggleHere = button("toggle-before-here", () => actions.toggleBefore());
+  opensPopover(panel, beforeButton, () => togglePopover(panel, cost));
+  store.on(["state", "connected"], show);
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("../model/actions.js").Actions} actions
-   */
-  constructor(store, actions) {
-    this.#store = store;
-    this.#toggle = button("toggle-before", () => actions.toggleBefore());
-    this.#toggleHere = button("toggle-before-here", () => actions.toggleBefore());
-    opensPopover(this.#panel, this.#before, () => togglePopover(this.#panel, this.#cost));
-    store.on(["state", "connected"], () => this.#show());
-  }
-
-  #show() {
-    const { state, connected } = this.#store.facts;
+  function show() {
+    const { state, connected } = store.facts;
     const last = state?.compared ?? null;
     const isBefore = !!last?.is_before_shown && !state?.replay;
-    this.#before.hidden = this.#toggle.hidden = !last;
-    this.#toggle.disabled = this.#toggleHere.disabled = !connected;
-    this.#toggle.setAttribute("aria-pressed", String(isBefore));
-    this.#badge.hidden = !isBefore;
+    beforeButton.hidden = toggle.hidden = !last;
+    toggle.disabled = toggleHere.disabled = !connected;
+    toggle.setAttribute("aria-pressed", String(isBefore));
+    badge.hidden = !isBefore;
     if (!state || !last) {
-      if (this.#panel.matches(":popover-open")) this.#panel.hidePopover();
+      if (panel.matches(":popover-open")) panel.hidePopover();
       return;
     }
     const was = last.before_px?.toFixed(2) ?? "–";
-    this.#before.textContent = isBefore ? "before" : `${was} →`;
-    this.#before.classList.toggle("is-warned", last.warning !== "");
-    this.#before.title = `Cost before and after the ${last.work}: ${costs(last.before_px, last.after_px)}. Click for each view`;
-    this.#badge.textContent = `Before the ${last.work}: ${px(last.before_px)} · Shift+B shows the result`;
+    beforeButton.textContent = isBefore ? "before" : `${was} →`;
+    beforeButton.classList.toggle("is-warned", last.warning !== "");
+    beforeButton.title = `Cost before and after the ${last.work}: ${costs(last.before_px, last.after_px)}. Click for each view`;
+    badge.textContent = `Before the ${last.work}: ${px(last.before_px)} · Shift+B shows the result`;
     const label = isBefore ? `Show the result of the ${last.work}` : `Show the pose before the ${last.work}`;
-    this.#toggle.title = this.#toggleHere.title = `${label} (Shift+B)`;
-    this.#toggleHere.textContent = isBefore ? "Show result" : "Show before";
-    this.#toggle.setAttribute("aria-label", label);
-    this.#list(last);
+    toggle.title = toggleHere.title = `${label} (Shift+B)`;
+    toggleHere.textContent = isBefore ? "Show result" : "Show before";
+    toggle.setAttribute("aria-label", label);
+    list(last);
   }
 
   /** @param {import("../model/protocol.js").Compared} last */
-  #list(last) {
-    const { session } = this.#store.facts;
-    this.#title.textContent = `Cost before and after the ${last.work}`;
+  function list(last) {
+    const { session } = store.facts;
+    title.textContent = `Cost before and after the ${last.work}`;
     const names = session?.cameras.map(({ name }) => name) ?? [];
-    this.#views.replaceChildren(
+    views.replaceChildren(
       ...names.map((name, i) => row(name, last.before_view_costs_px[i] ?? null, last.after_view_costs_px[i] ?? null)),
       row("Mean", last.before_px, last.after_px),
     );
-    this.#warning.hidden = last.warning === "";
-    this.#warning.textContent = last.warning;
+    warning.hidden = last.warning === "";
+    warning.textContent = last.warning;
   }
 }
 

@@ -6,8 +6,8 @@
 
 import { button, byId } from "../widgets/elements.js";
 import { leaveFields, watchTyping } from "../widgets/typing.js";
-import { Announcer } from "./announcer.js";
-import { Comparison } from "./comparison.js";
+import { mountAnnouncer } from "./announcer.js";
+import { mountComparison } from "./comparison.js";
 import { ExportPanel } from "./export_panel.js";
 import { FirstSteps } from "./first_steps.js";
 import { HistoryList } from "./history_list.js";
@@ -16,10 +16,10 @@ import { listen, orderedByArea } from "./keys.js";
 import { Notices, watchConnection } from "./notices.js";
 import { Palette } from "./palette.js";
 import { People } from "./people.js";
-import { SavedMark } from "./saved_mark.js";
+import { mountSavedMark } from "./saved_mark.js";
 import { escapeBindings, helpBindings, peopleBindings } from "./shell_keys.js";
-import { TopBar } from "./top_bar.js";
-import { WorkList } from "./work_list.js";
+import { mountTopBar } from "./top_bar.js";
+import { mountWorkList } from "./work_list.js";
 import { Workspace } from "./workspace.js";
 
 /**
@@ -48,16 +48,16 @@ export function mount(context, rooms) {
   const { posing, pinning } = rooms.posing;
   const notices = new Notices();
   context.onNotice((notice) => notices.show(notice));
-  new TopBar(store, actions);
-  new Comparison(store, actions);
+  mountTopBar(store, actions);
+  mountComparison(store, actions);
   const people = new People(store, actions, posing);
   watchConnection(byId("banner", HTMLElement), store);
   const workspace = new Workspace(store);
   const history = new HistoryList(store, send);
   const exporting = new ExportPanel(store, context.notify);
-  new WorkList(context, () => exporting.cancel());
-  new SavedMark(store, send);
-  new Announcer(byId("announcer", HTMLElement), store);
+  mountWorkList(context, () => exporting.cancel());
+  mountSavedMark(store, send);
+  mountAnnouncer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store, rooms.inspector.findPeople, rooms.sessions.showNew);
   const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });
   const keyList = new KeyList();

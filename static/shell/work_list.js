@@ -28,54 +28,37 @@ const COMPILING =
   "drawn as a skeleton and has no cost. A search or tracking run waits for the kernels that it needs.";
 const INDEXING = "The footage is indexed when it is first opened. Frames can be shown as soon as they are indexed.";
 
-export class WorkList {
-  #store;
-  #send;
-  #navigation;
-  #layers;
-  #actions;
-  #notify;
-  #cancelExport;
-  #list = byId("work", HTMLElement);
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {() => void} cancelExport
+ */
+export function mountWorkList({ store, send, navigation, layers, actions, notify }, cancelExport) {
+  const list = byId("work", HTMLElement);
   /** @type {Map<string, Shown>} */
-  #shown = new Map();
-  #failure = byId("find-failure", HTMLElement);
-  #damage = byId("damage", HTMLElement);
+  const rows = new Map();
+  const failure = byId("find-failure", HTMLElement);
+  const damage = byId("damage", HTMLElement);
   /** Whether the silhouettes are shown for the failure only. */
-  #hasSilhouettes = false;
-  #wasFinding = false;
+  let hasSilhouettes = false;
+  let wasFinding = false;
+  button("failure-look", () => lookAtSilhouettes());
+  button("failure-place", () => placeByHand());
+  button("failure-close", () => closeFailure());
+  store.on(["session"], () => (failure.hidden = true));
+  store.on(["finding"], watchFinding);
+  store.on(["state", "finding", "acquisition", "connected", "exporting"], show);
+  store.on(["state"], showDamage);
+  setInterval(() => rows.size > 0 && showFigures(), TICK_MS);
 
-  /**
-   * @param {import("../model/index.js").Context} context
-   * @param {() => void} cancelExport
-   */
-  constructor({ store, send, navigation, layers, actions, notify }, cancelExport) {
-    this.#store = store;
-    this.#send = send;
-    this.#navigation = navigation;
-    this.#layers = layers;
-    this.#actions = actions;
-    this.#notify = notify;
-    this.#cancelExport = cancelExport;
-    button("failure-look", () => this.#lookAtSilhouettes());
-    button("failure-place", () => this.#placeByHand());
-    button("failure-close", () => this.#closeFailure());
-    store.on(["session"], () => (this.#failure.hidden = true));
-    store.on(["finding"], () => this.#watchFinding());
-    store.on(["state", "finding", "acquisition", "connected", "exporting"], () => this.#show());
-    store.on(["state"], () => this.#showDamage());
-    setInterval(() => this.#shown.size > 0 && this.#showFigures(), TICK_MS);
-  }
-
-  #show() {
-    const all = this.#store.facts.connected ? this.#work() : [];
-    for (const [id, { row }] of this.#shown) {
+  function show() {
+    const all = store.facts.connected ? listWork() : [];
+    for (const [id, { row }] of rows) {
       if (all.some((work) => work.id === id)) continue;
       row.remove();
-      this.#shown.delete(id);
+      rows.delete(id);
     }
     for (const work of all) {
-      const shown = this.#shown.get(work.id) ?? this.#add(work);
+      const shown = rows.get(work.id) ?? add(work);
       shown.work = work;
       shown.text.textContent = work.text;
       shown.row.title = work.title ?? "";
@@ -84,11 +67,11 @@ export class WorkList {
       shown.bar.value = work.share ?? 0;
       shown.left.note(work.text, work.share, performance.now() / 1000);
     }
-    this.#showFigures();
+    showFigures();
   }
 
-  #showFigures() {
-    for (const { work, figures, left } of this.#shown.values()) {
+  function showFigures() {
+    for (const { work, figures, left } of rows.values()) {
       const seconds = work.share === null ? null : left.at(performance.now() / 1000);
       const text = [work.done, seconds === null ? "" : timeText(seconds)].filter(Boolean).join(", ");
       if (figures.textContent !== text) figures.textContent = text;
@@ -96,7 +79,7 @@ export class WorkList {
   }
 
   /** @param {Work} work */
-  #add(work) {
+  function add(work) {
     const row = make("div", { className: "work", id: `work-${work.id}` });
     const [text, figures] = [make("b"), make("output")];
     const bar = make("progress", { "aria-label": work.text });
@@ -104,33 +87,33 @@ export class WorkList {
     const shown = { row, text, figures, bar, stop, left: new TimeLeft(), work };
     stop.addEventListener("click", () => shown.work.stop?.());
     row.append(text, stop, figures, bar);
-    this.#shown.set(work.id, shown);
-    this.#list.append(row);
+    rows.set(work.id, shown);
+    list.append(row);
     return shown;
   }
 
   /** @returns {Work[]} */
-  #work() {
-    const { state, finding, acquisition, session, exporting } = this.#store.facts;
+  function listWork() {
+    const { state, finding, acquisition, session, exporting } = store.facts;
     if (!state) return [];
     const { track, range, compiling, footage } = state;
     const name = session?.people[acquisition?.person ?? 0]?.name ?? "";
-    const stopFinding = () => this.#send({ type: "find_people", action: "stop" });
-    const run = hasTrack(state) ? trackWork(track, finding?.running ? stopFinding : () => this.#actions.stopTracking()) : null;
+    const stopFinding = () => send({ type: "find_people", action: "stop" });
+    const run = hasTrack(state) ? trackWork(track, finding?.running ? stopFinding : () => actions.stopTracking()) : null;
     const search = finding?.running && !run && { id: "find", text: `Find people: ${finding.stage}`, ...shareOf(finding.share), stop: stopFinding };
     const sizes = acquisition?.running && {
       id: "sizes",
       text: `Acquiring sizes of ${name}: ${acquisition.stage}`,
       ...shareOf(acquisition.share),
-      stop: () => this.#send({ type: "acquire", action: "stop", person: acquisition.person }),
+      stop: () => send({ type: "acquire", action: "stop", person: acquisition.person }),
     };
     const frames = range.running && {
       id: "range",
       text: capital(range.what),
       ...ofTotal(range.done, range.total),
-      stop: () => this.#actions.stopRange(),
+      stop: () => actions.stopRange(),
     };
-    const files = exporting !== null && { id: "export", text: "Exporting", ...shareOf(exporting), stop: this.#cancelExport };
+    const files = exporting !== null && { id: "export", text: "Exporting", ...shareOf(exporting), stop: cancelExport };
     const kernels = compiling !== null && {
       id: "compiling",
       text: `Compiling ${displayName(compiling)}`,
@@ -143,33 +126,33 @@ export class WorkList {
     return [search, run, sizes, frames, files, kernels, index].filter((work) => !!work);
   }
 
-  #showDamage() {
-    const error = this.#store.facts.state?.footage.error ?? null;
-    this.#damage.hidden = error === null;
-    this.#damage.title = error ?? "";
+  function showDamage() {
+    const error = store.facts.state?.footage.error ?? null;
+    damage.hidden = error === null;
+    damage.title = error ?? "";
   }
 
-  #watchFinding() {
-    const { finding } = this.#store.facts;
-    if (finding?.running) this.#closeFailure();
-    else if (this.#wasFinding && finding?.failed) this.#showFailure(finding);
-    this.#wasFinding = finding?.running ?? false;
+  function watchFinding() {
+    const { finding } = store.facts;
+    if (finding?.running) closeFailure();
+    else if (wasFinding && finding?.failed) showFailure(finding);
+    wasFinding = finding?.running ?? false;
   }
 
   /** @param {import("../model/protocol.js").FindingMessage} finding */
-  #showFailure(finding) {
+  function showFailure(finding) {
     const { message, notes, tried } = finding;
     const [reason] = message.split(/;|\.$/);
     byId("failure-text", HTMLElement).textContent = `People were not found: ${reason.charAt(0).toLowerCase()}${reason.slice(1)}.`;
-    this.#showBadSilhouette(finding);
+    showBadSilhouette(finding);
     byId("failure-look", HTMLButtonElement).hidden = tried === null;
     byId("failure-look", HTMLButtonElement).textContent = `Show silhouettes of frame ${tried}`;
     byId("failure-details", HTMLDetailsElement).open = false;
     byId("failure-notes", HTMLElement).replaceChildren(
       ...[message, ...notes].map((text) => make("li", {}, text)),
     );
-    this.#failure.hidden = false;
-    if (tried === this.#store.facts.target) this.#lookAtSilhouettes();
+    failure.hidden = false;
+    if (tried === store.facts.target) lookAtSilhouettes();
   }
 
   /**
@@ -177,8 +160,8 @@ export class WorkList {
    *
    * @param {import("../model/protocol.js").FindingMessage} finding
    */
-  #showBadSilhouette({ camera, tried }) {
-    const { session } = this.#store.facts;
+  function showBadSilhouette({ camera, tried }) {
+    const { session } = store.facts;
     const picture = byId("failure-silhouette", HTMLImageElement);
     picture.hidden = true;
     picture.removeAttribute("src");
@@ -189,28 +172,28 @@ export class WorkList {
   }
 
   /** Show the silhouettes of the frame and the view that the failure is about. */
-  #lookAtSilhouettes() {
-    const { finding, layers } = this.#store.facts;
+  function lookAtSilhouettes() {
+    const { finding } = store.facts;
     if (!finding || finding.tried === null) return;
-    this.#navigation.goTo(finding.tried);
-    this.#hasSilhouettes ||= !layers.shown.silhouette;
-    this.#layers.toggle(["silhouette"], true);
-    if (finding.camera !== null) this.#store.set({ active: finding.camera });
+    navigation.goTo(finding.tried);
+    hasSilhouettes ||= !store.facts.layers.shown.silhouette;
+    layers.toggle(["silhouette"], true);
+    if (finding.camera !== null) store.set({ active: finding.camera });
   }
 
-  #closeFailure() {
-    this.#failure.hidden = true;
-    if (this.#hasSilhouettes) this.#layers.toggle(["silhouette"], false);
-    this.#hasSilhouettes = false;
+  function closeFailure() {
+    failure.hidden = true;
+    if (hasSilhouettes) layers.toggle(["silhouette"], false);
+    hasSilhouettes = false;
   }
 
-  #placeByHand() {
-    const { finding, state } = this.#store.facts;
+  function placeByHand() {
+    const { finding, state } = store.facts;
     const person = state?.people.findIndex(({ source }) => source === null) ?? 0;
-    if (finding && finding.tried !== null) this.#navigation.goTo(finding.tried);
-    this.#send({ type: "select", person: Math.max(0, person), point: "torso" });
-    this.#closeFailure();
-    this.#notify({ type: "notice", level: "info", text: "Drag the square of the body in two views, then joints; G fits the body to the edges." });
+    if (finding && finding.tried !== null) navigation.goTo(finding.tried);
+    send({ type: "select", person: Math.max(0, person), point: "torso" });
+    closeFailure();
+    notify({ type: "notice", level: "info", text: "Drag the square of the body in two views, then joints; G fits the body to the edges." });
   }
 }
 

@@ -20,112 +20,100 @@ import { keyframesOf } from "../model/cells.js";
 const STORED_HIDDEN = "quadrille.curves-hidden";
 const SIGNS = { deg: "°", cm: " cm", px: " px" };
 
-export class Curves {
-  #store;
-  #navigation;
-  #actions;
-  #frameWindow;
-  #stage = byId("curves", HTMLElement);
-  #legend = byId("curves-legend", HTMLElement);
-  #person = byId("curves-person", HTMLElement);
-  #lines = make("canvas");
-  #cursor = make("canvas");
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../model/navigation.js").Navigation} navigation
+ * @param {import("../model/actions.js").Actions} actions
+ * @param {import("./frame_window.js").FrameWindow} frameWindow
+ */
+export function mountCurves(store, navigation, actions, frameWindow) {
+  const stage = byId("curves", HTMLElement);
+  const legend = byId("curves-legend", HTMLElement);
+  const personName = byId("curves-person", HTMLElement);
+  const lines = make("canvas");
+  const cursor = make("canvas");
   /** The group that is shown; null while the drawer is closed or shows another tab. */
-  #group = /** @type {CurveGroup | null} */ (null);
+  let shownGroup = /** @type {CurveGroup | null} */ (null);
   /** Names of the curves that are switched off. */
-  #hidden = new Set(/** @type {string[]} */ (JSON.parse(localStorage.getItem(STORED_HIDDEN) ?? "[]")));
-  #hovered = /** @type {number | null} */ (null);
+  const hidden = new Set(/** @type {string[]} */ (JSON.parse(localStorage.getItem(STORED_HIDDEN) ?? "[]")));
+  let hovered = /** @type {number | null} */ (null);
   /** The labels that the legend was built for. */
-  #described = "";
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("../model/navigation.js").Navigation} navigation
-   * @param {import("../model/actions.js").Actions} actions
-   * @param {import("./frame_window.js").FrameWindow} frameWindow
-   */
-  constructor(store, navigation, actions, frameWindow) {
-    this.#store = store;
-    this.#navigation = navigation;
-    this.#actions = actions;
-    this.#frameWindow = frameWindow;
-    this.#stage.append(this.#lines, this.#cursor);
-    store.subscribe((changed) => this.#update(changed));
-    new ResizeObserver(() => this.#drawAll()).observe(this.#stage);
-    store.on(["theme"], () => this.#drawAll());
-    this.#listen();
-    this.#open();
-  }
+  let lastLabels = "";
+  stage.append(lines, cursor);
+  store.subscribe((changed) => update(changed));
+  new ResizeObserver(() => drawAll()).observe(stage);
+  store.on(["theme"], drawAll);
+  listen();
+  open();
 
   /** The curves to draw; null while they are loading. */
-  get #data() {
-    const { curves } = this.#store.facts;
-    return this.#group !== null && curves?.group === this.#group ? curves : null;
+  function shownCurves() {
+    const { curves } = store.facts;
+    return shownGroup !== null && curves?.group === shownGroup ? curves : null;
   }
 
-  get #axis() {
-    const { session, visible } = this.#store.facts;
-    return new FrameAxis(this.#stage.clientWidth, session?.n_frames ?? 1, visible);
+  function axisNow() {
+    const { session, visible } = store.facts;
+    return new FrameAxis(stage.clientWidth, session?.n_frames ?? 1, visible);
   }
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  #update(changed) {
-    if (changed.has("drawer")) this.#open();
-    if (this.#group === null) return;
-    if (changed.has("connected") && this.#store.facts.connected) this.#actions.openCurves(this.#group);
-    if (changed.has("curves")) this.#describe();
+  function update(changed) {
+    if (changed.has("drawer")) open();
+    if (shownGroup === null) return;
+    if (changed.has("connected") && store.facts.connected) actions.openCurves(shownGroup);
+    if (changed.has("curves")) describe();
     const moved = changed.has("curves") || changed.has("session") || changed.has("visible");
-    if (moved || changed.has("timeline") || changed.has("lanes")) this.#drawLines();
-    if (moved || changed.has("target")) this.#drawCursor();
+    if (moved || changed.has("timeline") || changed.has("lanes")) drawLines();
+    if (moved || changed.has("target")) drawCursor();
   }
 
   /** Request the group of the open tab, or end the request. */
-  #open() {
-    const { drawer } = this.#store.facts;
+  function open() {
+    const { drawer } = store.facts;
     const group = CURVE_GROUPS.find((one) => one === drawer) ?? null;
-    this.#stage.hidden = this.#legend.hidden = group === null;
-    if (group === null) this.#person.hidden = true;
-    if (group === this.#group) return;
-    this.#group = group;
-    if (this.#store.facts.connected) this.#actions.openCurves(group);
-    this.#drawAll();
+    stage.hidden = legend.hidden = group === null;
+    if (group === null) personName.hidden = true;
+    if (group === shownGroup) return;
+    shownGroup = group;
+    if (store.facts.connected) actions.openCurves(group);
+    drawAll();
   }
 
-  #listen() {
-    const stage = this.#stage;
+  function listen() {
     stage.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       stage.setPointerCapture(event.pointerId);
-      this.#navigation.pause();
-      this.#navigation.goTo(this.#axis.frameUnder(event, stage));
+      navigation.pause();
+      navigation.goTo(axisNow().frameUnder(event, stage));
     });
     stage.addEventListener("pointermove", (event) => {
-      const frame = this.#axis.frameUnder(event, stage);
-      if (stage.hasPointerCapture(event.pointerId)) this.#navigation.goTo(frame);
-      if (frame !== this.#hovered) this.#hover(frame);
+      const frame = axisNow().frameUnder(event, stage);
+      if (stage.hasPointerCapture(event.pointerId)) navigation.goTo(frame);
+      if (frame !== hovered) hover(frame);
     });
-    zoomByWheel(stage, this.#frameWindow, () => this.#axis);
-    stage.addEventListener("pointerleave", () => this.#hover(null));
+    zoomByWheel(stage, frameWindow, () => axisNow());
+    stage.addEventListener("pointerleave", () => hover(null));
   }
 
   /** @param {number | null} frame */
-  #hover(frame) {
-    this.#hovered = frame;
-    requestAnimationFrame(() => this.#drawCursor());
+  function hover(frame) {
+    hovered = frame;
+    requestAnimationFrame(() => drawCursor());
   }
 
   /** Build the legend: one switch per name, for the curves of that name in all plots. */
-  #describe() {
-    const data = this.#data;
-    this.#showPerson(data);
+  function describe() {
+    const data = shownCurves();
+    showPerson(data);
     const labels = labelsOf(data);
     const described = JSON.stringify(labels);
-    if (!data || described === this.#described) return;
-    this.#described = described;
-    this.#legend.replaceChildren(
+    if (!data || described === lastLabels) return;
+    lastLabels = described;
+    legend.replaceChildren(
       ...labels.map((label, index) => {
-        const one = make("button", { type: "button", className: "legend-switch", "aria-pressed": String(!this.#hidden.has(label)), title: `Show or hide ${label}` }, lineSwatch(index), label, make("output"));
-        one.addEventListener("click", () => this.#switch(one, label));
+        const one = make("button", { type: "button", className: "legend-switch", "aria-pressed": String(!hidden.has(label)), title: `Show or hide ${label}` }, lineSwatch(index), label, make("output"));
+        one.addEventListener("click", () => toggleCurve(one, label));
         return one;
       }),
     );
@@ -136,68 +124,68 @@ export class Curves {
    *
    * @param {Data | null} data
    */
-  #showPerson(data) {
-    const people = this.#store.facts.session?.people ?? [];
+  function showPerson(data) {
+    const people = store.facts.session?.people ?? [];
     const person = data && people.length > 1 ? people[data.person] : null;
-    this.#person.hidden = !person;
-    this.#person.textContent = person?.name ?? "";
-    this.#person.title = person ? `Curves of ${person.name} (P: next person)` : "";
-    this.#person.style.setProperty("--person", person?.color ?? "");
+    personName.hidden = !person;
+    personName.textContent = person?.name ?? "";
+    personName.title = person ? `Curves of ${person.name} (P: next person)` : "";
+    personName.style.setProperty("--person", person?.color ?? "");
   }
 
   /**
    * @param {HTMLButtonElement} element
    * @param {string} label
    */
-  #switch(element, label) {
+  function toggleCurve(element, label) {
     element.blur();
-    if (!this.#hidden.delete(label)) this.#hidden.add(label);
-    element.setAttribute("aria-pressed", String(!this.#hidden.has(label)));
-    localStorage.setItem(STORED_HIDDEN, JSON.stringify([...this.#hidden]));
-    this.#drawLines();
+    if (!hidden.delete(label)) hidden.add(label);
+    element.setAttribute("aria-pressed", String(!hidden.has(label)));
+    localStorage.setItem(STORED_HIDDEN, JSON.stringify([...hidden]));
+    drawLines();
   }
 
-  #drawAll() {
-    if (this.#group === null) return;
-    this.#drawLines();
-    this.#drawCursor();
+  function drawAll() {
+    if (shownGroup === null) return;
+    drawLines();
+    drawCursor();
   }
 
-  #drawLines() {
-    const { clientWidth, clientHeight } = this.#stage;
+  function drawLines() {
+    const { clientWidth, clientHeight } = stage;
     if (clientWidth === 0) return;
-    const context = prepare(this.#lines, clientWidth, clientHeight, true);
-    const data = this.#data;
+    const context = prepare(lines, clientWidth, clientHeight, true);
+    const data = shownCurves();
     if (!data) return;
-    const { timeline, lanes } = this.#store.facts;
+    const { timeline, lanes } = store.facts;
     const keyframes = keyframesOf(lanes[data.person] ?? timeline);
-    const style = getComputedStyle(this.#stage);
-    drawCurves(context, this.#axis, clientHeight, data, labelsOf(data), this.#hidden, keyframes, style);
+    const style = getComputedStyle(stage);
+    drawCurves(context, axisNow(), clientHeight, data, labelsOf(data), hidden, keyframes, style);
   }
 
   /** Draw lines at the current frame and the pointer. The legend shows the values at the pointer, or else the frame. */
-  #drawCursor() {
-    const { clientWidth, clientHeight } = this.#stage;
-    if (clientWidth === 0 || this.#group === null) return;
-    const context = prepare(this.#cursor, clientWidth, clientHeight, true);
-    const style = getComputedStyle(this.#stage);
-    const axis = this.#axis;
-    const { target } = this.#store.facts;
+  function drawCursor() {
+    const { clientWidth, clientHeight } = stage;
+    if (clientWidth === 0 || shownGroup === null) return;
+    const context = prepare(cursor, clientWidth, clientHeight, true);
+    const style = getComputedStyle(stage);
+    const axis = axisNow();
+    const { target } = store.facts;
     context.fillStyle = style.getPropertyValue("--text");
     if (axis.shows(target)) context.fillRect(axis.middle(target) - 0.5, 0, 1, clientHeight);
-    if (this.#hovered !== null) {
+    if (hovered !== null) {
       context.globalAlpha = 0.5;
-      context.fillRect(axis.middle(this.#hovered) - 0.5, 0, 1, clientHeight);
+      context.fillRect(axis.middle(hovered) - 0.5, 0, 1, clientHeight);
       context.globalAlpha = 1;
     }
-    this.#readOut(this.#hovered ?? target);
+    readOut(hovered ?? target);
   }
 
   /** @param {number} frame */
-  #readOut(frame) {
-    const data = this.#data;
+  function readOut(frame) {
+    const data = shownCurves();
     labelsOf(data).forEach((label, index) => {
-      const value = this.#legend.children[index]?.querySelector("output");
+      const value = legend.children[index]?.querySelector("output");
       if (!value || !data) return;
       const found = data.series.filter((one) => one.label === label);
       value.textContent = found

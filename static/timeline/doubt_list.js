@@ -14,89 +14,82 @@ const TICK = "m3 8.5 3.5 3.5L13 4.5";
 
 /** @typedef {import("./doubts.js").Doubt} Doubt */
 
-export class DoubtList {
-  #store;
-  #queue;
-  #panel = byId("doubts", HTMLElement);
-  #list = byId("doubt-list", HTMLOListElement);
-  #empty = byId("doubts-empty", HTMLElement);
-  #controls = byId("doubt-controls", HTMLElement);
-  #tabCount = byId("doubts-count", HTMLElement);
-  #loader = new ThumbnailLoader(this.#panel);
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("./doubt_queue.js").DoubtQueue} queue
+ */
+export function mountDoubtList(store, queue) {
+  const panel = byId("doubts", HTMLElement);
+  const list = byId("doubt-list", HTMLOListElement);
+  const empty = byId("doubts-empty", HTMLElement);
+  const controls = byId("doubt-controls", HTMLElement);
+  const tabCount = byId("doubts-count", HTMLElement);
+  const loader = new ThumbnailLoader(panel);
   /** @type {Map<string, HTMLLIElement>} rows by what they show */
-  #rows = new Map();
-  #limit = FEW_LISTED;
-  #more = make("li");
-  #moreButton = make("button", { type: "button", className: "doubt-more" });
+  let rowsByKey = new Map();
+  let limit = FEW_LISTED;
+  const moreRow = make("li");
+  const moreButton = make("button", { type: "button", className: "doubt-more" });
+  /** @type {(keyof import("../model/store.js").Facts)[]} */
+  const listed = ["drawer", "timeline", "lanes", "session", "keyframeDoubts"];
+  moreButton.addEventListener("click", () => {
+    limit = MAX_LISTED;
+    show();
+    list.children[FEW_LISTED]?.querySelector("button")?.focus();
+  });
+  moreRow.append(moreButton);
+  store.subscribe((changed) => {
+    const isOpen = store.facts.drawer === "doubts";
+    panel.hidden = controls.hidden = !isOpen;
+    if (!isOpen) {
+      limit = FEW_LISTED;
+      return;
+    }
+    if (listed.some((fact) => changed.has(fact))) show();
+    if (listed.some((fact) => changed.has(fact)) || changed.has("target") || changed.has("state") || changed.has("reason")) mark();
+  });
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("./doubt_queue.js").DoubtQueue} queue
-   */
-  constructor(store, queue) {
-    this.#store = store;
-    this.#queue = queue;
-    /** @type {(keyof import("../model/store.js").Facts)[]} */
-    const listed = ["drawer", "timeline", "lanes", "session", "keyframeDoubts"];
-    this.#moreButton.addEventListener("click", () => {
-      this.#limit = MAX_LISTED;
-      this.#show();
-      this.#list.children[FEW_LISTED]?.querySelector("button")?.focus();
-    });
-    this.#more.append(this.#moreButton);
-    store.subscribe((changed) => {
-      const isOpen = store.facts.drawer === "doubts";
-      this.#panel.hidden = this.#controls.hidden = !isOpen;
-      if (!isOpen) {
-        this.#limit = FEW_LISTED;
-        return;
-      }
-      if (listed.some((fact) => changed.has(fact))) this.#show();
-      if (listed.some((fact) => changed.has(fact)) || changed.has("target") || changed.has("state") || changed.has("reason")) this.#mark();
-    });
-  }
-
-  #show() {
-    const { doubts } = this.#queue;
-    const shown = doubts.slice(0, this.#limit);
-    const known = this.#rows;
-    this.#rows = new Map(shown.map((doubt) => [this.#key(doubt), known.get(this.#key(doubt)) ?? this.#row(doubt)]));
+  function show() {
+    const { doubts } = queue;
+    const shown = doubts.slice(0, limit);
+    const known = rowsByKey;
+    rowsByKey = new Map(shown.map((doubt) => [keyOf(doubt), known.get(keyOf(doubt)) ?? makeRow(doubt)]));
     for (const [key, row] of known) {
       const image = row.querySelector("img");
-      if (!this.#rows.has(key) && image) this.#loader.forget(image);
+      if (!rowsByKey.has(key) && image) loader.forget(image);
     }
     const hidden = doubts.length - shown.length;
-    this.#moreButton.textContent = `${count(hidden)} more`;
-    this.#moreButton.title = "List less severe entries too";
-    const rows = [...this.#rows.values(), ...(hidden > 0 && this.#limit < MAX_LISTED ? [this.#more] : [])];
-    if (rows.length !== this.#list.children.length || rows.some((row, i) => row !== this.#list.children[i])) {
-      const focused = this.#list.contains(document.activeElement) ? document.activeElement : null;
-      const at = focused ? [...this.#list.children].findIndex((row) => row.contains(focused)) : -1;
-      this.#list.replaceChildren(...rows);
+    moreButton.textContent = `${count(hidden)} more`;
+    moreButton.title = "List less severe entries too";
+    const rows = [...rowsByKey.values(), ...(hidden > 0 && limit < MAX_LISTED ? [moreRow] : [])];
+    if (rows.length !== list.children.length || rows.some((row, i) => row !== list.children[i])) {
+      const focused = list.contains(document.activeElement) ? document.activeElement : null;
+      const at = focused ? [...list.children].findIndex((row) => row.contains(focused)) : -1;
+      list.replaceChildren(...rows);
       // If the focused entry was resolved, the next one takes its place.
       if (at >= 0) (focused?.isConnected ? /** @type {HTMLElement} */ (focused) : rows[Math.min(at, rows.length - 1)]?.querySelector("button"))?.focus();
     }
     const listed = hidden > 0 ? `, the ${count(shown.length)} most severe are listed` : ", most severe first";
-    this.#tabCount.textContent = doubts.length === 0 ? "" : `${count(doubts.length)} to check${listed}`;
-    this.#empty.hidden = doubts.length > 0;
-    if (doubts.length === 0) this.#empty.textContent = this.#emptyText();
+    tabCount.textContent = doubts.length === 0 ? "" : `${count(doubts.length)} to check${listed}`;
+    empty.hidden = doubts.length > 0;
+    if (doubts.length === 0) empty.textContent = emptyText();
   }
 
-  #emptyText() {
-    const { timeline } = this.#store.facts;
-    const { all, resolved } = countDoubts(this.#store.facts);
+  function emptyText() {
+    const { timeline } = store.facts;
+    const { all, resolved } = countDoubts(store.facts);
     if (all > 0) return `All ${count(resolved)} doubtful and lost poses are confirmed or reviewed.`;
     if (timeline.statuses.some((status) => status > 0)) return "No pose is doubtful or lost.";
     return "No frame has been tracked. Press T to track; doubtful and lost poses are listed here.";
   }
 
   /** Mark the entry of the current frame. */
-  #mark() {
-    const current = this.#queue.current;
-    const key = current ? this.#key(current) : null;
-    for (const [own, row] of this.#rows) {
+  function mark() {
+    const current = queue.current;
+    const key = current ? keyOf(current) : null;
+    for (const [own, row] of rowsByKey) {
       const isCurrent = own === key;
-      if (isCurrent) explain(row, current?.worst === this.#store.facts.reason?.frame ? reasonOf(this.#store.facts) : "");
+      if (isCurrent) explain(row, current?.worst === store.facts.reason?.frame ? reasonOf(store.facts) : "");
       if (row.classList.contains("is-current") === isCurrent) continue;
       row.classList.toggle("is-current", isCurrent);
       row.querySelector("button")?.setAttribute("aria-current", String(isCurrent));
@@ -105,14 +98,14 @@ export class DoubtList {
   }
 
   /** @param {Doubt} doubt */
-  #key({ person, spans, worst, status, limbs, keyframe }) {
-    const cost = this.#cellsOf(person)?.costs[worst];
+  function keyOf({ person, spans, worst, status, limbs, keyframe }) {
+    const cost = cellsOf(person)?.costs[worst];
     return JSON.stringify([person, spans, worst, status, cost, limbs, keyframe]);
   }
 
   /** @param {number} person */
-  #cellsOf(person) {
-    const { lanes, timeline } = this.#store.facts;
+  function cellsOf(person) {
+    const { lanes, timeline } = store.facts;
     return lanes.length > 0 ? lanes[person] : timeline;
   }
 
@@ -120,18 +113,18 @@ export class DoubtList {
    * @param {Doubt} doubt
    * @returns {HTMLLIElement}
    */
-  #row(doubt) {
-    const { session, calibration } = this.#store.facts;
+  function makeRow(doubt) {
+    const { session, calibration } = store.facts;
     const { person, first, last, spans, worst, status, limbs, limb, keyframe } = doubt;
     const info = session?.people[person];
     const row = make("li");
     const go = make("button", { type: "button", className: "doubt", "data-no-command": "" });
     const image = make("img", { alt: "", draggable: false });
-    const cost = this.#cellsOf(person)?.costs[worst] ?? 0;
-    this.#loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}-${calibration?.revision ?? 1}`);
+    const cost = cellsOf(person)?.costs[worst] ?? 0;
+    loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}-${calibration?.revision ?? 1}`);
     const text = make("span", "doubt-text");
     const frames = `${first === last ? `frame ${first}` : `frames ${first}–${last}`}${spans.length > 1 ? `, in ${spans.length} stretches` : ""}`;
-    const remark = this.#cellsOf(person)?.get(worst)?.remark ?? "";
+    const remark = cellsOf(person)?.get(worst)?.remark ?? "";
     const why =
       keyframe && session ? contradictions(keyframe, session).map((one) => `disagrees ${one}`)
       : limbs.length ? limbs.slice(0, 2).map(chanceOf)
@@ -146,10 +139,10 @@ export class DoubtList {
     go.title = `Go to frame ${worst}, the worst of ${frames}: ${why.join("; ")}`;
     go.addEventListener("click", (event) => {
       if (event.detail > 0) go.blur();
-      this.#queue.visit(doubt);
+      queue.visit(doubt);
     });
     const accepts = keyframe ? "this keyframe is right" : `mark ${frames} as reviewed`;
-    const accept = iconButton(TICK, `Accept: ${accepts} (Alt+Enter)`, () => this.#queue.accept(doubt));
+    const accept = iconButton(TICK, `Accept: ${accepts} (Alt+Enter)`, () => queue.accept(doubt));
     accept.classList.add("doubt-accept");
     row.append(go, accept);
     return row;

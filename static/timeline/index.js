@@ -5,19 +5,19 @@
  */
 
 import { byId } from "../widgets/elements.js";
-import { Curves } from "./curves.js";
-import { DoubtList } from "./doubt_list.js";
+import { mountCurves } from "./curves.js";
+import { mountDoubtList } from "./doubt_list.js";
 import { DoubtQueue } from "./doubt_queue.js";
 import { Drawer } from "./drawer.js";
 import { FrameWindow } from "./frame_window.js";
-import { JumpMenu } from "./jump_menu.js";
+import { mountJumpMenu } from "./jump_menu.js";
 import { Jumps } from "./jumps.js";
 import { Playback } from "./playback.js";
-import { RangeBar } from "./range_bar.js";
-import { Timeline } from "./timeline.js";
+import { mountRangeBar } from "./range_bar.js";
+import { mountTimeline } from "./timeline.js";
 import { drawerBindings, frameBindings, queueBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
-import { TrackBar } from "./track_bar.js";
-import { Transport } from "./transport.js";
+import { mountTrackBar } from "./track_bar.js";
+import { mountTransport } from "./transport.js";
 
 /** @typedef {ReturnType<typeof mount>} TimelineRoom */
 
@@ -32,14 +32,14 @@ export function mount({ store, actions, navigation, reasons }, { grid }) {
   const queue = new DoubtQueue(store, navigation, actions, grid);
   const jumps = new Jumps(store, navigation, (frame) => queue.arriveAt(frame));
   const frameWindow = new FrameWindow(store);
-  new Transport(store, navigation, playback, actions);
-  new TrackBar(store, actions);
+  mountTransport(store, navigation, playback, actions);
+  mountTrackBar(store, actions);
   const drawer = new Drawer(store);
-  new RangeBar(store, actions, () => drawer.open("runs"));
-  new JumpMenu(store, jumps, () => drawer.open("doubts"));
-  new DoubtList(store, queue);
-  new Curves(store, navigation, actions, frameWindow);
-  new Timeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWindow });
+  mountRangeBar(store, actions, () => drawer.open("runs"));
+  mountJumpMenu(store, jumps, () => drawer.open("doubts"));
+  mountDoubtList(store, queue);
+  mountCurves(store, navigation, actions, frameWindow);
+  mountTimeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWindow });
   const bindings = [
     ...frameBindings(navigation, playback),
     ...trackBindings(store, actions, reasons),

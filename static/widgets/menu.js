@@ -7,70 +7,62 @@ import { make } from "./elements.js";
  *   remark in small type
  */
 
-export class Menu {
-  #button;
-  #menu;
-  #list;
+/**
+ * @param {HTMLButtonElement} opener
+ * @param {HTMLElement} menu
+ * @param {() => {items: MenuItem[], note?: string}} list returns what the menu offers now, with a sentence below it; without
+ *   items it does not open
+ */
+export function mountMenu(opener, menu, list) {
+  const button = opener;
+  opener.addEventListener("click", () => (menu.hidden ? open() : close()));
+  menu.addEventListener("keydown", (event) => key(event));
+  addEventListener("pointerdown", (event) => {
+    const at = /** @type {Node} */ (event.target);
+    if (!menu.hidden && !menu.contains(at) && !opener.contains(at)) close();
+  });
+  menu.addEventListener("focusout", (event) => {
+    const to = /** @type {Node | null} */ (event.relatedTarget);
+    if (to && !menu.contains(to) && to !== opener) close();
+  });
 
-  /**
-   * @param {HTMLButtonElement} opener
-   * @param {HTMLElement} menu
-   * @param {() => {items: MenuItem[], note?: string}} list returns what the menu offers now, with a sentence below it; without
-   *   items it does not open
-   */
-  constructor(opener, menu, list) {
-    this.#button = opener;
-    this.#menu = menu;
-    this.#list = list;
-    opener.addEventListener("click", () => (menu.hidden ? this.#open() : this.#close()));
-    menu.addEventListener("keydown", (event) => this.#key(event));
-    addEventListener("pointerdown", (event) => {
-      const at = /** @type {Node} */ (event.target);
-      if (!menu.hidden && !menu.contains(at) && !opener.contains(at)) this.#close();
-    });
-    menu.addEventListener("focusout", (event) => {
-      const to = /** @type {Node | null} */ (event.relatedTarget);
-      if (to && !menu.contains(to) && to !== opener) this.#close();
-    });
-  }
-
-  #open() {
-    const { items, note } = this.#list();
+  function open() {
+    const { items, note } = list();
     if (items.length === 0) return;
-    const entries = items.map((item) => this.#entry(item));
-    this.#menu.replaceChildren(...entries);
-    if (note) this.#menu.append(make("p", {}, note));
-    this.#menu.hidden = false;
-    this.#button.setAttribute("aria-expanded", "true");
-    const box = this.#button.getBoundingClientRect();
-    this.#menu.style.left = `${Math.min(box.left, innerWidth - this.#menu.offsetWidth - 8)}px`;
-    this.#menu.style.bottom = `${innerHeight - box.top + 4}px`;
-    (entries.find((entry) => !entry.disabled) ?? this.#menu).focus();
+    const entries = items.map((item) => makeEntry(item));
+    menu.replaceChildren(...entries);
+    if (note) menu.append(make("p", {}, note));
+    menu.hidden = false;
+    button.setAttribute("aria-expanded", "true");
+    const box = button.getBoundingClientRect();
+    menu.style.left = `${Math.min(box.left, innerWidth - menu.offsetWidth - 8)}px`;
+    menu.style.bottom = `${innerHeight - box.top + 4}px`;
+    (entries.find((entry) => !entry.disabled) ?? menu).focus();
   }
 
   /** @param {MenuItem} item */
-  #entry({ text, note, title, run, isDisabled = false }) {
+  function makeEntry({ text, note, title, run, isDisabled = false }) {
     const entry = make("button", { type: "button", role: "menuitem", title, disabled: isDisabled }, text, make("small", {}, note));
     entry.addEventListener("click", () => {
-      this.#close();
+      close();
       run();
     });
     return entry;
   }
 
-  #close() {
-    const hadFocus = this.#menu.contains(document.activeElement);
-    this.#menu.hidden = true;
-    this.#button.setAttribute("aria-expanded", "false");
-    if (hadFocus) this.#button.focus();
+  function close() {
+    const hadFocus = menu.contains(document.activeElement);
+    menu.hidden = true;
+    button.setAttribute("aria-expanded", "false");
+    if (hadFocus) button.focus();
   }
 
   /** @param {KeyboardEvent} event */
-  #key(event) {
-    const items = [...this.#menu.querySelectorAll("button")].filter((item) => !item.disabled);
+  function key(event) {
+    const items = [...menu.querySelectorAll("button")].filter((item) => !item.disabled);
     const at = items.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement));
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-    if (event.key === "Escape") this.#close();
+    if (event.key === "Escape") close();
     else if (step) items[(at + step + items.length) % items.length]?.focus();
     else return;
     event.preventDefault();
