@@ -38,7 +38,7 @@ export function acquisitionView({ store, send }) {
     ],
     change: (/** @type {Method} */ value) => (method = value),
   });
-  const work = workRow("Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }));
+  const work = workRow("Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }), { className: "section-note acquisition-status", "aria-live": "polite" });
   const result = make("div");
   element.append(choice.element, start, work.element, work.status, result);
   /** @type {Result | null} */

@@ -28,7 +28,7 @@ export class BodySection {
   #store;
   #send;
   #refuse;
-  #person = make("p", "person-name");
+  #person = make("p", "person-name is-clipped");
   #model;
   #height;
   #alike;
@@ -219,5 +219,5 @@ function tenths(cm) {
  * @param {string} title
  */
 function cell(text, title) {
-  return make("span", { title, className: "size-label" }, text);
+  return make("span", { title, className: "size-label is-clipped" }, text);
 }

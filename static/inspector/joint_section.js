@@ -38,7 +38,7 @@ export function jointSection(context, { posing }) {
     const limits = info.low === null || info.high === null ? "no limits" : `from ${info.low} to ${info.high} ${unit}`;
     const effect = meaning(info);
     const title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}; ${limits}`;
-    const head = make("span", "row-label", capital(info.name));
+    const head = make("span", "row-label is-clipped", capital(info.name));
     const [low, high] = info.unit === "cm" ? [-MAX_CM, MAX_CM] : [info.low ?? -360, info.high ?? 360];
     const field = boundedField({
       name: `${displayName(info.joint)} ${info.name}, ${unit}`,

@@ -13,11 +13,12 @@ export function group(...children) {
  *
  * @param {string} title of the button
  * @param {() => void} stop
+ * @param {import("../widgets/elements.js").Properties<"p">} [announced] how screen readers hear the line
  */
-export function workRow(title, stop) {
+export function workRow(title, stop, announced = { role: "status" }) {
   const progress = make("progress");
   const element = group(progress, textButton("Stop", title, stop));
-  const status = make("p", { className: "section-note", role: "status" });
+  const status = make("p", { className: "section-note", ...announced });
   return {
     element,
     status,
@@ -45,7 +46,7 @@ export function workRow(title, stop) {
  * @param {HTMLElement[]} cells
  */
 export function frameRow(frame, isHere, title, visit, ...cells) {
-  const go = textButton("", title, visit, { "data-no-command": "", ...(isHere ? { "aria-current": "true" } : {}) });
+  const go = textButton("", title, visit, { className: "frame-row", "data-no-command": "", ...(isHere ? { "aria-current": "true" } : {}) });
   go.append(make("span", "observed-frame", String(frame)), ...cells);
   return make("li", {}, go);
 }

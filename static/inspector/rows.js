@@ -180,7 +180,7 @@ export function tidy(value) {
  */
 function row(kind, label, title) {
   const element = make(kind, { className: "row", title });
-  const head = make("span", "row-label", label);
+  const head = make("span", "row-label is-clipped", label);
   element.append(head);
   return { element, head };
 }

@@ -112,7 +112,7 @@ function optionRow({ label, help, kind, choices, limits, step }, change, refuse)
  */
 function cameraChoices(change, refuse) {
   const element = make("div", { title: "Cameras to track with. The others are still shown", role: "group", "aria-label": "Cameras to track with" });
-  const head = make("span", "row-label", "Cameras");
+  const head = make("span", "row-label is-clipped", "Cameras");
   const list = make("div", "camera-choices");
   element.append(head, list);
   const boxes = () => [...list.querySelectorAll("input")];

@@ -3,7 +3,7 @@
 import { make } from "../widgets/elements.js";
 import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
-import { decluttered } from "./declutter.js";
+import { decluttered } from "./joint_picking.js";
 import { ofJoint } from "../model/observability.js";
 import { jointLabel } from "./joint_label.js";
 import { drawObservability } from "./observability_marks.js";
@@ -35,8 +35,8 @@ export class Pane {
   #store;
   #camera;
   #info;
-  #image = make("canvas");
-  #overlay = make("canvas", "pane-overlay");
+  #image = make("canvas", "is-layer");
+  #overlay = make("canvas", "is-layer pane-overlay");
   #corner;
   #tonedImage = new TonedImage();
   #onView;

@@ -24,7 +24,7 @@ export class PaneCorner {
   #joint = make("output", { className: "pane-joint", hidden: true });
   #cost = make("output", { className: "pane-cost", title: "Chamfer cost of this view, in pixels" });
   #tools = make("div", "pane-tools");
-  #placeholder = make("div", { className: "pane-placeholder", title: "The requested frame is loading. Until it arrives, the nearest available frame is shown", hidden: true });
+  #placeholder = make("div", { className: "pane-placeholder is-clipped", title: "The requested frame is loading. Until it arrives, the nearest available frame is shown", hidden: true });
   #scale = make("div", { className: "pane-scale", title: "Distance image: distance to the nearest edge, in image pixels", hidden: true });
   #limit = make("span");
   #fit;

@@ -61,7 +61,7 @@ export class Here {
    */
   #row(person, index) {
     const row = make("li");
-    const name = make("span", "participant-name", nameOf(person) + (person.is_self ? " (you)" : ""));
+    const name = make("span", "participant-name is-clipped", nameOf(person) + (person.is_self ? " (you)" : ""));
     const role = make("span", "quiet", ROLES[person.role]);
     const work = capital(person.doing);
     const at = make("button", { type: "button", title: `Go to frame ${person.frame}`, disabled: person.is_self }, `Frame ${person.frame}`); // prettier-ignore

@@ -129,7 +129,7 @@ export class JointBar {
     const hint = "Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.";
     const effect = meaning(info);
     row.title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}, ${range(info)}. ${hint}`;
-    const label = make("span", "dof-name", span("is-whole", name), span("is-brief", shortName(info.name)));
+    const label = make("span", "dof-name is-clipped", span("is-whole", name), span("is-brief", shortName(info.name)));
     makeScrubber(label, {
       begin: () => (this.#posing.isLocked([dof]) ? null : (this.#store.facts.state?.dofs[dof] ?? null)),
       perPixel: PER_PIXEL[info.unit],

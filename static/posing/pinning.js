@@ -4,7 +4,7 @@
  */
 
 import { scopePerson } from "../model/selectors.js";
-import { GRAB_RADIUS } from "../panes/declutter.js";
+import { GRAB_RADIUS } from "../panes/joint_picking.js";
 import { HEAD_REACH, POINT_REACH, isSame, placedPins } from "../panes/pin_drawing.js";
 
 const DRAG_THRESHOLD = 3;

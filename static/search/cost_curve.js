@@ -21,7 +21,7 @@ export class CostCurve {
   #store;
   #send;
   #element = byId("cost-curve", HTMLElement);
-  #lines = make("canvas");
+  #lines = make("canvas", "is-layer");
   #read = make("output", "curve-readout");
   #hovered = /** @type {number | null} */ (null);
   #plot = /** @type {Plot | null} */ (null);

@@ -17,7 +17,7 @@ const UNITS = { rad: { factor: 180 / Math.PI, sign: "°" }, m: { factor: 100, si
 export function mountCostLandscape(store, send) {
   const element = byId("landscape", HTMLElement);
   const controls = byId("landscape-controls", HTMLElement);
-  const canvas = make("canvas");
+  const canvas = make("canvas", "is-layer");
   const choice = make("select", { title: "Degree of freedom to vary; all others stay fixed", "aria-label": "Degree of freedom" });
   const legend = make("div", "landscape-legend");
   /** Text shown until there is a landscape. */

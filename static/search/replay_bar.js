@@ -9,7 +9,7 @@ export class ReplayBar {
   #store;
   #send;
   #slider = make("input");
-  #text = make("output", "replay-text");
+  #text = make("output", "replay-text is-clipped");
   #buttons;
   #leave;
   #play;

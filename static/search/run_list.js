@@ -52,7 +52,7 @@ export class RunList {
     look.className = "run-name";
     look.prepend(lineSwatch(number - 1));
     const figures = make("div", "run-figures");
-    const differs = make("div", "run-differs");
+    const differs = make("div", "run-differs is-clipped");
     const compare = textButton("Compare", `Show the pose found by run ${number} in the views, dashed`, () => {
       const isOn = this.#store.facts.searchRuns?.compared === number;
       this.#send({ type: "compare", run: isOn ? null : number });

@@ -82,12 +82,12 @@ export class SearchTree {
   #head(setup) {
     const passes = setup.passes.map((factor) => {
       const title = `Pass with steps ×${factor}: poses evaluated and reduction of the cost`;
-      return cell("tree-head", `steps ×${factor}`, title);
+      return cell("tree-head is-clipped", `steps ×${factor}`, title);
     });
     return [
-      cell("tree-head", "Stage", "Groups of degrees of freedom, searched one after the other"),
-      cell("tree-head", "DOF", "Number of degrees of freedom searched together"),
-      ...FIELDS.map(({ head, title }) => cell("tree-head", head, title)),
+      cell("tree-head is-clipped", "Stage", "Groups of degrees of freedom, searched one after the other"),
+      cell("tree-head is-clipped", "DOF", "Number of degrees of freedom searched together"),
+      ...FIELDS.map(({ head, title }) => cell("tree-head is-clipped", head, title)),
       ...passes,
     ];
   }
@@ -112,7 +112,7 @@ export class SearchTree {
       return field.element;
     });
     return [
-      cell("tree-name", name, `${name}: ${dofs} degrees of freedom`),
+      cell("tree-name is-clipped", name, `${name}: ${dofs} degrees of freedom`),
       cell("tree-count", String(dofs), `${dofs} degrees of freedom`),
       ...fields,
       ...setup.passes.map(() => cell("", "", "")),
@@ -127,7 +127,7 @@ export class SearchTree {
   #row(setup, leaf, isLast) {
     const { person, name, dofs } = leaf;
     const list = dofs.map((dof) => displayName(dof).replace(".", " ")).join(", ");
-    const label = cell(`tree-name is-leaf${isLast ? " is-last" : ""}`, name, `${name}: ${list}`);
+    const label = cell(`tree-name is-clipped is-leaf${isLast ? " is-last" : ""}`, name, `${name}: ${list}`);
     label.dataset.leaf = `${person} ${name}`;
     const fields = FIELDS.map(({ key, has, unit, title }) => {
       if (leaf[has] === 0) return cell("", "", "");

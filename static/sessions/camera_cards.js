@@ -96,7 +96,7 @@ export class CameraCards {
     const card = make("li", { draggable: true });
     card.classList.toggle("is-left-out", !choice.footage);
     const picture = choice.footage ? firstFrame(name, choice.footage) : noPicture("No footage");
-    const title = make("b", {}, name);
+    const title = make("b", "is-clipped", name);
     const offset = make("input");
     Object.assign(offset, { id: `new-offset-${index}`, type: "number", step: "any", placeholder: "auto", value: String(choice.offset ?? ""), className: "query-field" });
     offset.title = `Offset of ${name}: number of frames that it began earlier than the others, such as 2 or 2.4. Empty: by the clocks of the footage, else 0`;

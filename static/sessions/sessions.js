@@ -116,7 +116,7 @@ export class Sessions {
     const open = make("button", { type: "button" });
     open.title = `Close this session and open ${folder}`;
     const when = make("time", { dateTime: opened }, new Date(opened).toLocaleDateString([], { day: "numeric", month: "short" }));
-    open.append(make("b", {}, name), when, make("small", {}, make("bdi", {}, folder)));
+    open.append(make("b", {}, name), when, make("small", "is-clipped", make("bdi", {}, folder)));
     open.addEventListener("click", () => void this.#choose(folder));
     item.append(open);
     return item;

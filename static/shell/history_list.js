@@ -98,7 +98,7 @@ export class HistoryList {
     const row = make("button", { type: "button", title, "data-edit": String(edit) });
     row.classList.toggle("is-undone", isUndone);
     if (isCurrent) row.setAttribute("aria-current", "step");
-    row.append(...cells.map((text) => make("span", {}, text)));
+    row.append(...cells.map((text) => make("span", "is-clipped", text)));
     row.addEventListener("click", () => isCurrent || this.#send({ type: "go_to", edit }));
     return make("li", {}, row);
   }

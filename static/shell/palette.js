@@ -149,7 +149,7 @@ function option({ area, label, keys, why }, mark, index) {
     item.setAttribute("aria-disabled", "true");
     item.title = reason;
   }
-  item.append(make("span", {}, label), make("small", {}, `${area}${mark}`), keyCaps(keys));
+  item.append(make("span", "is-clipped", label), make("small", {}, `${area}${mark}`), keyCaps(keys));
   return item;
 }
 

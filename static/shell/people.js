@@ -69,7 +69,7 @@ export class People {
       this.#actions.selectPerson(person);
       if (within === this.#bar) input.blur();
     });
-    label.append(input, make("span", { className: "person-name", "--person": info.color }, info.name));
+    label.append(input, make("span", { className: "person-name is-clipped", "--person": info.color }, info.name));
     return input;
   }
 

@@ -30,8 +30,8 @@ export function mountCurves(store, navigation, actions, frameWindow) {
   const stage = byId("curves", HTMLElement);
   const legend = byId("curves-legend", HTMLElement);
   const personName = byId("curves-person", HTMLElement);
-  const lines = make("canvas");
-  const cursor = make("canvas");
+  const lines = make("canvas", "is-layer");
+  const cursor = make("canvas", "is-layer");
   /** The group that is shown; null while the drawer is closed or shows another tab. */
   let shownGroup = /** @type {CurveGroup | null} */ (null);
   /** Names of the curves that are switched off. */

@@ -165,7 +165,7 @@ function chanceOf({ name, lost }, rank) {
  * @param {string} [more] another class
  */
 function line(kind, text, more) {
-  const one = make("span", kind);
+  const one = make("span", `${kind} is-clipped`);
   if (more) one.classList.add(more);
   one.textContent = text;
   return one;

@@ -31,8 +31,8 @@ const CELL_FACTS = ["timeline", "lanes", "session", "keyframeDoubts", "calibrati
  *   jumps: import("./jumps.js").Jumps, frameWindow: import("./frame_window.js").FrameWindow}} parts
  */
 export function mountTimeline(element, { store, navigation, jumps, frameWindow }) {
-  const cellCanvas = make("canvas");
-  const cursor = make("canvas");
+  const cellCanvas = make("canvas", "is-layer");
+  const cursor = make("canvas", "is-layer");
   let hovered = /** @type {number | null} */ (null);
   let gesture = /** @type {Gesture | null} */ (null);
   /** Start of the range that is being marked. */
