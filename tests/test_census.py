@@ -8,7 +8,7 @@ import pytest
 from architecture import FILES, ROOT, nodes, trees
 from code_counts import code_lines, git, numbers, unexplained_rises
 
-MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 1157, 349, 0
+MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 1108, 330, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
 MAX_CODE_LINES = {"tracker": 49345, "app": 20790, "js": 14506, "css": 4472, "tests": 66600}

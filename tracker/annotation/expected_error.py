@@ -18,7 +18,7 @@ from tracker.body.model import BodyModel
 from tracker.estimation.tracking.pose_errors import LOST_FROM, point_covariances
 from tracker.evaluation.metrics import LOST_M
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.stored_poses import StoredPose
 
@@ -78,7 +78,7 @@ class ExpectedErrors:
         before, after = logs[:-1][pairs], logs[1:][pairs]
         scale = np.sqrt(np.sum(before**2) * np.sum(after**2))
         n = max(2, len(self.frames))
-        return float(np.clip(np.sum(before * after) / scale, 0.0, 1 - 1 / n)) if scale > 1e-12 else 0.0
+        return float(np.clip(np.sum(before * after) / scale, 0.0, 1 - 1 / n)) if scale > TINY else 0.0
 
     @property
     def mean_variance(self) -> float:

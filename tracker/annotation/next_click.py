@@ -19,7 +19,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import SessionError, TrackerError
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.images.working_view import working_scale
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.session.session import Session
 from tracker.session.store.stored_poses import StoredPose
@@ -298,7 +298,7 @@ class _Person:
             at = self.errors.unit_of == u
             for t in frames:
                 self.gains_m[t, u] = 0.0
-                if helps_m[t, at].sum() > 1e-9:  # rounding
+                if helps_m[t, at].sum() > TINY:  # rounding
                     to, share = self._carried(t)
                     left = mean_errors(*self._after(t, to, share, at))
                     self.gains_m[t, u] = np.maximum(self.errors.errors_m[to][:, at] - left, 0).sum()
@@ -312,4 +312,4 @@ def _shown(bodies: Sequence[PosedBody], model: BodyModel, camera: Camera) -> Arr
     inside = np.all((middles >= 0) & (middles <= np.array(camera.size) - 1), axis=1)
     own = seen.parts < n
     shown = np.bincount(seen.parts[own], (lengths * (~seen.occluded & inside))[own], n)
-    return np.asarray(shown / np.maximum(np.bincount(seen.parts[own], lengths[own], n), 1e-9))
+    return np.asarray(shown / np.maximum(np.bincount(seen.parts[own], lengths[own], n), TINY))

@@ -14,7 +14,7 @@ from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 from tracker.body.parts import Joint, Landmark, Part
 from tracker.errors import TrackerError
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 HEIGHT_LIMITS_M = (0.3, 3.0)
 """Least and largest height of a body, metres."""
@@ -215,14 +215,14 @@ def main_axis(model: BodyModel, part: int) -> int:
     """Return the axis of a part, given by index, along which its length is measured: 0, 1 or 2."""
     extents = np.ptp(_ends(model, part), axis=0)
     # A part without further points is as long as its shape.
-    return int(np.argmax(extents if extents.max() > 1e-6 else model.parts[part].half_axes))
+    return int(np.argmax(extents if extents.max() > TINY else model.parts[part].half_axes))
 
 
 def _length(model: BodyModel, part: int) -> float:
     """Return the length of a part, fraction of height."""
     axis = main_axis(model, part)
     extent = float(np.ptp(_ends(model, part)[:, axis]))
-    return extent if extent > 1e-6 else 2 * model.parts[part].half_axes[axis]
+    return extent if extent > TINY else 2 * model.parts[part].half_axes[axis]
 
 
 def _girdles(model: BodyModel) -> list[str]:
@@ -231,7 +231,7 @@ def _girdles(model: BodyModel) -> list[str]:
     out = []
     for width in _WIDTHS:
         pair = [by_name[f"{side}{width}"] for side in _SIDES if f"{side}{width}" in by_name]
-        if len(pair) == 2 and pair[0].parent == pair[1].parent and _half_width(model, width) > 1e-6:
+        if len(pair) == 2 and pair[0].parent == pair[1].parent and _half_width(model, width) > TINY:
             out.append(width)
     return [w for w in out if main_axis(model, model.part_index[by_name[f"left_{w}"].parent]) != 1]
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.footage.recording import Recording
-from tracker.geometry.arrays import Array, Image
+from tracker.geometry.arrays import TINY, Array, Image
 
 
 class Flash(NamedTuple):
@@ -49,5 +49,5 @@ def flash_of(brightness: list[Array]) -> Flash | None:
     rise = means[last] - means[first]
     share = (means[first + 1] - means[first]) / rise if rise > 0 else 1.0
     others = np.delete(np.abs(np.diff(means)), [first, last - 1])
-    ratio = float(rise / max(np.nanmax(others, initial=0.0), 1e-6))
+    ratio = float(rise / max(np.nanmax(others, initial=0.0), TINY))
     return Flash(first + 1 + float(np.clip(1 - share, 0.0, 1.0)), ratio, ratio >= 5.0)

@@ -21,6 +21,7 @@ from msgspec import Meta
 from tracker.body.model import BodyModel
 from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
+from tracker.geometry.arrays import TINY
 from tracker.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml, read_text
 from tracker.validation import UNPRINTABLE, Color, Name, Vector, check, check_version
 
@@ -72,7 +73,7 @@ class _AxisRow(_Row):
     spread_deg: Annotated[float, Meta(gt=0, description="a number above 0")] = np.inf
 
     def __post_init__(self) -> None:
-        if np.linalg.norm(self.axis) < 1e-9:
+        if np.linalg.norm(self.axis) < TINY:
             raise ValueError(f"expected a direction other than 0 as 'axis', found {list(self.axis)}")
 
 

@@ -17,6 +17,8 @@ Image = NDArray[np.uint8]
 """Pixels, (H, W) or (H, W, 3) in BGR, as each function states."""
 Mask = NDArray[np.bool_]
 """Whether each pixel belongs to something, (H, W)."""
+TINY = 1e-9
+"""Less is rounding: of lengths in metres or pixels, sines, shares. Divisors that may be 0 are at least that."""
 DAMAGED_ARRAYS = (
     OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, SyntaxError, MemoryError,
     tokenize.TokenError,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 MIN_APART_M = 0.02
 """Least distance of two cameras, metres: no stereo camera for people is narrower."""
@@ -43,9 +43,9 @@ def axes_point(Ts_world_camera: Sequence[Array] | Array) -> AxesPoint:
     middle = centers.mean(axis=0)
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     # For parallel axes, the solution of minimum norm lies beside the cameras.
-    offset = np.linalg.lstsq(across.sum(axis=0), (across @ (centers - middle)[..., None]).sum(axis=0)[:, 0], rcond=1e-9)
+    offset = np.linalg.lstsq(across.sum(axis=0), (across @ (centers - middle)[..., None]).sum(axis=0)[:, 0], rcond=TINY)
     toward = middle + offset[0] - centers
     distances = np.linalg.norm(toward, axis=1)
-    cosines = (axes * toward).sum(axis=1) / np.maximum(distances, 1e-12)
+    cosines = (axes * toward).sum(axis=1) / np.maximum(distances, TINY)
     spread = np.arccos(np.clip(axes @ axes.T, -1, 1)).max()
     return AxesPoint(middle + offset[0], np.arccos(np.clip(cosines, -1, 1)), distances, float(spread))

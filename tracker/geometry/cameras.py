@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.lenses import (
     coefficient_counts,
     count_words,
@@ -124,7 +124,7 @@ class Camera:
         angles = np.arctan2(np.linalg.norm(directions[:, :2], axis=-1), directions[:, 2])
         widest = min(MAX_PINHOLE_ANGLE, fisheye_limit(self.distortion))
         slopes = np.tan(np.where(angles < widest, angles, widest))  # NaN is beyond the lens
-        lengths = np.maximum(np.linalg.norm(xy, axis=-1, keepdims=True), 1e-12)  # 0 at the principal point
+        lengths = np.maximum(np.linalg.norm(xy, axis=-1, keepdims=True), TINY)  # 0 at the principal point
         border_px = self._slopes_to_px(xy / lengths * slopes[:, None])
         low, high = np.floor(border_px.min(axis=0)), np.ceil(border_px.max(axis=0))
         width, height = (int(n) + 1 for n in high - low)
@@ -266,7 +266,7 @@ class Camera:
             return self._slopes_to_px(fisheye_project(directions, self.distortion))
         z = directions[..., 2:]
         with np.errstate(divide="ignore", invalid="ignore"):
-            xy = np.where(z > 1e-9, directions[..., :2] / z, np.nan)
+            xy = np.where(z > TINY, directions[..., :2] / z, np.nan)
         return self._slopes_to_px(xy if self.is_pinhole else distort_slopes(xy, self.distortion))
 
     def _px_to_directions(self, points_px: Array) -> Array:
@@ -354,7 +354,7 @@ def epipolar_segment(source: Camera, target: Camera, point_px: Array) -> Array |
     origin = rigid.apply(target.T_camera_world, source.center_world)
     # The part of the ray t >= 0 in front of the target: z(t) = o_z + t d_z >= near.
     t_low, t_high = 0.0, np.inf
-    if abs(direction[2]) < 1e-12:
+    if abs(direction[2]) < TINY:
         if origin[2] < NEAR_PLANE_M:
             return None
     else:
@@ -364,7 +364,7 @@ def epipolar_segment(source: Camera, target: Camera, point_px: Array) -> Array |
         return None
     P = target.K @ np.stack([origin, direction], axis=1)  # (3, 2): homogeneous pixel as P @ (1, t)
     ends = np.stack([P @ (1.0, t_low), P[:, 1] if np.isinf(t_high) else P @ (1.0, t_high)])
-    if abs(ends[1, 2]) < 1e-12:  # the ray runs parallel to the image: go far enough to leave it
+    if abs(ends[1, 2]) < TINY:  # the ray runs parallel to the image: go far enough to leave it
         ends[1] = P @ (1.0, t_low + 1e6)
     return _clip_segment(ends[:, :2] / ends[:, 2:], target.size)
 
@@ -376,7 +376,7 @@ def _clip_segment(segment_px: Array, size: tuple[int, int]) -> Array | None:
     for axis in (0, 1):
         for sign, bound in ((-1.0, 0.5), (1.0, size[axis] - 0.5)):
             p, q = sign * delta[axis], bound - sign * start[axis]
-            if abs(p) < 1e-12:
+            if abs(p) < TINY:
                 if q < 0:
                     return None
             elif p < 0:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracker.errors import TrackerError
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.rigid import so3_exp
 
 MIN_HEIGHT_M = 0.2
@@ -31,7 +31,7 @@ class GroundPlane:
         axis = np.cross(R_world_up[:, 2], self.normal)
         sine, cosine = float(np.linalg.norm(axis)), float(R_world_up[:, 2] @ self.normal)
         # Upside down, all axes across are equally good.
-        direction = axis / sine if sine > 1e-9 else R_world_up[:, 0]
+        direction = axis / sine if sine > TINY else R_world_up[:, 0]
         return np.asarray(so3_exp(np.arctan2(sine, cosine) * direction) @ R_world_up)
 
 
@@ -48,7 +48,7 @@ def floor_through(points_world: Array, centers_world: Array) -> GroundPlane:
     a, b, c = points_world
     sides = np.linalg.norm([b - a, c - b, a - c], axis=1)
     across = np.cross(b - a, c - a)
-    height_m = float(np.linalg.norm(across) / max(sides.max(), 1e-9))
+    height_m = float(np.linalg.norm(across) / max(sides.max(), TINY))
     if height_m < MIN_HEIGHT_M:
         raise TrackerError(
             f"expected three points of the floor that span a wide triangle, found them within {100 * height_m:.0f} cm "

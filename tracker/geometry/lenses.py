@@ -7,7 +7,7 @@ angle, r = a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8). It has no such end.
 
 import numpy as np
 
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 _TABLE_SIZE = 2049
 """Angles between which the inverse of the polynomial is interpolated before Newton's method refines it."""
@@ -49,7 +49,7 @@ def fisheye_limit(distortion: Array) -> float:
     """Return the angle from the axis up to which the polynomial grows, at most pi, rad; beyond, it shows nothing."""
     # dr/da as a polynomial of 1/a^2, multiplied by its fourth power, so that the first coefficient is never 0.
     inverse_squares = np.roots([1.0, *_padded(distortion) * [3, 5, 7, 9]])
-    is_real = np.abs(inverse_squares.imag) <= 1e-9 * np.abs(inverse_squares)
+    is_real = np.abs(inverse_squares.imag) <= TINY * np.abs(inverse_squares)
     turns = inverse_squares.real[is_real & (inverse_squares.real > 1 / np.pi**2)]
     return float(1 / np.sqrt(turns.max())) if len(turns) else np.pi
 

@@ -8,7 +8,7 @@ loading it takes 0.1 s.
 
 import numpy as np
 
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 
 def skew(v: Array) -> Array:
@@ -107,7 +107,7 @@ def clip_swing_twist(wxyz: Array, cone: float, twist: float) -> Array:
     """Limit the swing and the twist about z of a rotation, rad; quaternion `(4,)` to quaternion `(4,)`."""
     q = wxyz / np.linalg.norm(wxyz)
     norm = np.hypot(q[0], q[3])
-    turn = np.array([q[0], 0.0, 0.0, q[3]]) / norm if norm > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
+    turn = np.array([q[0], 0.0, 0.0, q[3]]) / norm if norm > TINY else np.array([1.0, 0.0, 0.0, 0.0])
     swing = quaternion_log(quaternion_multiply(q, turn * (1.0, -1.0, -1.0, -1.0)))
     angle = np.linalg.norm(swing)
     if angle > cone:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.arrays import TINY, Array, IntArray, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.triangulation import MIN_ANGLE_RAD
 
@@ -257,7 +257,7 @@ def _refine(views: Views, points: Array, points_px: Array, weights: Array) -> tu
     robust = weights
     for _ in range(_ROBUST_ROUNDS):
         angles = views.errors(points, points_px)[0] / views.focal_px
-        robust = weights / (1 + (np.nan_to_num(angles) / (_CAUCHY * max(sigma, 1e-9))) ** 2)
+        robust = weights / (1 + (np.nan_to_num(angles) / (_CAUCHY * max(sigma, TINY))) ** 2)
         points, information = _gauss_newton(views, points, points_px, robust)
     return points, information, sigma
 

@@ -12,7 +12,7 @@ from tracker.files import refuse_links, write_text_atomic
 from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import format_calibration
 from tracker.formats.model_toml import has_preset_proportions
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.camera_correction import DRIFT, TIME, corrected
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
 from tracker.pipeline.calibration_check import CalibrationCheck
@@ -156,7 +156,7 @@ def _alike(a: object, b: object) -> bool:
     if isinstance(a, list) and isinstance(b, list):
         return len(a) == len(b) and all(map(_alike, a, b))
     if isinstance(a, float) and isinstance(b, float):
-        return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9)
+        return math.isclose(a, b, rel_tol=TINY, abs_tol=TINY)
     return a == b
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from tracker.compute.quantiles import known_median
-from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.arrays import TINY, Array, IntArray, Mask
 
 Bones: TypeAlias = Sequence[tuple[Sequence[int], Sequence[int]]]
 """Indices of the left and of the right point at both ends of each bone."""
@@ -163,7 +163,7 @@ class _Likelihood:
         mean = (weights * np.nan_to_num(medians)).sum(axis=0) / total
         among = (weights * (np.nan_to_num(medians) - mean) ** 2).sum(axis=0) / total
         freedom = np.maximum(total**2 / np.maximum((weights**2).sum(axis=0), 1.0), 1.0)
-        within = np.maximum(within, 1e-12)
+        within = np.maximum(within, TINY)
         return cls(_positive(step_m), noise, within, np.maximum(within, among), freedom)
 
     def nats(self, person: Sequence[_Stretch], stretch: _Stretch) -> float:

@@ -13,7 +13,7 @@ from tracker.calibration.check.lens_priors import UNKNOWN_LENS, prior_sigmas
 from tracker.calibration.check.reprojection import Prior, Rig, RigFit, fit_rig
 from tracker.compute.sampling import spread_indices
 from tracker.estimation.fitting.bundle import solve_bundle
-from tracker.geometry.arrays import IntArray
+from tracker.geometry.arrays import TINY, IntArray
 from tracker.geometry.camera_columns import FOCAL
 from tracker.geometry.cameras import Camera
 
@@ -110,5 +110,5 @@ def _first_lenses(blank: Camera) -> Iterator[Camera]:
 def _lens_fit(problem: BoardProblem, fit: RigFit, n_views: int) -> LensFit:
     depths = problem.locate(fit.rig.own).points_world[:, 2]
     focal_sigma = float(np.sqrt(fit.covariance[FOCAL, FOCAL]))
-    ratio = float(depths.max() / max(1e-9, depths.min()))
+    ratio = float(depths.max() / max(TINY, depths.min()))
     return LensFit(fit.rig.cameras[0], float(fit.sigmas_px[0]), focal_sigma, ratio, n_views)

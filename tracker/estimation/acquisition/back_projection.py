@@ -17,7 +17,7 @@ from tracker.evidence.images.edge_segments import MAX_ANGLE_RAD
 from tracker.evidence.images.silhouette_contour import MIN_TRUST
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array, FloatArray, IntArray
+from tracker.geometry.arrays import TINY, Array, FloatArray, IntArray
 from tracker.geometry.cameras import Camera
 
 MIN_POINTS = 8
@@ -94,7 +94,7 @@ def explained_points(view: ViewEvidence, bodies: Sequence[PosedBody]) -> tuple[A
     if not len(pieces) or not len(points):
         return np.empty((0, 2)), np.empty(0, np.int64)
     along = pieces[:, 2:] - pieces[:, :2]
-    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-6)
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), TINY)
     from scipy.spatial import cKDTree  # here: it takes a sixth of the time in which the program loads
 
     tree = cKDTree((pieces[:, :2] + pieces[:, 2:]) / 2)

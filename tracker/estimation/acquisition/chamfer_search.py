@@ -18,7 +18,7 @@ from tracker.estimation.acquisition.size_fit import SightedPerson
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 _BLOCKS = (
     ("girth_a", "side_x", "taper_x"),
@@ -143,7 +143,7 @@ class _Space:
         for signs in product((-1.0, 0.0, 1.0), repeat=len(at)):
             tried = sizes.copy()
             tried[at] += np.array(signs) * step[at]
-            if any(signs) and np.all(np.abs(tried[at]) <= half_range[at] + 1e-9):
+            if any(signs) and np.all(np.abs(tried[at]) <= half_range[at] + TINY):
                 tried_m = self._distance_m(tried, parts)
                 if tried_m < best_m - 1e-6:
                     best, best_m = tried, tried_m

@@ -15,7 +15,7 @@ from tracker.estimation.acquisition.piece_sums import GroupSums, sums_of_views
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.contour_residuals import MatchSettings, PieceSums
 from tracker.evidence.contours import occluding_contours
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.cameras import Camera
 
 _POSE_WEIGHT = 10.0
@@ -75,7 +75,7 @@ def _visible_pieces(contour: occluding_contours.Contour, first: int, body: Posed
     inside = np.all((middles >= 0) & (middles < camera.size), axis=1)
     own = ~contour.occluded & (parts >= 0) & (parts < len(model.parts)) & inside
     parts, along = parts[own], contour.pieces_px[own, 2:] - contour.pieces_px[own, :2]
-    lengths = np.maximum(np.linalg.norm(along, axis=1), 1e-6)
+    lengths = np.maximum(np.linalg.norm(along, axis=1), TINY)
     normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / lengths[:, None]
     T = body.kinematics.Ts_world_part[parts]
     local = np.einsum("nji,nj->ni", T[:, :3, :3], contour.points_world[own] - T[:, :3, 3])

@@ -25,7 +25,7 @@ from tracker.estimation.fitting.gauss_newton import (
 from tracker.estimation.fitting.keypoints import GROSS_SIGMAS
 from tracker.evidence.keypoints import PersonKeypoints
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.triangulation import sigma_px
 
@@ -128,7 +128,7 @@ class SeenBody(NamedTuple):
             parts, places = _places(body.model, seen, self.offsets_part)
             errors = _errors(_placed(body, parts, places), seen.seen[k], cameras) / self.sigmas[:, None]
             squares = np.nan_to_num(seen.confidence[k] * (errors**2).sum(axis=-1), nan=np.inf)
-            out[k] = 0.5 * float(np.sum(GROSS_SIGMAS**2 / (1 + GROSS_SIGMAS**2 / np.maximum(squares, 1e-12))))
+            out[k] = 0.5 * float(np.sum(GROSS_SIGMAS**2 / (1 + GROSS_SIGMAS**2 / np.maximum(squares, TINY))))
         return out
 
 

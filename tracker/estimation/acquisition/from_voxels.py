@@ -31,7 +31,7 @@ from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.estimation.voxel.state import FilterState
 from tracker.evidence.contours.body_silhouette import body_silhouette
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.geometry.arrays import Array, Mask, intersection_over_union
+from tracker.geometry.arrays import TINY, Array, Mask, intersection_over_union
 
 _KINDS = ("height", "build", "length", "girth", "free_end")
 """Kinds of sizes that voxels show; the places of joints in the flesh are left to the contours."""
@@ -256,5 +256,5 @@ def _relative(state: FilterState, seen: PartAxes, own: PartAxes) -> PartAxes:
         turns=seen.turns - own.turns,
         sizes=sizes,
         variances=(state.figure.sigma_shares * sizes) ** 2,
-        volumes=volumes * seen.volumes / np.maximum(own.volumes, 1e-9),
+        volumes=volumes * seen.volumes / np.maximum(own.volumes, TINY),
     )

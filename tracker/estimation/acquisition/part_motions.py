@@ -15,7 +15,7 @@ import numpy as np
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.estimation.acquisition.size_parameters import DIFFERENCE, SizeArrays
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.rigid import skew
 from tracker.geometry.shapes import EllipticalCone, Shape, TaperedSuperquadric
 
@@ -112,7 +112,7 @@ def _by_exponents(shape: TaperedSuperquadric, points: Array) -> Array:
     gradient = np.stack(
         [unit.inside_outside(points + s) - unit.inside_outside(points - s) for s in DIFFERENCE * np.eye(3)], axis=1
     ) / (2 * DIFFERENCE * np.array(shape.half_axes))  # fmt: skip
-    steepness = np.maximum(np.sum(gradient**2, axis=1), 1e-12)
+    steepness = np.maximum(np.sum(gradient**2, axis=1), TINY)
     out = np.empty((*points.shape, 2))
     for k, (s1, s2) in enumerate(DIFFERENCE * np.eye(2)):
         e1, e2 = shape.exponents

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tracker.evidence.images.color_histogram import BINS
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 VOLUME = (256 / BINS) ** 3
 """Volume of a bin, cubic gray levels."""
@@ -28,5 +28,5 @@ def log_density(counts: Array) -> Array:
     """Return the log density of each colour, (..., BINS^3), per cubic gray level, of histograms with some doubt."""
     smooth = smoothed(counts)
     total = smooth.sum(axis=-1, keepdims=True)
-    shares = np.where(total > 0, smooth / np.maximum(total, 1e-12), 1 / BINS**3)
+    shares = np.where(total > 0, smooth / np.maximum(total, TINY), 1 / BINS**3)
     return np.log(((1 - DOUBT) * shares + DOUBT / BINS**3) / VOLUME)

@@ -31,7 +31,7 @@ from tracker.estimation.appearance.region_deficit import counterparts
 from tracker.evidence.contours.occluding_contours import part_poses
 from tracker.evidence.images.color_histogram import BINS, bin_of
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
 
 _ACROSS = 3
@@ -236,7 +236,7 @@ class Colors:
 
 
 def _share(counts: Array) -> Array:
-    return counts / max(1e-12, float(counts.sum()))
+    return counts / max(TINY, float(counts.sum()))
 
 
 def _mean_by_part(nats: Array, parts: NDArray[np.int64], n_parts: int) -> tuple[Array, Array]:

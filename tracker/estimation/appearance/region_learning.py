@@ -25,7 +25,7 @@ from tracker.estimation.appearance.region_kernels import (
 from tracker.estimation.appearance.region_model import OCCUPIED_M, REACH_M, RegionModel, background_of, sample_share
 from tracker.evidence.images.color_histogram import BINS
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
+from tracker.geometry.arrays import TINY, Array, FloatArray, Image, IntArray
 from tracker.geometry.cameras import Camera
 
 N_LEARNING = 60
@@ -130,7 +130,7 @@ def _colors(models: Sequence[BodyModel], shown: Sequence[_Shown], weights: Array
     twins, of_body = counterparts(models), _bodies_of(models)
     pooled = counts.sum(axis=0)
     pooled = pooled + pooled[twins]
-    prior = _PRIOR_SAMPLES * pooled / np.maximum(pooled.sum(axis=-1, keepdims=True), 1e-9)
+    prior = _PRIOR_SAMPLES * pooled / np.maximum(pooled.sum(axis=-1, keepdims=True), TINY)
     is_rest = of_body[:, None] == of_body
     is_rest[range(n_parts), range(n_parts)] = is_rest[range(n_parts), twins] = False
     rest = is_rest.astype(np.float64) @ counts
@@ -171,7 +171,7 @@ def _agreement(models: Sequence[BodyModel], tables: RegionTables, shown: Sequenc
     for s in shown:
         own = tables.of_view(s.view)
         add_score(s.cells.colors, s.canvas, s.share, s.background, own, nats[s.frame], samples[s.frame])
-    rates = nats / np.maximum(samples, 1e-9)
+    rates = nats / np.maximum(samples, TINY)
     best = usual(rates, models)
     return np.asarray(np.clip(1 - (best - rates) / np.maximum(best, _CLEAR), 0, 1) ** 2)
 

@@ -17,7 +17,7 @@ from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.estimation.fitting.gauss_newton import UNKNOWN
 from tracker.estimation.fitting.twists import twists_to_dofs
 from tracker.evidence.contours import occluding_contours
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.cameras import Camera
 
 OBSERVABLE_RAD, OBSERVABLE_M = float(np.radians(10.0)), 0.03
@@ -228,7 +228,7 @@ def _part_twists(bodies: Sequence[PosedBody], camera: Camera, own: slice, noise:
         np.diff(ends[at], axis=1)[:, 0],
     )
     lengths = np.linalg.norm(steps, axis=1)
-    normals = np.stack([-steps[:, 1], steps[:, 0]], axis=1) / np.maximum(lengths, 1e-9)[:, None]
+    normals = np.stack([-steps[:, 1], steps[:, 0]], axis=1) / np.maximum(lengths, TINY)[:, None]
     _, J = camera.project_with_jacobian(points)
     gradients = np.einsum("ni,nij->nj", normals, J)
     rows = np.concatenate([np.cross(points, gradients), gradients], axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.arrays import TINY, Array, FloatArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.shapes import Shape
 
@@ -69,7 +69,7 @@ def point_on_part(body: PosedBody, camera: Camera, part: int, pointer_px: Array)
     turned = np.cross(from_a, ab)
     s, t = np.einsum("ij,ij->i", from_a, across) / det, turned @ ray / det
     far = np.einsum("ij,ij->i", ac, turned) / det
-    hit = (s >= -1e-9) & (t >= -1e-9) & (s + t <= 1 + 1e-9) & (far > 0) & np.isfinite(det)
+    hit = (s >= -TINY) & (t >= -TINY) & (s + t <= 1 + TINY) & (far > 0) & np.isfinite(det)
     if np.any(hit):
         return np.asarray(start + far[hit].min() * ray)
     points = corners[:, 0]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.cameras import Camera
 
 _MAX_RATIO = 2.0
@@ -70,7 +70,7 @@ def _weakest(at: Array, views: Sequence[int], cameras: Sequence[Camera]) -> Arra
 
 def _sight(camera: Camera, at: Array) -> Array:
     way = at - camera.center_world
-    return np.asarray(way / max(1e-9, float(np.linalg.norm(way))))
+    return np.asarray(way / max(TINY, float(np.linalg.norm(way))))
 
 
 def _is_inside(camera: Camera, at: Array) -> bool:

@@ -24,7 +24,7 @@ from tracker.estimation.fitting.gauss_newton import (
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M
 from tracker.estimation.posing.grab import Grab, Holds
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.cameras import NEAR_PLANE_M
 
 
@@ -350,7 +350,7 @@ def _is_near(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_
     """
     places, length = _chain(grabbed, pose, active_dofs)
     way = target_world - places[-1]
-    reachable = places[-1] + min(1.0, length / max(float(np.linalg.norm(way)), 1e-9)) * way
+    reachable = places[-1] + min(1.0, length / max(float(np.linalg.norm(way)), TINY)) * way
     return float(np.linalg.norm(places[0] - reachable)) < _NEAR_M
 
 

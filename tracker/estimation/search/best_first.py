@@ -18,7 +18,7 @@ from tracker.body.model import BodyModel
 from tracker.body.parts import SearchGroup
 from tracker.errors import TrackerError
 from tracker.estimation.search.chamfer_cost import ChamferCost
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 
 @dataclass(frozen=True)
@@ -237,8 +237,8 @@ def _search_stage(
     center = best[person]
     offset = model.difference(center, predicted)[dofs]
     # Lattice coordinates within the bounds around the prediction; the centre itself is always allowed.
-    low = np.minimum(0, np.ceil((-bounds - offset) / steps - 1e-9)).astype(int)
-    high = np.maximum(0, np.floor((bounds - offset) / steps + 1e-9)).astype(int)
+    low = np.minimum(0, np.ceil((-bounds - offset) / steps - TINY)).astype(int)
+    high = np.maximum(0, np.floor((bounds - offset) / steps + TINY)).astype(int)
 
     def poses_at(nodes: list[tuple[int, ...]]) -> Array:
         change = np.zeros((len(nodes), model.n_dofs))

@@ -23,7 +23,7 @@ from tracker.estimation.fitting.gauss_newton import Fit, covariance
 from tracker.estimation.tracking.remarks import uncertain
 from tracker.estimation.tracking.view_regions import px_per_m
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.arrays import TINY, Array, IntArray, Mask
 
 Status = Literal["good", "doubtful", "lost"]
 
@@ -295,7 +295,7 @@ class _Contours(NamedTuple):
 
     def forward(self, parts: IntArray | slice) -> float:
         """Return the feature `forward` of some parts."""
-        return float(self.far[:, parts].sum()) / max(1e-9, float(self.costs.length_px[:, parts].sum()))
+        return float(self.far[:, parts].sum()) / max(TINY, float(self.costs.length_px[:, parts].sum()))
 
     def explained(self, parts: IntArray | slice) -> float:
         """Return the feature `explained` of some parts."""

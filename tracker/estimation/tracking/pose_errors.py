@@ -13,7 +13,7 @@ from tracker.body.model import BodyModel
 from tracker.estimation.fitting.gauss_newton import OTHER_BODY_M
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M
 from tracker.estimation.tracking.confidence import LOST_NATS, LOST_ODDS, OFF_ODDS, probabilities
-from tracker.geometry.arrays import Array, Mask
+from tracker.geometry.arrays import TINY, Array, Mask
 
 SHARED_M = 0.006
 """Standard deviation along each axis with which sizes acquired from known joints determine the joints, metres. Of those
@@ -102,7 +102,7 @@ def beyond(radius_m: float, sigma_m: Array) -> Array:
     """
     from scipy.special import erfc  # imported lazily: loading takes 0.1 s
 
-    x = radius_m / np.maximum(sigma_m, 1e-9)
+    x = radius_m / np.maximum(sigma_m, TINY)
     return np.asarray(erfc(x / np.sqrt(2)) + np.sqrt(2 / np.pi) * x * np.exp(-(x**2) / 2))
 
 

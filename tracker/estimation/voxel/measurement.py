@@ -13,7 +13,7 @@ from tracker.estimation.voxel.labels import PartClouds
 from tracker.estimation.voxel.motion_model import left_jacobian_inverse
 from tracker.estimation.voxel.state import FilterState
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 
 MIN_VOXELS = 4
 """Fewest voxels of a part that is measured: fewer have no three principal axes."""
@@ -164,7 +164,7 @@ def _doubt(state: FilterState, found: PartAxes, noise: MeasurementNoise) -> Arra
     expected = np.sum((state.figure.sigma_shares * state.sizes)[:, :2] ** 2, axis=1) + 2 * _SKIN_M**2
     thick = np.sum(found.variances[:, :2], axis=1) / expected
     volumes = np.pi * 2 * np.prod(state.sizes, axis=1) * np.where(state.figure.is_ellipsoid, 2 / 3, 1.0)
-    missing = volumes / np.maximum(found.volumes, 1e-9)
+    missing = volumes / np.maximum(found.volumes, TINY)
     return np.asarray(np.clip(thick, 1.0, 3.0) ** 2 * np.clip(missing, 1.0, 10.0))
 
 

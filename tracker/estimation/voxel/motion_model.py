@@ -8,7 +8,7 @@ from tracker.estimation.voxel.figure import N_PARTS
 from tracker.estimation.voxel.kalman import product
 from tracker.estimation.voxel.state import FilterState
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 
 class ProcessNoise(NamedTuple):
@@ -51,7 +51,7 @@ def transition(state: FilterState, dt: float, damping: float = 0.0) -> tuple[Arr
     F, step = np.eye(at.n), np.zeros(at.n)
     # The velocity dies away as exp(-damping t), so that the way is its integral.
     kept = float(np.exp(-damping * dt))
-    effective = dt if damping * dt < 1e-9 else (1.0 - kept) / damping
+    effective = dt if damping * dt < TINY else (1.0 - kept) / damping
     if at.velocity:
         step[at.center_at] = effective * state.velocity
         step[at.velocity_at] = (kept - 1.0) * state.velocity

@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.body.motion.shortest_step import nearest_equivalent, shortest_step
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 
 
 def mean_pose(model: BodyModel, poses: Sequence[Array]) -> Array:
@@ -23,7 +23,7 @@ def mean_pose(model: BodyModel, poses: Sequence[Array]) -> Array:
     while True:
         step = pose_steps(model, poses, mean).mean(axis=0)
         mean = model.retract(mean, step)
-        if float(np.abs(step).max()) < 1e-9:  # rad and metres; the steps shrink quadratically
+        if float(np.abs(step).max()) < TINY:  # rad and metres; the steps shrink quadratically
             return nearest_equivalent(model, mean, mean)
 
 

@@ -15,7 +15,7 @@ from tracker.compute.sampling import spread_indices
 from tracker.errors import CalibrationError, Remedy
 from tracker.formats.calibrations.convention_names import CONVENTIONS, PoseConvention
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.camera_rig import axes_point
 
 STATED: PoseConvention = "world-to-camera"
@@ -201,7 +201,7 @@ def _distinct(conventions: Sequence[PoseConvention], Ts_stated: Sequence[Array])
 
 def _from_first(Ts_stated: Sequence[Array], convention: PoseConvention) -> Array:
     Ts = np.array([read_pose(T, convention) for T in Ts_stated])
-    scale = max(float(np.abs(Ts[:, :3, 3]).max()), 1e-12)
+    scale = max(float(np.abs(Ts[:, :3, 3]).max()), TINY)
     Ts[:, :3, 3] /= scale
     return Ts @ rigid.inverse(Ts[0])
 

@@ -14,7 +14,7 @@ from tracker.estimation.acquisition.segment_lengths import SEGMENTS
 from tracker.estimation.acquisition.size_parameters import SizePriors
 from tracker.estimation.acquisition.typical_body import typical_body
 from tracker.formats.model_toml import load_model
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.lengths import USUAL_SIZES
 
 
@@ -97,7 +97,7 @@ def bones(places: Places) -> Bones:
     known = {key: lengths for key, lengths in known.items() if np.isfinite(lengths).any()}
     if not known:
         return Bones(0.0, np.nan)
-    logs = np.log(np.maximum([*known.values()], 1e-9))
+    logs = np.log(np.maximum([*known.values()], TINY))
     stature = usual = np.ones(1)
     for _ in range(2):  # a child has other proportions
         body = typical_body(load_model(_BODY, float(np.clip(stature, *_PERSON).item())))
