@@ -1,5 +1,6 @@
 """Walks through the code: the files that a piece of work passes, and how often it crosses from one to another."""
 
+import re
 import sys
 import threading
 from collections import Counter
@@ -7,6 +8,7 @@ from contextlib import contextmanager
 
 from architecture import ROOT
 
+ROW = re.compile(r"^\| `([^`]+\.py)` \| `([\w.]+)` \|", re.MULTILINE)
 HOUSES = tuple(f"{ROOT / house}/" for house in ("app", "tracker"))
 
 
@@ -15,6 +17,8 @@ class Walk:
 
     def __init__(self):
         self._crossings = None
+        self.first_calls = {}
+        """Order in which functions were first called while calls were counted, by file and qualified name."""
         self._of_code = {}
 
     @contextmanager
@@ -36,6 +40,7 @@ class Walk:
         caller = frame.f_back
         while caller is not None and (file := self._file(caller.f_code)) is None:
             caller = caller.f_back
+        self.first_calls.setdefault((to, frame.f_code.co_qualname), len(self.first_calls))
         if caller is not None and file != to:
             crossings[file, to] += 1
 
@@ -58,3 +63,9 @@ def traced():
     finally:
         sys.setprofile(None)
         threading.setprofile(None)
+
+
+def calls_of(heading):
+    """File and function of each row of the table below a heading."""
+    text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    return ROW.findall(text.split(f"\n## {heading}")[1].split("\n## ")[0])
