@@ -24,6 +24,8 @@ from architecture import (
     wing_of,
 )
 
+MEASURING = ("tracker.simulate", "app.bench")
+
 
 def test_the_walk_sees_imports_of_every_kind():
     within = "def f():\n    from tracker.errors import TrackerError\n    import viser as v\n"
@@ -70,6 +72,14 @@ def test_no_circle():
 def test_the_tracker_knows_no_screen():
     roots = {m: {name.split(".")[0] for name in found} for m, found in imports().items() if m.startswith("tracker")}
     assert {m: found & OF_THE_SCREEN for m, found in roots.items() if found & OF_THE_SCREEN} == {}
+
+
+def test_measuring_is_of_no_use_to_the_product():
+    """Simulated recordings, experiments and benchmarks are started by commands alone."""
+    users = {(m, wing_of(n)) for m, needs in own_imports().items() for n in needs if n.startswith(MEASURING)}
+    others = {(m, wing) for m, wing in users if not m.startswith((*MEASURING, "app.cli."))}
+    assert len(users) > 20
+    assert others == set()
 
 
 def test_the_page_imports_run_downwards():

@@ -15,7 +15,6 @@ LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)(#[^)]*)?\)")
 HEADING_LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)#([^)\s]+)\)")
 FILE = re.compile(r"`((?:app|tracker|static|tests|docs|sample_sessions)/[\w./-]+)`")
 COMMAND = re.compile(r"^ {4}(?:\.venv/bin/)?(quadrille\b(?:[^\\\n]|\\\n)*)", re.MULTILINE)
-MAKE = re.compile(r"`?make ([a-z-]+)`?")
 
 
 def anchors(page):

@@ -55,10 +55,6 @@ def handles(controller):
     return server.handles
 
 
-def R_of(handle):
-    return rigid.matrix_from_quaternion(np.array(handle.wxyz))
-
-
 def part_frame(controller, name):
     model = controller.models[0]
     return model.kinematics(controller.state.poses[0]).Ts_world_part[[j.name for j in model.joints].index(name)]

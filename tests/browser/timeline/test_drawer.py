@@ -40,14 +40,6 @@ async def test_a_drawer_whose_content_is_gone_closes(page, endpoint):
     assert await page.locator("#drawer").is_visible()
 
 
-PRESSED = """(rooms) => new Promise((answer) => window.addEventListener("keydown", (event) => {
-  if (["Alt", "Control", "Shift"].includes(event.key)) return;
-  event.preventDefault();
-  event.stopImmediatePropagation();
-  answer(quadrille.bindings.filter(({ matches }) => matches(event)).map(({ label }) => label));
-}, { capture: true }))"""
-
-
 async def test_a_search_drawer_without_searches_stays_as_opened(page, endpoint):
     """The list of searches comes only after the drawer has been opened."""
     await page.keyboard.press("b")

@@ -151,12 +151,6 @@ class PoseQuality(NamedTuple):
         return tuple(self.limbs[i].name for i in np.argsort(-odds) if odds[i] > least)
 
 
-FEATURES = (
-    "free_spread", "second_forward", "end_color", "end_explained", "at_limits", "innovation", "trunk_forward", "views"
-)  # fmt: skip
-"""Names of `features`, in their order."""
-
-
 def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
     """Return the features of a limb from which its status follows, (8,)."""
     return np.array([
