@@ -23,8 +23,8 @@ __all__ = [
     "number_rows",
     "observation_layout",
     "opensim_model",
-    "opensim_mot",
     "plain_data",
     "pose_csv",
     "trc",
+    "unread",
 ]

@@ -1,10 +1,14 @@
-"""OpenSim models (.osim): a body model whose coordinates are the angles of the poses.
+"""OpenSim models (.osim): a body model whose coordinates are the angles of the poses; motions (.mot) of them over time.
 
 A joint of up to three rotations about independent axes becomes a CustomJoint with the same axes in the same order. A
 ball joint, and a joint whose axes OpenSim does not accept, turns by Euler angles about x, y and z. The root has
 translations along the world's axes besides. Each body has the shape's ellipsoid, and the mass of that ellipsoid at the
 density of water: enough for display and inverse kinematics, too rough for dynamics. A marker marks each point of the
 body under its name, as in a TRC file.
+
+A motion has a header with the name, the numbers of rows and columns and inDegrees, then tab-separated columns: time in
+seconds, then one for each coordinate, in degrees and metres. Rows of frames without a pose are left out; OpenSim
+interpolates by time.
 """
 
 import xml.etree.ElementTree as ET
@@ -28,6 +32,7 @@ _DENSITY = 1000.0
 _FREE = 100.0
 """Half the range of a coordinate without limits, metres or rad: more than any room, and any number of turns."""
 _EULER: Order = "XYZ"
+_SETS = ("Body", "Joint", "Marker")
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,27 +96,45 @@ def write_osim(path: str | Path, model: BodyModel, name: str, T_ground_world: Ar
         up: unit vector against gravity, in the ground.
     """
     document = ET.Element("OpenSimDocument", Version="40000")
-    top = ET.SubElement(document, "Model", name=identifier(name))
-    _text(top, "gravity", _vector(-GRAVITY * np.asarray(up)))
-    _text(top, "length_units", "meters")
-    _text(top, "force_units", "N")
+    gravity = _vector(-GRAVITY * np.asarray(up))
+    top = _add(document, "Model", identifier(name), gravity=gravity, length_units="meters", force_units="N")
     part_names, joint_names = identifiers([p.name for p in model.parts]), identifiers([j.name for j in model.joints])
-    bodies = _list(top, "BodySet", "bodyset")
+    bodies, joints, markers = (_add(_add(top, f"{kind}Set", f"{kind.lower()}set"), "objects") for kind in _SETS)
     for i, part in enumerate(part_names):
         _body(bodies, model, i, part)
-    joints = _list(top, "JointSet", "jointset")
     for i, coordinates in enumerate(coordinate_joints(model)):
         _joint(joints, model, i, coordinates, joint_names[i], part_names, T_ground_world)
-    markers = _list(top, "MarkerSet", "markerset")
     for i, point in enumerate(identifiers(model.point_names)):
-        marker = ET.SubElement(markers, "Marker", name=point)
         carrier, location = _marker_place(model, i)
-        _text(marker, "socket_parent_frame", f"/bodyset/{part_names[carrier]}")
-        _text(marker, "location", _vector(location))
-        _text(marker, "fixed", "true")
+        frame = f"/bodyset/{part_names[carrier]}"
+        _add(markers, "Marker", point, socket_parent_frame=frame, location=_vector(location), fixed="true")
     ET.indent(document)
     text = ET.tostring(document, encoding="unicode")
     write_text_atomic(Path(path), f'<?xml version="1.0" encoding="UTF-8" ?>\n{text}\n')
+
+
+def write_mot(path: str | Path, model: BodyModel, poses: Array, times: Array, title: str, note: str) -> None:
+    """Write poses of one body.
+
+    Args:
+        path: the file.
+        model: the body of all poses.
+        poses: (n, n_values).
+        times: time of each, ascending, (n,), s.
+        title: name of the motion in OpenSim.
+        note: a line of the header for people.
+    """
+    joints = coordinate_joints(model)
+    names = [name for joint in joints for name in joint.names]
+    is_length = np.array([i < 3 and joint.is_free for joint in joints for i in range(len(joint.names))])
+    values = coordinate_values(model, poses)
+    values[:, ~is_length] = np.degrees(values[:, ~is_length])
+    lines = [title, "version=1", f"nRows={len(poses)}", f"nColumns={len(names) + 1}", "inDegrees=yes", note]
+    lines.append("endheader")
+    lines.append("\t".join(["time", *names]))
+    for time, row in zip(times.tolist(), values.tolist(), strict=True):
+        lines.append("\t".join([f"{time:.9f}", *(f"{x:.9f}" for x in row)]))
+    write_text_atomic(Path(path), "\n".join(lines) + "\n")
 
 
 def _marker_place(model: BodyModel, point: int) -> tuple[int, Array]:
@@ -146,21 +169,15 @@ def _body(bodies: ET.Element, model: BodyModel, i: int, name: str) -> None:
     half_axes, center = np.array(model.parts[i].half_axes) * model.height_m, model.centers_part[i]
     mass = _DENSITY * 4 / 3 * np.pi * float(np.prod(half_axes))
     a2, b2, c2 = half_axes**2
-    body = ET.SubElement(bodies, "Body", name=name)
-    components = ET.SubElement(body, "components")
-    frame = ET.SubElement(components, "PhysicalOffsetFrame", name="shape")
-    geometry = ET.SubElement(ET.SubElement(frame, "attached_geometry"), "Ellipsoid", name="ellipsoid")
-    _text(geometry, "socket_frame", "..")
-    appearance = ET.SubElement(geometry, "Appearance")
+    body = _add(bodies, "Body", name)
+    frame = _add(_add(body, "components"), "PhysicalOffsetFrame", "shape")
+    geometry = _add(_add(frame, "attached_geometry"), "Ellipsoid", "ellipsoid", socket_frame="..")
     rgb = [int(model.parts[i].color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    _text(appearance, "color", _vector(rgb))
-    _text(geometry, "radii", _vector(half_axes))
-    _text(frame, "socket_parent", "..")
-    _text(frame, "translation", _vector(center))
-    _text(frame, "orientation", "0 0 0")
-    _text(body, "mass", f"{mass:.9g}")
-    _text(body, "mass_center", _vector(center))
-    _text(body, "inertia", f"{_vector(mass / 5 * np.array([b2 + c2, a2 + c2, a2 + b2]))} 0 0 0")
+    _add(geometry, "Appearance", color=_vector(rgb))
+    _add_texts(geometry, radii=_vector(half_axes))
+    _add_texts(frame, socket_parent="..", translation=_vector(center), orientation="0 0 0")
+    inertia = f"{_vector(mass / 5 * np.array([b2 + c2, a2 + c2, a2 + b2]))} 0 0 0"
+    _add_texts(body, mass=f"{mass:.9g}", mass_center=_vector(center), inertia=inertia)
 
 
 def _joint(
@@ -174,36 +191,32 @@ def _joint(
 ) -> None:
     parent, offset = model.parents[i], np.array(model.joints[i].position) * model.height_m
     T_parent_joint = rigid.transform(t=offset) if parent >= 0 else T_ground_world @ rigid.transform(t=offset)
-    joint = ET.SubElement(joints, "CustomJoint" if coordinates.names else "WeldJoint", name=name)
-    _text(joint, "socket_parent_frame", "parent_offset")
-    _text(joint, "socket_child_frame", "child_offset")
+    frames = {"socket_parent_frame": "parent_offset", "socket_child_frame": "child_offset"}
+    joint = _add(joints, "CustomJoint" if coordinates.names else "WeldJoint", name, **frames)
     if coordinates.names:
         _coordinates(joint, coordinates)
-    frames = ET.SubElement(joint, "frames")
+    rows = _add(joint, "frames")
     parent_path = f"/bodyset/{part_names[parent]}" if parent >= 0 else "/ground"
     for frame, path, T in (
         ("parent_offset", parent_path, T_parent_joint),
         ("child_offset", f"/bodyset/{part_names[i]}", np.eye(4)),
     ):
-        row = ET.SubElement(frames, "PhysicalOffsetFrame", name=frame)
-        _text(row, "socket_parent", path)
-        _text(row, "translation", _vector(T[:3, 3]))
-        _text(row, "orientation", _vector(continuous_euler_angles(T[None, :3, :3], _EULER)[0]))
+        angles = _vector(continuous_euler_angles(T[None, :3, :3], _EULER)[0])
+        place = {"translation": _vector(T[:3, 3]), "orientation": angles}
+        _add(rows, "PhysicalOffsetFrame", frame, socket_parent=path, **place)
     if coordinates.names:
         _spatial_transform(joint, coordinates)
 
 
 def _coordinates(joint: ET.Element, coordinates: CoordinateJoint) -> None:
-    rows = ET.SubElement(joint, "coordinates")
+    rows = _add(joint, "coordinates")
     ranges = ((-_FREE, _FREE),) * 3 * coordinates.is_free + coordinates.ranges
     for name, limits in zip(coordinates.names, ranges, strict=True):
-        row = ET.SubElement(rows, "Coordinate", name=name)
-        _text(row, "range", _vector(limits))
-        _text(row, "clamped", "false")
+        _add(rows, "Coordinate", name, range=_vector(limits), clamped="false")
 
 
 def _spatial_transform(joint: ET.Element, coordinates: CoordinateJoint) -> None:
-    found = ET.SubElement(joint, "SpatialTransform")
+    found = _add(joint, "SpatialTransform")
     moved, turned = coordinates.names[: 3 * coordinates.is_free], coordinates.names[3 * coordinates.is_free :]
     for i, axis in enumerate(_completed(coordinates.axes)):
         _transform_axis(found, f"rotation{i + 1}", turned[i] if i < len(turned) else None, axis)
@@ -212,13 +225,11 @@ def _spatial_transform(joint: ET.Element, coordinates: CoordinateJoint) -> None:
 
 
 def _transform_axis(parent: ET.Element, name: str, coordinate: str | None, axis: Array) -> None:
-    row = ET.SubElement(parent, "TransformAxis", name=name)
-    _text(row, "coordinates", coordinate or "")
-    _text(row, "axis", _vector(axis))
+    row = _add(parent, "TransformAxis", name, coordinates=coordinate or "", axis=_vector(axis))
     if coordinate is None:
-        _text(ET.SubElement(row, "Constant", name="function"), "value", "0")
+        _add(row, "Constant", "function", value="0")
     else:
-        _text(ET.SubElement(row, "LinearFunction", name="function"), "coefficients", " 1 0")
+        _add(row, "LinearFunction", "function", coefficients=" 1 0")
 
 
 def _completed(axes: Sequence[tuple[float, float, float]]) -> Array:
@@ -230,12 +241,16 @@ def _completed(axes: Sequence[tuple[float, float, float]]) -> Array:
     return np.array(found)
 
 
-def _list(parent: ET.Element, kind: str, name: str) -> ET.Element:
-    return ET.SubElement(ET.SubElement(parent, kind, name=name), "objects")
+def _add(parent: ET.Element, kind: str, name: str = "", **texts: str) -> ET.Element:
+    """Add an element, which may have a name, with elements of text inside."""
+    element = ET.SubElement(parent, kind, {"name": name} if name else {})
+    _add_texts(element, **texts)
+    return element
 
 
-def _text(parent: ET.Element, name: str, text: str) -> None:
-    ET.SubElement(parent, name).text = text
+def _add_texts(parent: ET.Element, **texts: str) -> None:
+    for name, text in texts.items():
+        ET.SubElement(parent, name).text = text
 
 
 def _vector(v: Sequence[float] | Array) -> str:

@@ -22,8 +22,7 @@ from tracker.formats.keypoints.coco import (
     write_coco,
 )
 from tracker.formats.motion_csv import MotionRow, write_motion_csv
-from tracker.formats.opensim_model import write_osim
-from tracker.formats.opensim_mot import write_mot
+from tracker.formats.opensim_model import write_mot, write_osim
 from tracker.formats.pose_csv import value_units
 from tracker.formats.trc import write_trc
 from tracker.formats.write_only.gltf import AnimatedBody, write_glb
