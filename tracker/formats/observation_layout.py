@@ -61,12 +61,5 @@ class ObservationLayout(Generic[T]):
     recognized_by: str
     """Content by which it is recognized, for documents."""
     recognizes: Callable[[Sample], bool]
-    reader: Callable[..., T] | None = None
-    """Reads it; None for a layout that is known by name alone."""
-    instead: str = ""
-    """For a layout that is not read: the file to export instead, as the end of a sentence."""
-
-    def read(self, *arguments: Any) -> T:
-        """Read files; the arguments are those of its table."""
-        assert self.reader is not None, "a layout that is not read is refused before"
-        return self.reader(*arguments)
+    read: Callable[..., T]
+    """Reads files; the arguments are those of its table."""

@@ -5,13 +5,13 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
-from tracker.files import open_regular
 from tracker.formats.joint_tables import columns as head
 from tracker.formats.joint_tables.arrays import is_array, read_array
 from tracker.formats.joint_tables.scenes import Scenes, is_easymocap, is_panoptic, read_scenes
 from tracker.formats.joint_tables.table_reading import read_table
 from tracker.formats.observation_layout import ObservationLayout, Sample
 from tracker.formats.trc import MarkerTable
+from tracker.formats.unread import unread
 
 JointLayout: TypeAlias = ObservationLayout[Scenes]
 _SECTIONS = {"trajectories", "devices", "model outputs", "joints", "segments", "events"}
@@ -79,34 +79,10 @@ LAYOUTS: tuple[JointLayout, ...] = (
     ObservationLayout("arrays of body-model networks (SMPL, SMPL-X, MHR)", "a `.npy` or `.npz`",
         "shape (frames, joints, 3) or (frames, people, joints, 3)", is_array, _of_each(read_array)))
 """In the order in which they are tried."""
-_ARRAY = "the joints in space as a NumPy array (frames, joints, 3), saved with numpy.save"
-_NOT_READ = (
-    ("FBX", (".fbx",), b"Kaydara FBX", "BVH"),
-    ("glTF", (".glb", ".gltf"), b"glTF", "BVH"),
-    ("a Python pickle, as fits of SMPL", (".pkl", ".pickle"), b"\x80", _ARRAY),
-    ("a MATLAB file", (".mat",), b"MATLAB", "a CSV with columns NAME_x, NAME_y, NAME_z (writetable)"),
-    ("a workbook of Excel", (".xlsx", ".xls"), b"", "it as CSV"),
-    ("Parquet, as of FreeMoCap", (".parquet",), b"PAR1", "CSV, which FreeMoCap writes beside it"),
-    ("a file of Visual3D or Theia", (".cmz", ".cmo", ".p3d"), b"", "C3D with the joint centres as points"),
-    ("a project of Motive, Nexus or Qualisys Track Manager", (".tak", ".x2d", ".qtm"), b"", "C3D or a table"))
 # fmt: on
 
 
-def _is_of(suffixes: tuple[str, ...], first: bytes, sample: Sample) -> bool:
-    """Return whether a file has one of some suffixes, or begins with some bytes."""
-    if sample.path.suffix.lower() in suffixes:
-        return True
-    try:
-        with open_regular(sample.path) as file:
-            return bool(first) and file.read(len(first)) == first
-    except OSError:
-        return False
-
-
-NOT_READ: tuple[JointLayout, ...] = tuple(
-    ObservationLayout(program, ", ".join(f"`{s}`" for s in suffixes), "", partial(_is_of, suffixes, first), None, new)
-    for program, suffixes, first, new in _NOT_READ
-)
+NOT_READ = unread("joints")
 """Files that are known by name alone."""
 
 

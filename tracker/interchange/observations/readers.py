@@ -12,7 +12,7 @@ from tracker.errors import FormatError
 from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
-from tracker.formats.joint_tables.layouts import NOT_READ, SCENES, Scenes, find_layout, read_joint_files
+from tracker.formats.joint_tables.layouts import SCENES, Scenes, find_layout, read_joint_files
 from tracker.formats.keypoints import detections, hand_labels
 from tracker.formats.keypoints.coco_reading import holds, is_alphapose, is_coco, read_coco
 from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, check_mask_size, read_segmentations
@@ -22,6 +22,7 @@ from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_files
 from tracker.formats.observation_layout import ObservationLayout, Sample
 from tracker.formats.trc import MarkerTable, read_trc
+from tracker.formats.unread import unread
 from tracker.interchange.observations.mask_files import MaskFiles
 from tracker.interchange.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
 from tracker.text_files import TABLE_BYTES, TextKind, read_json
@@ -159,18 +160,10 @@ def _in_space(name: str, read: Callable[..., Scenes]) -> ObservationLayout[Scene
     return ObservationLayout(name, f"a `{suffix}` for each person", _END, _ends(suffix), read)
 
 
-def _unread(program: str, instead: str, *keys: str) -> ObservationLayout[Any]:
-    """Return the row of a JSON file that is known by keys and not read."""
-    return ObservationLayout(program, "`.json`", " and ".join(f"`{k}`" for k in keys), _has(*keys), instead=instead)
-
-
 def _is_scene(sample: Sample) -> bool:
     return sample.suffix == ".json" and find_layout(sample) in SCENES
 
 
-_VIDEOS = (".mp4", ".avi", ".mov")
-_is_array = _is_text(".json", lambda head: "".join(head).replace(" ", "").startswith("[[["))
-_is_min = _is_json(hand_labels.is_json_min)
 _CAMERA, _PICTURE = "for each camera", "for each picture, as `CAMERA/CAMERA_000012`"
 _ALL = "one `.json` for all cameras, or one for each"
 _IN_SPACE = "see [Joints in space](#joints-in-space)"
@@ -226,20 +219,8 @@ MASK_FORMATS: Mapping[str, ObservationLayout[list[MaskFiles]]] = {
 }  # fmt: skip
 FORMATS: Mapping[str, ObservationLayout[Any]] = {**PICTURE_FORMATS, **SPACE_FORMATS, **MASK_FORMATS}
 """The layouts that are read, by the name that is stored."""
-_OF_UNREAD = (".mat", ".pkl", ".pickle", ".pt", ".pth", ".xlsx", ".xls", ".fbx", ".glb", ".parquet", ".tak")
-_ARRAY = "the joints in space by numpy.save, as an array (frames, joints, 3)"
-_UNREAD: Sequence[ObservationLayout[Any]] = (
-    _unread("AlphaPose's formats of OpenPose", "its results in its own format, which is the default", "bodies"),
-    _unread("LabelMe", "COCO", "shapes", "imagePath"),
-    _unread("VGG Image Annotator", "COCO", "_via_img_metadata"),
-    _unread("Datumaro", "COCO or CVAT's XML", "items", "categories"),
-    ObservationLayout("a plain array in JSON", "`.json`", "lists of numbers alone", _is_array, instead=_ARRAY),
-    ObservationLayout("Label Studio's JSON-MIN", "`.json`", "a list with `annotation_id`", _is_min, instead="JSON"),
-    ObservationLayout("PyTorch", "`.pt`, `.pth`", _END, _ends(".pt", ".pth"), instead="CSV or JSON"),
-    ObservationLayout("a video", "`.mp4`, `.avi`, `.mov`", _END, _ends(*_VIDEOS), instead="a detector's key points"),
-)
-UNREAD = (*NOT_READ, *_UNREAD)
-"""Layouts that are known and not read."""
+UNREAD = (*unread("joints"), *unread("points"))
+"""Files that are known and not read."""
 _OFTEN_OTHER = (".txt", ".xml")
 """Ends of names that files of notes and of cameras have too: one that is of no known program is left out."""
 _OF_SPACE = (".trc", ".c3d", ".bvh", ".tsv", ".npy", ".npz")
@@ -288,7 +269,7 @@ def _listed(paths: Sequence[Path]) -> list[Found]:
         if not all(path.exists() for path in paths):
             raise
         with suppress(FormatError):
-            return list_files(paths, _OF_UNREAD)
+            return list_files(paths, [suffix for row in UNREAD for suffix in row.suffixes])
         raise
 
 
