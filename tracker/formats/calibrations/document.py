@@ -105,3 +105,24 @@ def refuse(document: Document, camera: str | None, expected: str, found: str, ad
     """Return the error of a file, or of one camera in it."""
     place = document.where if camera is None else f"{document.where}, camera {quoted(camera)}"
     return CalibrationError(f"{place}: expected {expected}, found {found}; {advice}")
+
+
+def numbers_in(text: str) -> list[float]:
+    """Return the numbers of a text, apart by commas, semicolons or blanks; an empty list if a word is none."""
+    text = text.replace(",", ".") if ";" in text else text  # decimal commas
+    try:
+        return [float(word) for word in re.findall(r"[^,;\s]+", text)]
+    except ValueError:
+        return []
+
+
+def read_numbers(document: Document, camera: str, key: str, text: str | None, count: int) -> list[float]:
+    """Return the numbers of a line or an attribute.
+
+    Raises:
+        CalibrationError: there are fewer or more.
+    """
+    if len(found := numbers_in(text or "")) != count:
+        seen = "none" if text is None else text
+        raise refuse(document, camera, f"{count} numbers as {key}", quoted(seen), "export the file again")
+    return found

@@ -4,12 +4,13 @@ The directions of their poses are those by which Pose2Sim converts them (`read_q
 """
 
 from collections.abc import Mapping
+from functools import partial
 from xml.etree import ElementTree
 
 import numpy as np
 
 from tracker.formats.calibrations.camera_words import Section, plain_camera, unit_rotation, unusable
-from tracker.formats.calibrations.document import Document, refuse
+from tracker.formats.calibrations.document import Document, read_numbers, refuse
 from tracker.formats.calibrations.pose_conventions import OPENGL
 from tracker.geometry import rigid
 
@@ -45,15 +46,19 @@ def read_qualisys(document: Document) -> dict[str, Section]:
             turned = f"is turned by {camera.get('viewrotation')} degrees in QTM, which says nothing of its video"
             found[name] = unusable(name, f"camera '{name}' {turned}; convert the calibration with Pose2Sim")
             continue
-        transform, intrinsic = (_Numbers(document, name, attributes[tag]) for tag in ("transform", "intrinsic"))
-        view = _Numbers(document, name, _attributes(camera, "fov_video") or _attributes(camera, "fov_marker"))
-        left, top = view["left"], view["top"]
-        size = [view["right"] - left + 1, view["bottom"] - top + 1]
-        subpixels = _subpixels(intrinsic, size, document, name)
-        fu, fv, cu, cv = (intrinsic[k] / subpixels for k in _MATRIX)
-        lens = np.array([intrinsic.get(k) for k in _LENS])
-        R = OPENGL[:3, :3] @ np.array([[transform[f"r{i}{j}"] for j in (1, 2, 3)] for i in (1, 2, 3)])
-        position = np.array([transform[k] for k in "xyz"])
+        values = {**(attributes["transform"] or {}), **(attributes["intrinsic"] or {})}
+        values |= _attributes(camera, "fov_video") or _attributes(camera, "fov_marker") or {}
+        number = partial(_number, document, name, values)
+        left, top = number("left"), number("top")
+        size = [number("right") - left + 1, number("bottom") - top + 1]
+        subpixels = _SUBPIXELS
+        if "sensorMaxU" in values:
+            width = number("sensorMaxU") - number("sensorMinU", 0.0) + 1
+            subpixels = _subpixels(width / size[0], document, name)
+        fu, fv, cu, cv = (number(k) / subpixels for k in _MATRIX)
+        lens = np.array([number(k, 0.0) for k in _LENS])
+        R = OPENGL[:3, :3] @ np.array([[number(f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)])
+        position = np.array([number(k) for k in "xyz"])
         K = [[fu, 0.0, cu - left], [0.0, fv, cv - top], [0.0, 0.0, 1.0]]
         lens = lens / (_SUBPIXELS if by_pose2sim else 1.0)
         found[name] = plain_camera(name, size, K, lens.tolist(), rigid.transform(R, -R @ position))
@@ -67,16 +72,20 @@ _LENS = (
 """In OpenCV's order."""
 
 
-def _subpixels(intrinsic: "_Numbers", size: list[float], document: Document, name: str) -> float:
-    """Return the units of the sensor per pixel."""
-    if "sensorMaxU" not in intrinsic.values:
-        return _SUBPIXELS
-    ratio = (intrinsic["sensorMaxU"] - intrinsic.get("sensorMinU") + 1) / size[0]
+def _subpixels(ratio: float, document: Document, name: str) -> float:
+    """Return the units of the sensor per pixel, from those per pixel of the video."""
     for unit in (_SUBPIXELS, 1.0):
         if abs(ratio / unit - 1) < 0.02:
             return unit
     expected, found = "a sensor as wide as the video in pixels or 64ths of them", f"{ratio:.3g} units per pixel"
     raise refuse(document, name, expected, found, "export the calibration for the size of the video")
+
+
+_VICON = {
+    "ORIENTATION": "x y z w", "FOCAL_LENGTH": "f", "PRINCIPAL_POINT": "u v", "POSITION": "x y z",
+    "SENSOR_SIZE": "width height",
+}  # fmt: skip
+"""Attributes of a camera, and their numbers."""
 
 
 def is_vicon(document: Document) -> bool:
@@ -100,14 +109,14 @@ def read_vicon(document: Document) -> dict[str, Section]:
             advice = "undistort the footage, or convert the calibration with Pose2Sim (convert_from = 'vicon')"
             found[name] = unusable(name, f"camera '{name}' {other}; {advice}")
             continue
-        values = _Numbers(document, name, {**camera.attrib, **frame.attrib})
-        quaternion = np.roll(values.row("ORIENTATION", 4), 1)
-        R = unit_rotation(document, name, "ORIENTATION", quaternion)
-        (focal,), (cu, cv) = values.row("FOCAL_LENGTH", 1), values.row("PRINCIPAL_POINT", 2)
-        ratio = values.get("PIXEL_ASPECT_RATIO") or 1.0
+        values = {**camera.attrib, **frame.attrib}
+        row = {k: read_numbers(document, name, k, values.get(k), len(of.split())) for k, of in _VICON.items()}
+        R = unit_rotation(document, name, "ORIENTATION", np.roll(row["ORIENTATION"], 1))
+        (focal,), (cu, cv) = row["FOCAL_LENGTH"], row["PRINCIPAL_POINT"]
+        ratio = _number(document, name, values, "PIXEL_ASPECT_RATIO", 0.0) or 1.0
         K = [[focal, 0.0, cu], [0.0, focal / ratio, cv], [0.0, 0.0, 1.0]]
-        T_camera_world = rigid.transform(R, -R @ np.array(values.row("POSITION", 3)))
-        found[name] = plain_camera(name, values.row("SENSOR_SIZE", 2), K, [], T_camera_world)
+        T_camera_world = rigid.transform(R, -R @ np.array(row["POSITION"]))
+        found[name] = plain_camera(name, row["SENSOR_SIZE"], K, [], T_camera_world)
     return found
 
 
@@ -127,28 +136,10 @@ def _words(text: str | None) -> list[float]:
     return found
 
 
-class _Numbers:
-    """Attributes of a camera as numbers, refused by name where one is missing or none."""
-
-    def __init__(self, document: Document, camera: str, values: Mapping[str, str] | None) -> None:
-        self._document, self._camera = document, camera
-        self.values = values or {}
-
-    def __getitem__(self, key: str) -> float:
-        return self.row(key, 1)[0]
-
-    def get(self, key: str) -> float:
-        """Return a number, 0 if it is not there."""
-        return self[key] if key in self.values else 0.0
-
-    def row(self, key: str, count: int) -> list[float]:
-        """Return the numbers of an attribute.
-
-        Raises:
-            CalibrationError: there are fewer or more.
-        """
-        numbers = _words(self.values.get(key))
-        if len(numbers) != count:
-            found = repr(self.values.get(key, "none"))[:40]
-            raise refuse(self._document, self._camera, f"{count} numbers as {key}", found, "export the file again")
-        return numbers
+def _number(
+    document: Document, camera: str, values: Mapping[str, str], key: str, default: float | None = None
+) -> float:
+    """Return a number of the attributes of a camera; refused by name where it is missing without a default."""
+    if key not in values and default is not None:
+        return default
+    return read_numbers(document, camera, key, values.get(key), 1)[0]

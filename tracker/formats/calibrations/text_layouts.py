@@ -14,7 +14,7 @@ import numpy as np
 
 from tracker.formats.calibrations.camera_matrices import ProjectionError, split_projection
 from tracker.formats.calibrations.camera_words import COEFFICIENTS, Section, once, plain_camera, unit_rotation, unusable
-from tracker.formats.calibrations.document import Document, refuse
+from tracker.formats.calibrations.document import Document, numbers_in, read_numbers, refuse
 from tracker.geometry import rigid
 from tracker.geometry.camera_rig import axes_point
 from tracker.validation import quoted
@@ -42,26 +42,6 @@ def _lines(document: Document) -> list[str]:
     return [line.strip() for line in text.splitlines() if not line.startswith("#")]
 
 
-def _numbers(text: str) -> list[float]:
-    """Return the numbers of a line, apart by commas, semicolons or blanks; an empty list if a word is none."""
-    text = text.replace(",", ".") if ";" in text else text  # decimal commas
-    try:
-        return [float(word) for word in re.split(r"[,;\s]+", text.strip(" ,;\t"))]
-    except ValueError:
-        return []
-
-
-def _row(document: Document, camera: str, key: str, text: str, count: int) -> list[float]:
-    """Return the numbers of a line.
-
-    Raises:
-        CalibrationError: there are fewer or more.
-    """
-    if len(found := _numbers(text)) != count:
-        raise refuse(document, camera, f"{count} numbers as {key}", quoted(text), "export the file again")
-    return found
-
-
 # --- Skeletool ------------------------------------------------------------------------------------------------------
 
 
@@ -87,13 +67,13 @@ def _skeletool_camera(document: Document, values: Mapping[str, str]) -> tuple[st
     if values.get("animated", "0") != "0":
         return name, unusable(name, f"camera '{name}' moves during the recording (animated); film with one that stands")
     lens = [key for key in values if key.startswith(_OF_FISHEYE)]
-    if lens or any(_numbers(values.get("radial", "0"))):
+    if lens or any(numbers_in(values.get("radial", "0"))):
         found = f"Skeletool's lens model ({(lens or ['radial'])[0]}), whose coefficients are not those of OpenCV"
         return name, unusable(
             name, f"camera '{name}' has {found}; undistort the footage, and set the coefficients to 0"
         )
-    K, T = (_row(document, name, key, values.get(key, ""), 16) for key in ("intrinsic", "extrinsic"))
-    size = _row(document, name, "size", values.get("size", ""), 2)
+    K, T = (read_numbers(document, name, key, values.get(key, ""), 16) for key in ("intrinsic", "extrinsic"))
+    size = read_numbers(document, name, "size", values.get("size", ""), 2)
     return name, plain_camera(name, size, np.reshape(K, (4, 4))[:3, :3], [], np.reshape(T, (4, 4)))
 
 
@@ -113,7 +93,7 @@ def read_mayacam2(document: Document) -> dict[str, Section]:
         title = line.lower() if line.lower() in _MAYACAM else title
         blocks.setdefault(title, []).extend([line] * (line.lower() != title))
     size, K, R, t = (
-        _row(document, document.stem, key, ",".join(blocks[key]), count)
+        read_numbers(document, document.stem, key, ",".join(blocks[key]), count)
         for key, count in zip(_MAYACAM, (2, 9, 9, 3), strict=True)
     )
     T = rigid.transform(np.reshape(R, (3, 3)), np.array(t))
@@ -122,7 +102,7 @@ def read_mayacam2(document: Document) -> dict[str, Section]:
 
 def is_mayacam1(document: Document) -> bool:
     """Return whether there are five lines of three numbers, with a focal length below 0 as Maya has it."""
-    rows = [_numbers(line) for line in filter(None, _lines(document))]
+    rows = [numbers_in(line) for line in filter(None, _lines(document))]
     return [len(row) for row in rows] == [3] * 5 and rows[3][2] < 0
 
 
@@ -131,7 +111,7 @@ def read_mayacam1(document: Document) -> dict[str, Section]:
 
     The camera looks along -z with y up; v0 counts from the bottom, and both count pixels from 1 (Autoscoper).
     """
-    place, angles, _, (u0, v0, z), (_, *size) = (_numbers(line) for line in filter(None, _lines(document)))
+    place, angles, _, (u0, v0, z), (_, *size) = (numbers_in(line) for line in filter(None, _lines(document)))
     width, height = (side or 1024.0 for side in size)
     x, y, turn = (rigid.so3_exp(np.radians(a) * axis) for a, axis in zip(angles, np.eye(3), strict=True))
     R = np.diag([1.0, -1.0, -1.0]) @ (turn @ y @ x).T
@@ -144,7 +124,7 @@ def read_mayacam1(document: Document) -> dict[str, Section]:
 
 def is_dlt(document: Document) -> bool:
     """Return whether there are eleven lines with as many numbers each (Abdel-Aziz and Karara 1971)."""
-    counts = [len(_numbers(line)) for line in filter(None, _lines(document))]
+    counts = [len(numbers_in(line)) for line in filter(None, _lines(document))]
     return len(counts) == 11 and min(counts) == max(counts) > 0
 
 
@@ -154,7 +134,7 @@ def read_dlt(document: Document) -> dict[str, Section]:
     Raises:
         CalibrationError: all cameras look away from where their axes meet: rows were counted from the bottom.
     """
-    columns = np.array([_numbers(line) for line in filter(None, _lines(document))]).T
+    columns = np.array([numbers_in(line) for line in filter(None, _lines(document))]).T
     found, Ts = {}, []
     for name, column in ((f"cam{i + 1}", column) for i, column in enumerate(columns)):
         try:
@@ -183,7 +163,7 @@ def _colmap_lenses(document: Document) -> Iterator[list[str]]:
 def _colmap_pictures(document: Document) -> Iterator[list[str]]:
     for line in _lines(document):
         row = line.split(maxsplit=9)
-        if len(row) == 10 and len(_numbers(" ".join(row[:9]))) == 9 and not _numbers(row[9]):
+        if len(row) == 10 and len(numbers_in(" ".join(row[:9]))) == 9 and not numbers_in(row[9]):
             yield row
 
 
@@ -218,15 +198,15 @@ def _colmap_camera(document: Document, name: str, lens: Sequence[str] | None, po
     if not words:
         found = f"COLMAP's lens {lens[1]}, which OpenCV does not know"
         return unusable(name, f"camera '{name}' has {found}; undistort the pictures")
-    numbers = dict(zip(words, _row(document, name, lens[1], " ".join(lens[4:]), len(words)), strict=True))
-    *quaternion, x, y, z = _row(document, name, "pose", " ".join(pose), 7)
+    numbers = dict(zip(words, read_numbers(document, name, lens[1], " ".join(lens[4:]), len(words)), strict=True))
+    *quaternion, x, y, z = read_numbers(document, name, "pose", " ".join(pose), 7)
     R = unit_rotation(document, name, "pose", quaternion)
     fx, fy = (numbers.get(key, numbers.get("f", 0.0)) for key in ("fx", "fy"))
     # COLMAP's corner of the picture is at 0, 0, and the centre of its first pixel at 0.5, 0.5.
     K = np.array([[fx, 0.0, numbers["cx"] - 0.5], [0.0, fy, numbers["cy"] - 0.5], [0.0, 0.0, 1.0]])
     fisheye = lens[1].endswith("FISHEYE")
     order = COEFFICIENTS[fisheye][: 8 if "k3" in numbers else 4]
-    size = _row(document, name, "size", " ".join(lens[2:4]), 2)
+    size = read_numbers(document, name, "size", " ".join(lens[2:4]), 2)
     T = rigid.transform(R, np.array([x, y, z]))
     return plain_camera(name, size, K, [numbers.get(key, 0.0) for key in order], T, fisheye)
 
@@ -248,7 +228,7 @@ def _egoexo_camera(document: Document, row: Mapping[str, str | None]) -> tuple[s
     name = row.get("cam_uid") or ""
 
     def numbers(*keys: str) -> list[float]:
-        return _row(document, name, keys[0], ",".join(row.get(key) or "none" for key in keys), len(keys))
+        return read_numbers(document, name, keys[0], ",".join(row.get(key) or "none" for key in keys), len(keys))
 
     if row.get("intrinsics_type") != "KANNALABRANDTK3":
         lens = quoted(row.get("intrinsics_type"))
