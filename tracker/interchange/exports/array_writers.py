@@ -12,10 +12,10 @@ from tracker.formats.write_only.c3d import write_c3d
 from tracker.formats.write_only.movement_netcdf import PER_POSE, PoseDataset, Variable, per_point, write_dataset
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.frame_views import view_arrays
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions, file_from_world
 from tracker.interchange.exports.pose_arrays import pose_arrays, pose_values
-from tracker.interchange.exports.view_arrays import view_arrays
 from tracker.interchange.exports.views import exported_cameras
 
 

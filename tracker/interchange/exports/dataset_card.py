@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
@@ -16,16 +17,7 @@ from tracker.session.store.edit_tree import program_version
 
 TO_FILL_IN = "TO BE FILLED IN"
 """Value of a field that only the owner knows."""
-_OWNER_FIELDS = {
-    "Licence": "terms under which the pictures and labels may be used",
-    "Rights holder and contact": "who may be asked, and where",
-    "Consent of the people filmed": "whether each has agreed to this use, in which form, and until when",
-    "Ethics approval": "board and number, or why none is needed",
-    "Date and place of the recording": "as far as they may be told",
-    "People filmed": "how they were chosen; age, sex, body and clothing as far as they may be told",
-    "Intended use": "what the dataset is for, and what it must not be used for",
-}
-"""Fields that the owner fills in, with their meaning."""
+_TEMPLATE = resources.files("tracker").joinpath("interchange", "exports", "dataset_card.md")
 
 
 class LabelCounts(NamedTuple):
@@ -111,39 +103,21 @@ def format_card(
         choice: a sentence on how they were divided.
         options: of the export.
     """
-    where = {"images": "recordings/*/images", "video": "recordings/*/videos, whole"}[options.pictures]
-    lines = [
-        f"# {', '.join(dict.fromkeys(s.session for s in summaries))}",
-        "",
-        "A dataset of people filmed by calibrated cameras, with labels by Quadrille.",
-        "",
-        "## To be filled in by the owner",
-        "",
-        *_table(("field", "value", "meaning"), [(f, TO_FILL_IN, m) for f, m in _OWNER_FIELDS.items()]),
-        "",
-        "## Counts",
-        "",
-        *_table(("what", "number"), _count_rows(summaries)),
-        "",
-        *_recording_lines(summaries, splits),
-        "## Provenance",
-        "",
-        *_table(("what", "poses"), _provenance_rows(summaries)),
-        "",
-        f"Exported by Quadrille {program_version()}: "
-        f"{'; '.join(f'frames {s.frames} of {s.session}' for s in summaries)}.",
-        "`recordings/*/provenance.json` has the provenance of each pose and joint.",
-        "",
-        "## Files",
-        "",
-        *_table(("file", "content"), [(f"`{name}`", text) for name, text in _files(where, options).items()]),
-        "",
-        "## Splits",
-        "",
-        *_split_lines(splits, choice),
-        "",
-    ]
-    return "\n".join(lines)
+    lens = "without lens distortion" if options.pixels == "undistorted" else "of the footage, with its lens distortion"
+    rows = [(split, str(len(names)), ", ".join(names)) for split, names in splits.items()]
+    return _TEMPLATE.read_text("utf-8").format(
+        sessions=", ".join(dict.fromkeys(s.session for s in summaries)),
+        to_fill_in=TO_FILL_IN,
+        counts=_table(("what", "number"), _count_rows(summaries)),
+        recordings=_of_recordings(summaries, splits),
+        provenance=_table(("what", "poses"), _provenance_rows(summaries)),
+        version=program_version(),
+        frames="; ".join(f"frames {s.frames} of {s.session}" for s in summaries),
+        pictures={"images": "images", "video": "videos, whole"}[options.pictures],
+        lens=lens,
+        splits=_table(("split", "recordings", "names"), rows),
+        choice=choice,
+    )
 
 
 def _count_rows(summaries: Sequence[RecordingSummary]) -> list[tuple[str, str]]:
@@ -163,10 +137,10 @@ def _count_rows(summaries: Sequence[RecordingSummary]) -> list[tuple[str, str]]:
     ]
 
 
-def _recording_lines(summaries: Sequence[RecordingSummary], splits: Mapping[str, Sequence[str]]) -> list[str]:
+def _of_recordings(summaries: Sequence[RecordingSummary], splits: Mapping[str, Sequence[str]]) -> str:
     """Return a table of the recordings and one of the people who are in several; nothing for one recording."""
     if len(summaries) == 1:
-        return []
+        return ""
     split_of = {name: split for split, names in splits.items() for name in names}
     head = ("recording", "session", "split", "people", "cameras", "frames", "pictures", "poses")
     rows = [
@@ -176,25 +150,14 @@ def _recording_lines(summaries: Sequence[RecordingSummary], splits: Mapping[str,
         )
         for s in summaries
     ]  # fmt: skip
-    lines = ["## Recordings", "", *_table(head, rows), "", "## People in several recordings", ""]
-    shared = shared_people(summaries)
-    if not shared:
-        return [*lines, "None: each person has a `track_id` of their own in each recording.", ""]
-    of_person = [
-        (name, ", ".join(found), ", ".join(dict.fromkeys(split_of[r] for r in found))) for name, found in shared
-    ]
-    text = "People of one name count as one person, and have one `track_id`."
-    return [*lines, text, "", *_table(("person", "recordings", "splits"), of_person), ""]
-
-
-def _split_lines(splits: Mapping[str, Sequence[str]], choice: str) -> list[str]:
-    rows = [(split, str(len(names)), ", ".join(names)) for split, names in splits.items()]
-    return [
-        *_table(("split", "recordings", "names"), rows),
-        "",
-        f"{choice} Frames of one recording are too alike to train on some and test on others: no recording is in two "
-        "splits.",
-    ]
+    people = "None: each person has a `track_id` of their own in each recording."
+    if shared := shared_people(summaries):
+        of_person = [
+            (name, ", ".join(found), ", ".join(dict.fromkeys(split_of[r] for r in found))) for name, found in shared
+        ]
+        text = "People of one name count as one person, and have one `track_id`."
+        people = f"{text}\n\n{_table(('person', 'recordings', 'splits'), of_person)}"
+    return f"## Recordings\n\n{_table(head, rows)}\n\n## People in several recordings\n\n{people}\n\n"
 
 
 def _provenance_counts(found: list[PoseProvenance]) -> Counter[tuple[str, str]]:
@@ -232,22 +195,9 @@ def _provenance_rows(summaries: Sequence[RecordingSummary]) -> list[tuple[str, s
     return rows
 
 
-def _files(where: str, options: ExportOptions) -> Mapping[str, str]:
-    lens = "without lens distortion" if options.pixels == "undistorted" else "of the footage, with its lens distortion"
-    return {
-        where: f"pictures, numbered as frames of the footage; pixels {lens}",
-        "recordings/*/labels/coco.json": "keypoints and segmentation (COCO)",
-        "recordings/*/labels/openpose": "keypoints (BODY_25)",
-        "recordings/*/calibration": "cameras in the layouts of anipose and of OpenCV, in metres",
-        "recordings/*/poses.npz": "poses, joint centers and covariances in space",
-        "recordings/*/provenance.json": "author, source and errors of each pose",
-        "SHA256SUMS": "checksums; check them by `sha256sum -c SHA256SUMS`",
-    }
-
-
-def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Return the lines of a table."""
-    return [
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    """Return a table of Markdown."""
+    return "\n".join(
         f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |"
         for row in (head, ("---",) * len(head), *rows)
-    ]
+    )

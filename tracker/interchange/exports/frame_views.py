@@ -1,6 +1,6 @@
-"""The people of a frame in each view: their points, and the pixels that they cover."""
+"""The people of a frame in each view: their points, also as arrays of all frames, and the pixels that they cover."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody, ahead
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.interchange.exports.keypoints import Keypoints, keypoints_in_views
 from tracker.interchange.exports.motion import ExportedMotion, PersonMotion
-from tracker.interchange.exports.views import view_labels
+from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.views import exported_cameras, view_labels
 
 
 class PersonInView(NamedTuple):
@@ -70,3 +72,39 @@ class FrameViews:
         parts = np.concatenate([np.arange(n) for n in counts]) if counts else np.zeros(0, np.int64)
         found = view_labels(bodies, self._cameras[view])
         return np.append(-1, people).astype(np.int64)[found], np.append(-1, parts).astype(np.int64)[found]
+
+
+class ViewPoints(NamedTuple):
+    """The points of F frames, P people and n points in V views."""
+
+    points_px: Array
+    """Joint centres, (V, F, P, n, 2), in the pixels of the export; NaN outside the picture, and without a pose."""
+    visibility: NDArray[np.uint8]
+    """A `KeypointFlag` of each, (V, F, P, n)."""
+
+
+def view_arrays(
+    motion: ExportedMotion, options: ExportOptions, points: tuple[str, ...], tick: Callable[[], None]
+) -> ViewPoints:
+    """Return the points of all exported people in all views.
+
+    Args:
+        motion: what is exported.
+        options: its pixels.
+        points: names of the points, (n,).
+        tick: called after each frame.
+    """
+    cameras = exported_cameras(motion, options)
+    shape = (len(cameras), len(motion.frames), len(motion.chosen), len(points))
+    out = ViewPoints(np.full((*shape, 2), np.nan), np.zeros(shape, np.uint8))
+    for i, frame in enumerate(motion.frames):
+        views = FrameViews(motion, cameras, frame)
+        for view in range(len(cameras)):
+            for person, body, keypoints in views.seen(view):
+                is_in = keypoints.visibility > 0
+                columns = np.array([points.index(name) for name in body.model.point_names])[is_in]
+                at = view, i, motion.chosen.index(person.index)
+                out.points_px[at][columns] = keypoints.points_px[is_in]
+                out.visibility[at][columns] = keypoints.visibility[is_in]
+        tick()
+    return out
