@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tracker.formats.bvh_reading import BvhJoint, posed, read_bvh_motion
-from tracker.formats.exact_text import exact_text, replace_words
+from tracker.formats.text_patch import TextPatch
 from tracker.geometry.arrays import Array, IntArray, Mask
 
 
@@ -55,9 +55,9 @@ def patch_bvh(path: Path, unit_m: float | None, changes: Mapping[int, Array], is
         new[row] = dict(zip(free.tolist(), (values / motion.units)[free].tolist(), strict=True))
         distances = np.linalg.norm(posed(motion.joints, values[None]).positions[0] - points, axis=-1)
         farthest_m = max(farthest_m, float(distances[is_new].max(initial=0.0)))
-    exact = exact_text(path.read_bytes())
-    # At 1 m, a ten thousandth of a degree is 2 micrometres.
-    return PatchedBvh(exact.encoded(replace_words(exact.text, len(motion.values), new, 4)), farthest_m)
+    patch = TextPatch(path.read_bytes())
+    patch.replace_words(len(motion.values), new, 4)  # at 1 m, a ten thousandth of a degree is 2 micrometres
+    return PatchedBvh(patch.encoded(), farthest_m)
 
 
 def _reaching(joints: Sequence[BvhJoint], channels: _Channels, values: Array, free: IntArray, points: Array) -> Array:

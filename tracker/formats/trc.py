@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
-from tracker.formats.exact_text import exact_text, replace_cells
 from tracker.formats.number_rows import MAX_NAMES, MAX_TIME, NumberRows, not_a_number
+from tracker.formats.text_patch import TextPatch
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
@@ -255,8 +255,8 @@ def patch_trc(path: Path, changes: Mapping[int, Array]) -> bytes:
         changes: positions, (n_points, 3), metres, by row, from 0; points of NaN stay.
     """
     table = read_trc(path)
-    exact = exact_text(path.read_bytes())
-    head = [line for line in exact.text.splitlines() if line.strip()][:3]
+    patch = TextPatch(path.read_bytes())
+    head = [line for line in patch.text.splitlines() if line.strip()][:3]
     header = {k.strip().lower(): v for k, v in zip(head[1].split("\t"), head[2].split("\t"), strict=False)}
     scale = 1 / _scale(header, str(path))
     new = {
@@ -264,4 +264,5 @@ def patch_trc(path: Path, changes: Mapping[int, Array]) -> bytes:
         for row, points in changes.items()
     }
     digits = 7 if scale < 10 else 4  # a tenth of a micrometre, as `write_trc` has it
-    return exact.encoded(replace_cells(exact.text, "\t", len(table.frames), new, digits))
+    patch.replace_cells("\t", len(table.frames), new, digits)
+    return patch.encoded()

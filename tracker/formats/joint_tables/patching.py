@@ -7,11 +7,11 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.delimited import read_delimited
-from tracker.formats.exact_text import exact_text, replace_cells
 from tracker.formats.joint_tables.columns import named_columns
 from tracker.formats.joint_tables.layouts import WIDE, find_layout
 from tracker.formats.joint_tables.table_reading import read_table
 from tracker.formats.observation_layout import Sample
+from tracker.formats.text_patch import TextPatch
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import METRES_BY_WORD
 
@@ -27,9 +27,9 @@ def patch_table(path: Path, unit_m: float | None, changes: Mapping[int, Array]) 
     Raises:
         FormatError: it is of another layout, or has decimal commas.
     """
-    layout, table, exact = find_layout(Sample(path)), read_delimited(path), exact_text(path.read_bytes())
+    layout, table, patch = find_layout(Sample(path)), read_delimited(path), TextPatch(path.read_bytes())
     columns = named_columns(table) if layout is WIDE else None
-    if columns is None or columns.person is not None or (table.separator != "," and "," in exact.text):
+    if columns is None or columns.person is not None or (table.separator != "," and "," in patch.text):
         expected = "a table with a row for each frame of one person and points in decimal numbers, the one layout"
         found = layout.program if layout else "another"
         advice = "export the poses as TRC or CSV"
@@ -42,4 +42,5 @@ def patch_table(path: Path, unit_m: float | None, changes: Mapping[int, Array]) 
         row: {i: float(x / scale) for i, x in zip(at, points.ravel(), strict=True) if not np.isnan(x)}
         for row, points in changes.items()
     }
-    return exact.encoded(replace_cells(exact.text, table.separator, len(found.frames), new, 7 if scale > 0.1 else 4))
+    patch.replace_cells(table.separator, len(found.frames), new, 7 if scale > 0.1 else 4)
+    return patch.encoded()

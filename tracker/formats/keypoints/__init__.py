@@ -6,13 +6,13 @@ all programs is `tracker.interchange.observations.readers`.
 
 __all__ = [
     "coco",
-    "coco_patching",
     "coco_reading",
     "coco_segmentation",
     "deeplabcut",
     "detections",
     "hand_labels",
     "hdf5",
+    "json_patching",
     "openpose",
     "picture_names",
     "picture_table",

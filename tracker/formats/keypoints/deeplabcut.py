@@ -8,19 +8,20 @@ labels of a person. The Ensemble Kalman Smoother (EKS) adds coords of its own.
 import io
 import pickle
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.errors import FormatError, Remedy
+from tracker.errors import FormatError
 from tracker.formats.delimited import TableLine, read_delimited
-from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
 from tracker.formats.keypoints.picture_names import picture_names
 from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks, text_of
+from tracker.formats.keypoints.point_changes import Changes, PersonChanges, placed_points
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
+from tracker.formats.text_patch import PIXEL_DECIMALS, TextPatch
 from tracker.geometry.arrays import Array, IntArray
 from tracker.validation import MAX_NUMBER, quoted
 
@@ -212,19 +213,14 @@ def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: 
     return PictureTable(tuple(names), numbers, points, notes=tuple(notes), tracks=tracks, is_by_hand=is_by_hand)
 
 
-Changes = Mapping[int, Sequence[tuple[int, Array]]]
-"""By row, from 0: number of the individual, or -1 for one who was not found, and x, y, confidence of all points,
-(n_points, 3); rows of NaN stay, confidence 0 makes a point absent."""
-
-
 def patch_deeplabcut_csv(path: Path, changes: Changes) -> bytes:
     """Return a file, which has been read before, with points of some rows replaced; all other bytes stay."""
     columns, n_index, _ = _read_head(_filled(path), str(path))
-    n_rows = len(read_deeplabcut_csv(path).numbers)
     found = _new_cells(columns, changes).items()
     new = {row: {n_index + i: value for i, value in cells.items()} for row, cells in found}
-    exact = exact_text(path.read_bytes())
-    return exact.encoded(replace_cells(exact.text, ",", n_rows, new, PIXEL_DECIMALS))
+    patch = TextPatch(path.read_bytes())
+    patch.replace_cells(",", len(read_deeplabcut_csv(path).numbers), new, PIXEL_DECIMALS)
+    return patch.encoded()
 
 
 def patch_deeplabcut_hdf5(path: Path, changes: Changes) -> None:
@@ -244,37 +240,15 @@ def patch_deeplabcut_hdf5(path: Path, changes: Changes) -> None:
 def _new_cells(columns: Sequence[_Column], changes: Changes) -> dict[int, dict[int, float]]:
     """Return the numbers that change, by row and column; NaN for the position of an absent point."""
     individuals, names = ([*dict.fromkeys(words)] for words in list(zip(*columns, strict=True))[:2])
+    at, every = {column: i for i, column in enumerate(columns)}, range(len(individuals))
+    problem = f"expected columns for a person who was not found, found those of {len(individuals)} others alone"
+
+    def places(_: int, people: PersonChanges) -> tuple[Sequence[int], Sequence[int]]:
+        return every, sorted({*every} - {k for k, _ in people})
+
     new: dict[int, dict[int, float]] = {}
-    for row, people in changes.items():
-        free = sorted({*range(len(individuals))} - {k for k, _ in people})
-        problem = f"expected columns for a person who was not found, found those of {len(individuals)} others alone"
-        for person, values in with_free_places(people, range(len(individuals)), free, problem):
-            for i, column in enumerate(columns):
-                if column.coordinate not in _COORDINATES:
-                    continue
-                value = values[names.index(column.point)]
-                if column.individual == individuals[person] and not np.isnan(value[2]):
-                    absent = value[2] == 0 and column.coordinate != "likelihood"
-                    cell = np.nan if absent else float(value[_COORDINATES.index(column.coordinate)])
-                    new.setdefault(row, {})[i] = cell
+    for row, person, point, xyc in placed_points(changes, places, problem):
+        for coordinate, value in zip(_COORDINATES, xyc, strict=True):
+            if (column := at.get(_Column(individuals[person], names[point], coordinate))) is not None:
+                new.setdefault(row, {})[column] = value
     return new
-
-
-def with_free_places(
-    people: Sequence[tuple[int, Array]], present: Sequence[int], free: Sequence[int], problem: str
-) -> list[tuple[int, Array]]:
-    """Give those who were not found the first places that are free; return all by place.
-
-    Args:
-        people: numbers among those present, or -1, and their points.
-        present: place of each who is there.
-        free: other places.
-        problem: sentence on too few of them.
-
-    Raises:
-        FormatError: no places are left.
-    """
-    if sum(k < 0 for k, _ in people) > len(free):
-        raise FormatError(problem, Remedy("export_other_format"))
-    left = iter(free)
-    return [(present[k] if k >= 0 else next(left), values) for k, values in people]

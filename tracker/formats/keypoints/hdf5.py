@@ -19,8 +19,8 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy
 from tracker.files import check_regular
-from tracker.formats.keypoints.deeplabcut import Changes
 from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.keypoints.point_changes import Changes
 from tracker.formats.number_rows import MAX_VALUES
 
 CHANGES, PATCHED = "changes.npz", "patched"

@@ -6,6 +6,7 @@ With a file of changes in the folder, they are made in the copy of the file ther
 import re
 import sys
 import warnings
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from tracker.formats.keypoints.deeplabcut import is_deeplabcut_hdf5, patch_deepl
 from tracker.formats.keypoints.hdf5 import CHANGES, LIMITS, PATCHED, ReadAnswer, VideoHead
 from tracker.formats.keypoints.nwb_files import is_of_points, patch_nwb, read_nwb
 from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.keypoints.point_changes import Changes
 from tracker.formats.keypoints.sleap_files import read_sleap
 from tracker.formats.keypoints.sleap_patching import is_analysis, patch_analysis, patch_project
 from tracker.formats.number_rows import check_size
@@ -94,17 +96,13 @@ def limit_memory() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (LIMITS.memory_bytes, LIMITS.memory_bytes))
 
 
-Changes = dict[int, dict[int, list[tuple[int, Array]]]]
-"""By video and row of its table: number of the person, and x, y, confidence of the points, (n_points, 3)."""
-
-
 def _change(path: Path, folder: Path) -> None:
     """Replace points in the copy of a file.
 
     Raises:
         FormatError: points of such a file cannot be replaced.
     """
-    changes: Changes = {}
+    changes: dict[int, dict[int, list[tuple[int, Array]]]] = {}
     with np.load(folder / CHANGES, allow_pickle=False) as arrays:
         for (video, row, person), values in zip(arrays["numbers"].T.tolist(), arrays["values"], strict=True):
             changes.setdefault(video, {}).setdefault(row, []).append((person, values))
@@ -124,7 +122,7 @@ def _change(path: Path, folder: Path) -> None:
     _check(read_hdf5(path), read_hdf5(copy), changes, path)
 
 
-def _check(before: Tables, after: Tables, changes: Changes, path: Path) -> None:
+def _check(before: Tables, after: Tables, changes: Mapping[int, Changes], path: Path) -> None:
     """Compare a changed file with the file that it was, as sleap-io reads them.
 
     Raises:

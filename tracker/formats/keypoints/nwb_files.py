@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.deeplabcut import Changes, with_free_places
 from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
+from tracker.formats.keypoints.point_changes import Changes, placed_points, places_by_presence
 from tracker.formats.keypoints.sleap_patching import replace_dataset
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray
 from tracker.validation import MAX_FRAMES, MAX_NUMBER
 
 _TYPE = "neurodata_type"
+_NO_PLACE = "expected a free person for one who was not found in picture {}, found none"
 _ESTIMATION, _SERIES, _SKELETON = "PoseEstimation", "PoseEstimationSeries", "Skeleton"
 
 
@@ -66,15 +67,10 @@ def patch_nwb(path: Path, changes: Mapping[int, Changes]) -> None:
         videos = _videos(file, path)
         for number, rows in changes.items():
             video = videos[number]
-            found, pictures = _table(video, f"file {path}").is_found, video.all_numbers
-            for row, people in rows.items():
-                present = np.flatnonzero(found[row].any(axis=1)).tolist()
-                free = [k for k in range(found.shape[1]) if k not in present]
-                problem = f"expected a free person for one who was not found in picture {pictures[row]}, found none"
-                for k, values in with_free_places(people, present, free, problem):
-                    for node, (x, y, confidence) in enumerate(values.tolist()):
-                        if not np.isnan(confidence):
-                            _set(video, k, node, int(pictures[row]), (x, y, confidence))
+            places = places_by_presence(np.asarray(_table(video, f"file {path}").is_found.any(axis=2)))
+            pictures = video.all_numbers.tolist()
+            for row, person, node, xyc in placed_points(rows, places, _NO_PLACE, pictures):
+                _set(video, person, node, pictures[row], xyc)
 
 
 def is_of_points(group: Any) -> bool:
@@ -187,10 +183,10 @@ def _table(video: _Video, where: str) -> PictureTable:
 def _set(video: _Video, person: int, node: int, number: int, place: tuple[float, float, float]) -> None:
     """Set a point in a picture, or remove it, where its confidence is 0; a series without this picture gets a row."""
     series, numbers = video.series[person][node], video.numbers[person][node]
-    x, y, confidence = place
-    is_absent, at = confidence == 0, int(np.searchsorted(numbers, number))
+    *xy, confidence = place
+    at = int(np.searchsorted(numbers, number))
     if at == len(numbers) or numbers[at] != number:
-        if is_absent:
+        if confidence == 0:
             return
         times, new = _times(series), np.interp(number, *_scale(video))
         if "timestamps" not in series:
@@ -204,7 +200,7 @@ def _set(video: _Video, person: int, node: int, number: int, place: tuple[float,
         if "confidence" in series:
             _insert(series, "confidence", at, np.float64(0.0))
         video.numbers[person][node] = np.insert(numbers, at, number)
-    series["data"][at] = (np.nan, np.nan) if is_absent else (x, y)
+    series["data"][at] = xy
     if "confidence" in series:
         series["confidence"][at] = confidence
 

@@ -12,8 +12,6 @@ import msgspec
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, number_like
-from tracker.formats.json_numbers import Span, json_spans, replace_spans
 from tracker.formats.keypoints.picture_table import PicturePerson, text_of
 from tracker.geometry.arrays import Array, IntArray
 from tracker.text_files import read_json
@@ -58,38 +56,6 @@ def read_openpose(path: Path) -> list[PicturePerson]:
         values[(values[:, :2] == 0).all(axis=1)] = (np.nan, np.nan, 0.0)
         found.append(PicturePerson(values, person.track))
     return found
-
-
-def patch_openpose(data: bytes, changes: Sequence[tuple[int, Array]]) -> bytes:
-    """Return a file with points of some people replaced; all other bytes stay.
-
-    Args:
-        data: the file, as it was read.
-        changes: number of a person among those with points, or -1 for a new one, and x, y, confidence of all points,
-            (n_points, 3); rows of NaN stay, confidence 0 makes a point absent.
-    """
-    exact = exact_text(data)
-    people = json_spans(exact.text)["people"]
-    numbers = [p["pose_keypoints_2d"].items for p in people.items if "pose_keypoints_2d" in p]
-    with_points = [some for some in numbers if some]
-    new: dict[Span, str] = {}
-    is_first = not people.items
-    for person, values in changes:
-        if person < 0:
-            rows = np.where(np.isnan(values), 0.0, values)
-            text = ", ".join(number_like(x, "", PIXEL_DECIMALS) for x in rows.ravel().tolist())
-            begin = "" if is_first else ", "
-            new[people.end, people.end] = new.get((people.end, people.end), "") + (
-                f'{begin}{{"person_id": [-1], "pose_keypoints_2d": [{text}]}}'
-            )
-            is_first = False
-            continue
-        for i, row in enumerate(values.tolist()):
-            if row[2] == row[2]:
-                for k, value in enumerate(row if row[2] > 0 else (0.0, 0.0, 0.0)):
-                    span = with_points[person][3 * i + k]
-                    new[span] = number_like(value, exact.text[slice(*span)], PIXEL_DECIMALS)
-    return exact.encoded(replace_spans(exact.text, new))
 
 
 class OpenPosePerson(NamedTuple):

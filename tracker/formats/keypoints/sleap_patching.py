@@ -3,7 +3,7 @@
 It needs h5py, and runs in the process that reads HDF5 files.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.formats.keypoints.deeplabcut import Changes, with_free_places
+from tracker.formats.keypoints.point_changes import Changes, placed_points, places_by_presence
 from tracker.geometry.arrays import Array
 
 _Rows = NDArray[np.void]
@@ -49,17 +49,12 @@ def patch_analysis(path: Path, changes: Changes) -> None:
         points, is_there = tracks[:], occupancy[:]  # (n_tracks, 2, n_points, n_frames), (n_frames, n_tracks)
         scores = file["point_scores"][:] if "point_scores" in file else np.zeros((len(points), *points.shape[2:]))
         seen = np.isfinite(points).any(axis=(1, 2))
-        numbers = np.flatnonzero(seen.any(axis=0))  # rows of the table: frames that show somebody
-        for row, people in changes.items():
-            k = int(numbers[row])
-            present, free = np.flatnonzero(seen[:, k]).tolist(), np.flatnonzero(~seen[:, k]).tolist()
-            problem = f"expected a track for a person who was not found on frame {k}, found none"
-            for track, values in with_free_places(people, present, free, problem):
-                stays, absent = np.isnan(values[:, 2]), values[:, 2] == 0
-                xy = np.where(absent[:, None], np.nan, values[:, :2])
-                points[track, :, ~stays, k] = xy[~stays]
-                scores[track, ~stays, k] = values[~stays, 2]
-                is_there[k, track] = 1
+        numbers = np.flatnonzero(seen.any(axis=0)).tolist()  # rows of the table: frames that show somebody
+        problem = "expected a track for a person who was not found on frame {}, found none"
+        for row, track, point, xyc in placed_points(changes, places_by_presence(seen[:, numbers].T), problem, numbers):
+            points[track, :, point, numbers[row]] = xyc[:2]
+            scores[track, point, numbers[row]] = xyc[2]
+            is_there[numbers[row], track] = 1
         tracks[:], occupancy[:] = points, is_there
         if "point_scores" in file:
             file["point_scores"][:] = scores
@@ -79,17 +74,12 @@ def patch_project(path: Path, changes: Mapping[int, Changes]) -> None:
             of_video = np.flatnonzero(tables["frames"]["video"] == video_ids[video])
             of_video = of_video[np.argsort(tables["frames"]["frame_idx"][of_video], kind="stable")]
             for row, people in rows.items():
-                for person, values in _last_added(people):
+                for person, values in sorted(people, key=lambda one: one[0] < 0):  # new ones change numbers of others
                     at = _new_instance(tables, of_video[row], len(values)) if person < 0 else None
                     instance = _instances(tables, of_video[row])[person] if at is None else at
                     _set_points(tables, instance, values, offset)
         for name in names:
             replace_dataset(file, name, tables[name])
-
-
-def _last_added(people: Sequence[tuple[int, Array]]) -> list[tuple[int, Array]]:
-    """Put new people last: they change no numbers of others."""
-    return sorted(people, key=lambda one: one[0] < 0)
 
 
 def _instances(tables: Mapping[str, _Rows], frame: int) -> list[int]:

@@ -13,10 +13,9 @@ from tracker.formats.bvh_patching import patch_bvh
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
 from tracker.formats.joint_tables.patching import patch_table
-from tracker.formats.keypoints.coco_patching import patch_coco
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
-from tracker.formats.keypoints.openpose import patch_openpose
+from tracker.formats.keypoints.json_patching import patch_coco, patch_openpose
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.trc import patch_trc
 from tracker.geometry.arrays import Array
@@ -115,7 +114,7 @@ def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Chan
         raise _not_sent_back(
             f"files of a program to which points are sent back, found {PICTURE_FORMATS[format_name].program}"
         )
-    for path in {pictures.files[0] for pictures, _ in found}:  # a file may hold several cameras
+    for path in dict.fromkeys(pictures.files[0] for pictures, _ in found):  # a file may hold several cameras
         of_file = {p.part: changes for p, changes in found if p.files[0] == path}
         if format_name == "deeplabcut":
             out[path] = patch_deeplabcut_csv(path, of_file[0])
