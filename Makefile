@@ -51,7 +51,7 @@ test-library: $(VENV)/.tested
 test-page: $(VENV)/.tested
 	$(STEP) nice -n 5 $(PYTEST) --numprocesses 3 --no-loadscope-reorder -m "not slow" tests/browser
 
-test-slow: $(VENV)/.slow kernels
+test-slow: $(VENV)/.slow $(VENV)/.typescript kernels
 	$(PYTEST) -m slow
 
 # Once, not in each process of the tests at the same time.
