@@ -17,7 +17,7 @@ from tracker.geometry.camera_correction import DRIFT, TIME, corrected
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.stored_run import forget_unfinished
-from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_cameras
+from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_camera_files
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.calibration_log import (
     CALIBRATION_EDITS,
@@ -183,6 +183,6 @@ def _write(session: Session, content: Mapping[str, Any]) -> Session:
         ahead_frames, rate = clocks[name]
         return Clock(ahead_frames, rate, tuple(LostFrames(*own) for own in lost.get(name, ())))
 
-    return save_cameras(
+    return save_camera_files(
         loaded, [replace(c, clock=clock(c.camera.name)) if c.camera.name in clocks else c for c in loaded.cameras]
     )

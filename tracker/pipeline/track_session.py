@@ -253,25 +253,15 @@ class TrackSession:
 
     def take(self, step: Step) -> None:
         """Keep the results of a step."""
-        if isinstance(step, BackwardStep):
-            self._take_backward(step.found)
-            return
-        if isinstance(step, EstimatedRows):
-            self._take_estimated(step)
-            return
-        if isinstance(step, CameraStep):
-            self.contradiction = step.contradiction
-            return
-        if isinstance(step, EstimateStep):
-            return
-        self._waiting += self._rows_of(step)
-        self._n_waiting += 1
-        self.tracked[step.frame] = TrackedFrame.of(step)
-        self.costs_px[step.frame] = step.cost_px
-        if step.normal_matrices:
-            self.normal_matrices[step.frame] = step.normal_matrices
-        if self._save_frames is not None and self._n_waiting >= self._save_frames:
-            self.save()
+        match step:
+            case PoseEstimate():
+                self._take_tracked(step)
+            case BackwardStep(found=found):
+                self._take_backward(found)
+            case EstimatedRows():
+                self._take_estimated(step)
+            case CameraStep(contradiction=sentence):
+                self.contradiction = sentence
 
     def save(self) -> None:
         """Save the frames that are not saved yet."""
@@ -294,6 +284,16 @@ class TrackSession:
         """Return how often each person had which status on the frames of this run; on all if none was left to track."""
         of_frames = [self.tracked[k].statuses for k in self.costs_px or self.tracked]
         return [Counter(s[i] for s in of_frames) for i in range(len(self._stored))]
+
+    def _take_tracked(self, found: PoseEstimate) -> None:
+        self._waiting += self._rows_of(found)
+        self._n_waiting += 1
+        self.tracked[found.frame] = TrackedFrame.of(found)
+        self.costs_px[found.frame] = found.cost_px
+        if found.normal_matrices:
+            self.normal_matrices[found.frame] = found.normal_matrices
+        if self._save_frames is not None and self._n_waiting >= self._save_frames:
+            self.save()
 
     def _take_backward(self, found: TrackedFrame) -> None:
         self.save()

@@ -19,7 +19,7 @@ from tracker.footage.video import open_footage
 from tracker.session.footage_files import check_side_files, find_background, find_masks
 from tracker.session.matching import check_names, find_entry
 from tracker.session.missing_files import Kind, MissingFile, missing_files
-from tracker.session.session import Session, save_cameras
+from tracker.session.session import Session, save_camera_files
 from tracker.validation import same_form
 
 
@@ -93,7 +93,7 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
     for f in found:
         changes.setdefault(f.camera, {})[f.kind] = f.new
     cameras = tuple(replace(c, **changes.get(c.camera.name, {})) for c in session.cameras)  # pyrefly: ignore[bad-argument-type]
-    return save_cameras(session, cameras), tuple(found)
+    return save_camera_files(session, cameras), tuple(found)
 
 
 def leave_masks(session: Session) -> Session:
@@ -102,7 +102,7 @@ def leave_masks(session: Session) -> Session:
     Raises:
         SessionError: session.toml cannot be written.
     """
-    return save_cameras(session, [replace(c, masks=None) for c in session.cameras])
+    return save_camera_files(session, [replace(c, masks=None) for c in session.cameras])
 
 
 def _masked(session: Session, folder: Path) -> list[str]:

@@ -207,7 +207,7 @@ def _load_cameras(row: SessionFile, folder: Path) -> tuple[CameraSource, ...]:
     )
 
 
-def save_cameras(session: Session, cameras: Sequence[CameraSource]) -> Session:
+def save_camera_files(session: Session, cameras: Sequence[CameraSource]) -> Session:
     """Replace the places of footage, backgrounds and masks in a session's session.toml.
 
     Args:

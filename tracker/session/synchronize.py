@@ -21,7 +21,7 @@ from tracker.session.footage_clocks import (
 )
 from tracker.session.matching import check_names
 from tracker.session.missing_files import missing_files
-from tracker.session.session import Session, save_cameras
+from tracker.session.session import Session, save_camera_files
 
 
 class FoundStart(NamedTuple):
@@ -199,7 +199,7 @@ def with_starts(session: Session, starts: Mapping[str, float], rates: Mapping[st
     """
     names = [c.camera.name for c in session.cameras]
     check_names([*starts, *rates], names, "camera", "the offsets")
-    return save_cameras(session, [_started(session, c, starts, rates) for c in session.cameras])
+    return save_camera_files(session, [_started(session, c, starts, rates) for c in session.cameras])
 
 
 def _started(

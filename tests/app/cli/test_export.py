@@ -143,8 +143,11 @@ def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
         (["--frames", "2", "--keyframes-only"], ["in frames 2, found none that is a keyframe", "--keyframes-only"]),
         (["--frames", "3:4", "--person", "ann"], ["expected poses of 'ann' in frames 3:4, found none"]),
         (["--frames", "5:6", "--person", "bob", "--skip-lost"], ["found none that is not lost"]),
-        (["--view", "cam0"], ["expected no --view with format trc", "--axes, --units"]),
-        (["--format", "mot", "--out", "{}/a.mot", "--units", "mm"], ["expected no --units with format mot", "--axes"]),
+        (["--view", "cam0"], ["expected no option 'view' with format trc", "it takes axes, units"]),
+        (
+            ["--format", "mot", "--out", "{}/a.mot", "--units", "mm"],
+            ["expected no option 'units' with format mot", "it takes axes"],
+        ),
         (["--format", "mp4", "--out", "{}/a.mp4", "--view", "x"], ["--view to be one of cam0, cam1, cam2, found 'x'"]),
         (["--format", "mp4", "--out", "{}/a.mp4"], ["cam0", "not found"]),
     ],

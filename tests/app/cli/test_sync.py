@@ -10,7 +10,7 @@ from command_line import assert_refused
 from tracker.errors import SessionError
 from tracker.footage import sound, start_times
 from tracker.session import footage_clocks, synchronize
-from tracker.session.session import load_session, save_cameras
+from tracker.session.session import load_session, save_camera_files
 
 
 def clocks(session):
@@ -120,7 +120,7 @@ def test_videos_without_clock(run, session):
 def test_nothing_to_compare(run, session, way):
     loaded = load_session(session)
     name = loaded.cameras[0].camera.name
-    save_cameras(loaded, [replace(c, footage=session / "missing.mp4") for c in loaded.cameras])
+    save_camera_files(loaded, [replace(c, footage=session / "missing.mp4") for c in loaded.cameras])
     assert_refused(run("sync", session, way), [f"camera '{name}': its footage", "missing.mp4 is not there", "relink"])
 
 

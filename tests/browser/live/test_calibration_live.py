@@ -16,7 +16,7 @@ from tracker.formats.anipose import write_calibration
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, corrected
-from tracker.session.session import load_session, save_cameras
+from tracker.session.session import load_session, save_camera_files
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseChange, PoseRecord
 
@@ -39,7 +39,7 @@ def tracked_copy(folder, changed):
     """Copy the sample, change its cameras, and track it from the true first pose."""
     shutil.copytree(SAMPLE, folder)
     session = changed(load_session(folder))
-    session = save_cameras(session, session.cameras)
+    session = save_camera_files(session, session.cameras)
     write_calibration(folder / "calibration.toml", [c.camera for c in session.cameras])
     person = session.people[0]
     truth, store = read_pose_table(SAMPLE / "truth.csv"), AnnotationStore(session.annotations_path)

@@ -51,7 +51,7 @@ def test_a_range_of_frames_is_read_and_exported(stored, tmp_path):
         (lambda s: tracker.read_poses(s, "eve"), "ann, bob"),
         (lambda s: tracker.read_poses(s, "ann", [9]), "frames from 0 to 5, found 9"),
         (lambda s: tracker.export(s, "a.xyz"), "expected a format"),
-        (lambda s: tracker.export(s, "a.trc", options={"view": "C0"}), "expected no --view"),
+        (lambda s: tracker.export(s, "a.trc", options={"view": "C0"}), "expected no option 'view'"),
         (lambda s: tracker.evaluate(s, "a.txt", "ann"), "expected a reference"),
         (lambda s: tracker.open_session(s.folder / "none"), "none"),
     ],

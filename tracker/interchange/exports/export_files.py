@@ -68,8 +68,8 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
     }
     for name, value in values.items():
         if name not in chosen.options:
-            can = f"its options are {', '.join(f'--{o}' for o in sorted(chosen.options))}"
-            raise TrackerError(f"expected no --{name} with format {chosen.name}, found '{value}'; {can}")
+            can = f"it takes {', '.join(sorted(chosen.options))}" if chosen.options else "it has no options"
+            raise TrackerError(f"expected no option '{name}' with format {chosen.name}, found '{value}'; {can}")
         if name == "character":
             load_character(value)
         elif value not in allowed[name]:

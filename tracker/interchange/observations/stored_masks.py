@@ -26,7 +26,7 @@ from tracker.interchange.observations.stored import (
     read_description,
     write_description,
 )
-from tracker.session.session import Session, save_cameras
+from tracker.session.session import Session, save_camera_files
 from tracker.validation import FileStem
 
 if TYPE_CHECKING:  # it decodes videos
@@ -127,7 +127,7 @@ def store_masks(session: Session, plan: "MaskPlan") -> Session:
         write_description(temporary / MASKS_FILE, f"masks {plan.name}", content)
     folder = masks_folder(session, plan.name)
     try:
-        return save_cameras(
+        return save_camera_files(
             session,
             [replace(c, masks=folder / c.camera.name) if c.camera.name in plan.masks else c for c in session.cameras],
         )

@@ -330,7 +330,7 @@ def test_an_import_that_cannot_be_written_leaves_nothing(session, tmp_path, monk
     def fails(*_):
         raise SessionError("disk full")
 
-    monkeypatch.setattr("tracker.interchange.observations.stored_masks.save_cameras", fails)
+    monkeypatch.setattr("tracker.interchange.observations.stored_masks.save_camera_files", fails)
     with pytest.raises(SessionError, match="disk full"):
         store_import(session, plan)
     assert not list((session.folder / "observations").iterdir())
