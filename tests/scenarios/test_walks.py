@@ -1,7 +1,7 @@
 """The walks of docs/architecture.md: each call is made, in the order in which the table has them."""
 
 import pytest
-from walks import calls_of, traced
+from walks import traced
 
 import tracker
 from tracker.formats.model_toml import load_model
@@ -18,7 +18,4 @@ def test_people_are_found_and_tracked_as_the_documents_say(tmp_path):
             walk.first_calls.clear()
             with walk.counted():
                 work(session.folder)
-            calls = calls_of(heading)
-            assert len(calls) > 10
-            assert [call for call in calls if call not in walk.first_calls] == []
-            assert sorted(calls, key=walk.first_calls.get) == calls
+            walk.assert_documented(heading)

@@ -30,6 +30,14 @@ class Walk:
         finally:
             self._crossings = None
 
+    def assert_documented(self, heading):
+        """The calls of the table below a heading of the document were made, and first made in its order."""
+        text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+        calls = ROW.findall(text.split(f"\n## {heading}")[1].split("\n## ")[0])
+        assert len(calls) > 5
+        assert [call for call in calls if call not in self.first_calls] == []
+        assert sorted(calls, key=self.first_calls.get) == calls
+
     def profile(self, frame, event, _):
         crossings = self._crossings
         if event != "call" or crossings is None:
@@ -63,9 +71,3 @@ def traced():
     finally:
         sys.setprofile(None)
         threading.setprofile(None)
-
-
-def calls_of(heading):
-    """File and function of each row of the table below a heading."""
-    text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
-    return ROW.findall(text.split(f"\n## {heading}")[1].split("\n## ")[0])

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 from page_visits import visiting
-from walks import calls_of, traced
+from walks import traced
 
 MAX_FILES, MAX_CROSSINGS = 50, 280
 """Of a move with the news that it makes; they may only fall."""
@@ -30,9 +30,6 @@ async def test_a_move_passes_few_files(walk, placed):
                 await page.hear("overlay", lambda m, seq=seq: m["seq"] == seq)
             moves.append(crossings)
     files, crossings = zip(*((len({*sum(m, ())}), m.total()) for m in moves), strict=True)
-    assert min(files) > 30
     assert min(files) <= MAX_FILES, sorted({*sum(min(moves, key=len), ())})
     assert min(crossings) <= MAX_CROSSINGS, min(moves, key=Counter.total).most_common(20)
-    calls = calls_of("One drag")
-    assert [call for call in calls if call not in walk.first_calls] == []
-    assert sorted(calls, key=walk.first_calls.get) == calls
+    walk.assert_documented("One drag")
