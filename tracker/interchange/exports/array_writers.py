@@ -1,6 +1,6 @@
 """Write a motion to files that are arrays over frames, people and points, one function for each format."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from tracker.formats.write_only.c3d import write_c3d
 from tracker.formats.write_only.movement_netcdf import PER_POSE, PoseDataset, Variable, per_point, write_dataset
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.frame_views import view_arrays
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions, file_from_world
@@ -19,9 +20,7 @@ from tracker.interchange.exports.pose_arrays import pose_arrays, pose_values
 from tracker.interchange.exports.views import exported_cameras
 
 
-def write_person_c3d(
-    motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
-) -> None:
+def write_person_c3d(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write the points of one person as C3D; residuals are the errors that the run expects."""
     found = pose_arrays(motion, options, tick)
     write_c3d(
@@ -30,7 +29,7 @@ def write_person_c3d(
     )  # fmt: skip
 
 
-def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]) -> None:
+def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write poses, joint centers, covariances, provenance and cameras as arrays of NumPy; docs/export.md lists them."""
     found, (names, poses) = pose_arrays(motion, options, tick), pose_values(motion)
     bodies = {p.record.model_revision: p.body.model for one in motion.exported for p in one.poses.values()}
@@ -80,9 +79,7 @@ def _cameras(sources: Sequence[CameraSource], cameras: Sequence[Camera]) -> dict
     }
 
 
-def write_movement(
-    motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
-) -> None:
+def write_movement(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write a dataset of `movement` with the joint centers in space, and another one with the points in all views.
 
     Raises:

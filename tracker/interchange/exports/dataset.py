@@ -16,7 +16,7 @@ recordings/NAME/
 import hashlib
 import json
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import reduce
@@ -31,6 +31,7 @@ from tracker.interchange.exports.dataset_card import LabelCounts, RecordingSumma
 from tracker.interchange.exports.dataset_labels import DatasetLabels, DatasetRecording, RecordingLabels, plan_labels
 from tracker.interchange.exports.dataset_splits import SplitChoice, divide
 from tracker.interchange.exports.export_files import FOLDER_PROVENANCE, is_export_folder, moved_at_end, unwritable
+from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.label_writers import write_views
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions
@@ -42,8 +43,6 @@ CHECKSUMS = "SHA256SUMS"
 """Name of the file that `sha256sum -c` reads."""
 SUFFIXES = {"anipose": ".toml", "opencv": ".yml"}
 """Layouts of the calibration, with the ends of their files' names."""
-Tick = Callable[[], None]
-"""Called after each frame; it may raise to stop the export."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args, get_type_hints
 
 import msgspec
 
@@ -55,17 +55,11 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
     Raises:
         TrackerError: the format has no such option, or a value is not allowed.
     """
-    from tracker.interchange.exports.options import AXES, KEYPOINT_SETS, PICTURES, PIXELS, UNITS, load_character
+    from tracker.interchange.exports.options import load_character
 
     values = {name: value for name, value in given.items() if value is not None}
-    allowed: dict[str, Sequence[str]] = {
-        "axes": AXES,
-        "units": UNITS,
-        "keypoints": KEYPOINT_SETS,
-        "pixels": PIXELS,
-        "pictures": PICTURES,
-        "view": _camera_names(session),
-    }
+    allowed = {name: get_args(kind) for name, kind in get_type_hints(ExportOptions).items()}
+    allowed["view"] = tuple(source.camera.name for source in session.cameras)
     for name, value in values.items():
         if name not in chosen.options:
             can = f"it takes {', '.join(sorted(chosen.options))}" if chosen.options else "it has no options"
@@ -235,7 +229,3 @@ def _remove_left(parent: Path) -> None:
             if not (place := parent / before.name.removesuffix(_BEFORE)).exists():
                 before.rename(place)
         shutil.rmtree(left, ignore_errors=True)
-
-
-def _camera_names(session: "Session") -> tuple[str, ...]:
-    return tuple(source.camera.name for source in session.cameras)

@@ -9,7 +9,9 @@ if TYPE_CHECKING:
     from tracker.interchange.exports.motion import ExportedMotion
     from tracker.interchange.exports.options import AxesName, ExportOptions, UnitName
 
-Writer = Callable[["ExportedMotion", "ExportOptions", Sequence[Path], Callable[[], None]], None]
+Tick = Callable[[], None]
+"""Called after each frame of each file; it may raise to stop the export."""
+Writer = Callable[["ExportedMotion", "ExportOptions", Sequence[Path], Tick], None]
 """Writes a motion to the files of one format, and calls the function after each frame."""
 
 

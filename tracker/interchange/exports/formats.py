@@ -3,14 +3,14 @@
 Other packages add theirs by an entry point (`tracker.compute.extensions`), and so does `app` with its overlay video.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tracker.compute.extensions import Extended
 from tracker.errors import Remedy, TrackerError
-from tracker.interchange.exports.export_format import ExportFormat, Writer
+from tracker.interchange.exports.export_format import ExportFormat, Tick, Writer
 
 if TYPE_CHECKING:
     from tracker.interchange.exports.motion import ExportedMotion
@@ -20,11 +20,8 @@ if TYPE_CHECKING:
 def _by_writer(name: str, module: str = "writers") -> Writer:
     """Return a function of a module of `tracker.interchange.exports`, imported when first used: help is quick."""
 
-    def write(
-        motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]
-    ) -> None:
-        writer: Writer = getattr(import_module(f"tracker.interchange.exports.{module}"), name)
-        writer(motion, options, paths, tick)
+    def write(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Tick) -> None:
+        getattr(import_module(f"tracker.interchange.exports.{module}"), name)(motion, options, paths, tick)
 
     return write
 

@@ -1,6 +1,6 @@
 """The people of a frame in each view: their points, also as arrays of all frames, and the pixels that they cover."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tracker.body.model import PosedBody, ahead
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.keypoints import Keypoints, keypoints_in_views
 from tracker.interchange.exports.motion import ExportedMotion, PersonMotion
 from tracker.interchange.exports.options import ExportOptions
@@ -83,9 +84,7 @@ class ViewPoints(NamedTuple):
     """A `KeypointFlag` of each, (V, F, P, n)."""
 
 
-def view_arrays(
-    motion: ExportedMotion, options: ExportOptions, points: tuple[str, ...], tick: Callable[[], None]
-) -> ViewPoints:
+def view_arrays(motion: ExportedMotion, options: ExportOptions, points: tuple[str, ...], tick: Tick) -> ViewPoints:
     """Return the points of all exported people in all views.
 
     Args:

@@ -8,6 +8,7 @@ import numpy as np
 from tracker.formats.joint_maps import known_joint_maps
 from tracker.formats.keypoints.openpose import OpenPosePerson, file_name, write_openpose
 from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.frame_views import FrameViews, PersonInView
 from tracker.interchange.exports.keypoints import project_through_lens
 from tracker.interchange.exports.motion import ExportedMotion
@@ -15,8 +16,6 @@ from tracker.interchange.exports.options import ExportOptions
 from tracker.interchange.exports.provenance import point_lost
 from tracker.interchange.exports.views import Pictures, exported_cameras, undistorted_pictures
 
-Tick = Callable[[], None]
-"""Called after each frame; it may raise to stop the export."""
 WriteView = Callable[[FrameViews, int, int], None]
 """Writes the labels of a frame in a view: the people, the view, the frame."""
 

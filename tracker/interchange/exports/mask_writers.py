@@ -1,7 +1,7 @@
 """Write masks of parts and people in each view: indexed PNG, and a legend of their labels."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from tracker.errors import FormatError, Remedy
 from tracker.files import write_text_atomic
 from tracker.formats.write_only.indexed_png import write_indexed_png
 from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.frame_views import FrameViews
 from tracker.interchange.exports.label_writers import write_views
 from tracker.interchange.exports.motion import ExportedMotion
@@ -21,9 +22,7 @@ SOMEBODY = np.iinfo(np.uint8).max
 _SOMEBODY_COLOR = "#808080"
 
 
-def write_masks(
-    motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
-) -> None:
+def write_masks(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write the masks of all frames in all views, and their legend.
 
     Raises:

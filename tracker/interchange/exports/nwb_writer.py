@@ -4,7 +4,7 @@ Each person is a `MultiCameraPoseEstimation`, which holds a series for each poin
 each view. Devices are calibrated cameras; a table has the provenance of each pose.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +19,7 @@ from tracker.formats.file_names import identifier, identifiers
 from tracker.formats.write_only.optional_packages import require
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
+from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.frame_views import view_arrays
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions, file_from_world
@@ -65,9 +66,7 @@ class _Types:
     """The axes of points in space, in words."""
 
 
-def write_poses_nwb(
-    motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
-) -> None:
+def write_poses_nwb(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write joint centers in space and in all views, skeletons, cameras and provenance of all people.
 
     Raises:

@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -15,15 +15,10 @@ from tracker.geometry.ground_plane import up_rotation
 from tracker.session.session import Session
 
 AxesName = Literal["calibration", "y-up"]
-AXES: tuple[AxesName, ...] = get_args(AxesName)
 UnitName = Literal["m", "mm"]
-UNITS: tuple[UnitName, ...] = get_args(UnitName)
 KeypointSet = Literal["all", "coco17", "body"]
-KEYPOINT_SETS: tuple[KeypointSet, ...] = get_args(KeypointSet)
 PicturesName = Literal["images", "video"]
-PICTURES: tuple[PicturesName, ...] = get_args(PicturesName)
 PixelsName = Literal["original", "undistorted"]
-PIXELS: tuple[PixelsName, ...] = get_args(PixelsName)
 
 
 @dataclass(frozen=True)

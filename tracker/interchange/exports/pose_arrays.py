@@ -1,6 +1,5 @@
 """Exported poses as arrays over frames, people and points, for files that are arrays."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
+from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions, file_from_world
 from tracker.interchange.exports.provenance import pose_provenance
@@ -50,7 +50,7 @@ class PoseArrays:
         return np.where(np.isnan(self.joints[..., 0]), np.nan, 1.0 - np.nan_to_num(self.point_lost))
 
 
-def pose_arrays(motion: ExportedMotion, options: ExportOptions, tick: Callable[[], None] = lambda: None) -> PoseArrays:
+def pose_arrays(motion: ExportedMotion, options: ExportOptions, tick: Tick = lambda: None) -> PoseArrays:
     """Return the exported poses and their provenance as arrays, in the axes of a file; call `tick` after each frame."""
     models = [model for person in motion.exported for model in person.models]
     names = tuple(dict.fromkeys(name for model in models for name in model.point_names))

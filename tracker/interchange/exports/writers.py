@@ -1,6 +1,6 @@
 """Write a motion to files, one function for each format. `app.export` lists them for the command line and the page."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,15 +28,13 @@ from tracker.formats.trc import write_trc
 from tracker.formats.write_only.gltf import AnimatedBody, write_glb
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
+from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.frame_views import FrameViews
 from tracker.interchange.exports.keypoints import Keypoints
 from tracker.interchange.exports.label_writers import write_views
 from tracker.interchange.exports.motion import ExportedMotion, PersonMotion
 from tracker.interchange.exports.options import ExportOptions, file_from_world, up_in_file
 from tracker.interchange.exports.pose_arrays import pose_arrays, pose_values
-
-Tick = Callable[[], None]
-"""Called after each frame of each file; it may raise to stop the export."""
 
 
 def write_person_trc(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
