@@ -96,9 +96,6 @@ class NumberRows:
             return None
         return row if len(row) == self._n_columns else None
 
-    def _split(self, text: str, line: int) -> list[str]:
-        return split_cells(text, self._separator, f"{self._where}, line {line}")
-
     def _numbers(self, fields: Sequence[str], line: int) -> list[float]:
         where = f"{self._where}, line {line}"
         try:

@@ -81,11 +81,6 @@ def is_label_studio(data: Any) -> bool:
     return isinstance(data, list) and bool(data) and isinstance(data[0], dict) and {"data", "annotations"} <= {*data[0]}
 
 
-def is_json_min(data: Any) -> bool:
-    """Return whether plain data of a JSON file are those of Label Studio's JSON-MIN."""
-    return isinstance(data, list) and bool(data) and isinstance(data[0], dict) and "annotation_id" in data[0]
-
-
 def read_cvat(path: Path) -> Tables:
     """Read an XML export of CVAT, for images or for videos; single points of a picture are of one person.
 

@@ -6,86 +6,40 @@ individuals); one of several views has a dimension `view` before these.
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
-import numpy as np
 from numpy.typing import NDArray
 
 from tracker.formats.write_only.optional_packages import require
-from tracker.geometry.arrays import Array
 
-Variable = tuple[tuple[str, ...], NDArray[Any]]
-"""Names of the dimensions of a variable, and its values."""
-PER_POSE = ("time", "individuals")
-"""Dimensions of a value of each pose."""
-PER_POINT = ("time", "keypoints", "individuals")
+Variable: TypeAlias = tuple[tuple[str, ...], NDArray[Any]]
+"""Names of the dimensions of a variable, in any order, and its values."""
+PER_POINT = ("time", "individuals", "keypoints")
 """Dimensions of a value of each point."""
-
-
-class PoseDataset(NamedTuple):
-    """Poses of P people with n points on F frames."""
-
-    position: Array
-    """(F, P, n, D), or (V, F, P, n, D) in V views; D is 2 or 3."""
-    confidence: Array
-    """(F, P, n), or (V, F, P, n), from 0 to 1; NaN without a point."""
-    times_s: Array
-    """(F,)."""
-    individuals: Sequence[str]
-    """Names of the people, (P,)."""
-    keypoints: Sequence[str]
-    """Names of the points, (n,)."""
-    views: Sequence[str] = ()
-    """Names of the views, (V,); none for points in space."""
+PER_POSE = PER_POINT[:2]
+"""Dimensions of a value of each pose."""
+_ORDER = ("view", "time", "space", "space_of", "keypoints", "individuals")
 
 
 def write_dataset(
-    path: Path, poses: PoseDataset, attributes: Mapping[str, Any], variables: Mapping[str, Variable]
+    path: Path,
+    variables: Mapping[str, Variable],
+    coordinates: Mapping[str, Sequence[str] | NDArray[Any]],
+    attributes: Mapping[str, Any],
 ) -> None:
     """Write a dataset of poses.
 
     Args:
         path: the file.
-        poses: as arrays.
-        attributes: of the dataset, besides those of the poses: at least `fps`.
-        variables: more of them by name.
+        variables: by name, at least `position`, whose values are NaN where missing, and `confidence`, from 0 to 1.
+        coordinates: of the dimensions: times in s, and names.
+        attributes: of the dataset, besides those of all: at least `fps`.
 
     Raises:
         FormatError: a package is missing.
     """
     require("h5netcdf", "netCDF")
     xarray = require("xarray", "netCDF")
-    view = ("view",) * bool(poses.views)
-    n_space = poses.position.shape[-1]
-    variables = {
-        "position": ((*view, "time", "space", "keypoints", "individuals"), _last_people(poses.position, 2)),
-        "confidence": ((*view, *PER_POINT), _last_people(poses.confidence, 1)),
-        **variables,
-    }
-    coordinates = {
-        "time": poses.times_s,
-        "space": list("xyz"[:n_space]),
-        "keypoints": list(poses.keypoints),
-        "individuals": list(poses.individuals),
-        **({"view": list(poses.views)} if poses.views else {}),
-    }
     common = {"source_software": "Quadrille", "ds_type": "poses", "time_unit": "seconds"}
-    dataset = xarray.Dataset(variables, coords=coordinates, attrs=common | dict(attributes))
-    dataset.to_netcdf(path, engine="h5netcdf")
-
-
-def per_point(values: NDArray[Any]) -> Variable:
-    """Return values of each point, (F, P, n), or (V, F, P, n) in V views, as a variable."""
-    return (("view",) * (values.ndim == 4) + PER_POINT, _last_people(values, 1))
-
-
-def _last_people(values: NDArray[Any], n_after: int) -> NDArray[Any]:
-    """Bring the people to the end, and of positions the coordinates before the points.
-
-    Args:
-        values: (..., F, P, n) or (..., F, P, n, D).
-        n_after: number of dimensions after the people: 1 or 2.
-    """
-    if n_after == 1:
-        return np.swapaxes(values, -1, -2)
-    return np.moveaxis(values, (-1, -2, -3), (-3, -2, -1))
+    dataset = xarray.Dataset(dict(variables), coords=dict(coordinates), attrs=common | dict(attributes))
+    dataset.transpose(*_ORDER, missing_dims="ignore").to_netcdf(path, engine="h5netcdf")

@@ -9,7 +9,7 @@ import numpy as np
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model
 from tracker.formats.write_only.c3d import write_c3d
-from tracker.formats.write_only.movement_netcdf import PER_POSE, PoseDataset, Variable, per_point, write_dataset
+from tracker.formats.write_only.movement_netcdf import PER_POINT, PER_POSE, Variable, write_dataset
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.interchange.exports.export_format import Tick
@@ -88,21 +88,25 @@ def write_movement(motion: ExportedMotion, options: ExportOptions, paths: Sequen
     found = pose_arrays(motion, options)
     seen = view_arrays(motion, options, found.points, tick)
     attributes = {"fps": motion.session.fps, "session": motion.session.name}
-    poses = PoseDataset(found.joints, found.confidence, found.times_s, found.people, found.points)
-    in_space = attributes | {"space_unit": "metres", "axes": options.axes}
-    variables: dict[str, Variable] = {
-        "covariance": (
-            ("time", "space", "space_of", "keypoints", "individuals"),
-            found.covariances.transpose(0, 3, 4, 2, 1),
-        ),
-        "point_source": per_point(found.point_sources),
-        "point_lost": per_point(found.point_lost),
-        "frame": (("time",), found.frames),
+    names = {"time": found.times_s, "keypoints": list(found.points), "individuals": list(found.people)}
+    frame: Variable = (("time",), found.frames)
+    in_space: dict[str, Variable] = {
+        "position": ((*PER_POINT, "space"), found.joints),
+        "confidence": (PER_POINT, found.confidence),
+        "covariance": ((*PER_POINT, "space", "space_of"), found.covariances),
+        "point_source": (PER_POINT, found.point_sources),
+        "point_lost": (PER_POINT, found.point_lost),
+        "frame": frame,
         **{name: (PER_POSE, values) for name, values in found.by_pose.items()},
     }
-    write_dataset(paths[0], poses, in_space, variables)
-    confidence = np.where(np.isnan(seen.points_px[..., 0]), np.nan, found.confidence)
-    views = tuple(source.camera.name for source in motion.session.cameras)
-    in_views = poses._replace(position=seen.points_px, confidence=confidence, views=views)
+    metres = attributes | {"space_unit": "metres", "axes": options.axes}
+    write_dataset(paths[0], in_space, names | {"space": list("xyz")}, metres)
+    in_views: dict[str, Variable] = {
+        "position": (("view", *PER_POINT, "space"), seen.points_px),
+        "confidence": (("view", *PER_POINT), np.where(np.isnan(seen.points_px[..., 0]), np.nan, found.confidence)),
+        "visibility": (("view", *PER_POINT), seen.visibility),
+        "frame": frame,
+    }
+    views = [source.camera.name for source in motion.session.cameras]
     pixels = attributes | {"space_unit": "pixels", "pixels": options.pixels}
-    write_dataset(paths[1], in_views, pixels, {"visibility": per_point(seen.visibility), "frame": variables["frame"]})
+    write_dataset(paths[1], in_views, names | {"space": list("xy"), "view": views}, pixels)
