@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix
 
 from app.bench.rows import Row, Yardstick, in_yardsticks
 from tracker.calibration.check.lens_priors import CALIBRATED, prior_sigmas
-from tracker.calibration.check.point_adjustment import PointProblem, triangulate_all
+from tracker.calibration.check.point_problem import PointProblem, triangulate_all
 from tracker.calibration.check.reprojection import Observations, Prior, Rig
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.geometry import rigid

@@ -23,10 +23,10 @@ from detected_people import acted, detected, filmed_couple
 from doc_tables import Conditions, add_write_option, check_places, show, table
 from filmed_people import aligned, blanks, dancing, observed, rig
 
-from tracker.calibration.check.point_adjustment import triangulate_all
+from tracker.calibration.check.point_problem import triangulate_all
 from tracker.calibration.check.reprojection import Observations
 from tracker.calibration.self_calibration.keypoint_calibration import calibrate_by_person
-from tracker.calibration.self_calibration.keypoint_files import KeyPoints, read_keypoints
+from tracker.calibration.self_calibration.keypoint_files import footage_session, plan_of_files
 from tracker.calibration.self_calibration.person_calibration import PersonCalibration
 from tracker.errors import CalibrationError
 from tracker.formats.calibrations.reading import read_cameras
@@ -94,23 +94,25 @@ def joints_of(observations: ObservationSet, cameras: Sequence[Camera]) -> Array:
 
 def keypoint_row(folder: Path, height_m: float | None, has_lenses: bool) -> list[str]:
     """Calibrate the cameras of a recording by key points, and return a row of the table."""
-    paths, given, keypoints = _recording(folder)
-    lenses = [given[name] for name in paths] if has_lenses else keypoints.blanks
-    found = calibrate_by_person(keypoints.observations, lenses, height_m, has_lenses)
+    paths, given, observations, unknown = _recording(folder)
+    lenses = [given[name] for name in paths] if has_lenses else unknown
+    found = calibrate_by_person(observations, lenses, height_m, has_lenses)
     return recording_row(folder, found, height_m, has_lenses)
 
 
-def _recording(folder: Path) -> tuple[dict[str, Path], dict[str, Camera], KeyPoints]:
+def _recording(folder: Path) -> tuple[dict[str, Path], dict[str, Camera], ObservationSet, list[Camera]]:
     entries = {e.name: e.camera() for e in read_cameras(folder / "Calib.toml").entries}
     paths = {p.stem: p for p in sorted(folder.glob("*.mp4"))}
-    return paths, entries, read_keypoints(folder / "detector/keypoints", paths, {}, common_frames=False)
+    session = footage_session(folder, paths, {}, common_frames=False)
+    plan = plan_of_files(session, folder / "detector/keypoints")
+    return paths, entries, plan.observations, [c.camera for c in session.cameras]
 
 
 def recording_row(folder: Path, found: PersonCalibration, height_m: float | None, has_lenses: bool) -> list[str]:
     """Compare found cameras with the given ones, by joints that both triangulate from key points."""
-    paths, entries, keypoints = _recording(folder)
+    paths, entries, observations, _ = _recording(folder)
     given = [entries[name] for name in paths]
-    joints, expected = (joints_of(keypoints.observations, c) for c in (found.cameras, given))
+    joints, expected = (joints_of(observations, c) for c in (found.cameras, given))
     known = np.isfinite(joints).all(axis=-1) & np.isfinite(expected).all(axis=-1)
     off = compared(found.cameras, given, joints[known], expected[known])
     most = np.sort(off.joints_mm)[: int(TRIMMED * known.sum())]
@@ -123,12 +125,12 @@ def recording_row(folder: Path, found: PersonCalibration, height_m: float | None
         f"{1000 * found.volume.expected_m:.1f} ({1000 * found.volume.low_m:.1f} to {1000 * found.volume.high_m:.1f})",
         f"{100 * (1 / off.scale - 1):+.0f}" if height_m is not None else "height unknown",
         f"{off.tilt_deg:.1f}",
-        f"{np.median(found.held_out_px):.1f} / {found.held_out_rms_px():.1f}",
+        f"{np.median(found.held_out.px):.1f} / {found.held_out.rms_px():.1f}",
     ]
 
 
 def _said(found: PersonCalibration) -> str:
-    return f"± {100 * np.mean(found.adjusted.focal_sigmas):.0f}"
+    return f"± {100 * np.mean(found.adjusted.fit.focal_sigmas):.0f}"
 
 
 def simulated_row(n_rigs: int, n_cameras: int, arc: float, has_lenses: bool) -> list[str]:

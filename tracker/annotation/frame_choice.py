@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.compute.sampling import farthest_first
 from tracker.errors import TrackerError
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import Array
 from tracker.session.frame_list import parse_frames_and_ranges
 from tracker.session.session import Person, Session
 from tracker.session.store.stored_poses import StoredPose, read_stored_poses
@@ -47,28 +48,6 @@ def choose_frames(session: Session, person: Person, choice: FrameChoice, name: s
     return doubted_frames(poses) if choice.doubted else diverse_frames(poses, choice.diverse)
 
 
-def spread_choice(points: Array, n: int) -> IntArray:
-    """Choose points far from one another (farthest-point sampling, Gonzalez 1985).
-
-    The first one is the point nearest the mean. Each further one is the point farthest from all that are chosen.
-
-    Args:
-        points: (N, D).
-        n: number to choose; all points if there are fewer distinct ones.
-
-    Returns:
-        Indices in the order of choice, (at most n,).
-    """
-    if not len(points) or n < 1:
-        return np.empty(0, dtype=np.int64)
-    chosen = [int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
-    distances = np.linalg.norm(points - points[chosen[0]], axis=1)
-    while len(chosen) < n and distances.max() > 0:
-        chosen.append(int(np.argmax(distances)))
-        distances = np.minimum(distances, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.array(chosen)
-
-
 def diverse_frames(poses: dict[int, StoredPose], n: int) -> list[int]:
     """Choose the frames with the most diverse poses of a person, ascending.
 
@@ -81,8 +60,8 @@ def diverse_frames(poses: dict[int, StoredPose], n: int) -> list[int]:
     frames = [
         k for k, p in poses.items() if p.body.model.point_names == next(iter(poses.values())).body.model.point_names
     ]
-    chosen = spread_choice(np.array([_posture(poses[k]) for k in frames]), n)
-    return sorted(frames[i] for i in chosen)
+    postures = np.array([_posture(poses[k]) for k in frames])
+    return sorted(frames[i] for i in farthest_first(postures, n, np.finfo(float).tiny))
 
 
 def doubted_frames(poses: dict[int, StoredPose]) -> list[int]:

@@ -1,11 +1,13 @@
 """Arrangement of the cameras of a rig: the point that all of them see, and its distance."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tracker.geometry import rigid
 from tracker.geometry.arrays import TINY, Array
+from tracker.geometry.cameras import Camera
 
 MIN_APART_M = 0.02
 """Least distance of two cameras, metres: no stereo camera for people is narrower."""
@@ -30,6 +32,13 @@ class AxesPoint:
     def is_determined(self) -> bool:
         """Whether the axes differ enough to fix the point."""
         return self.spread_rad >= MIN_SPREAD_RAD
+
+
+def scaled_cameras(cameras: Sequence[Camera], factor: float) -> tuple[Camera, ...]:
+    """Return cameras in a world that is larger by a factor."""
+    return tuple(
+        replace(c, T_world_camera=rigid.transform(c.T_world_camera[:3, :3], factor * c.center_world)) for c in cameras
+    )
 
 
 def axes_point(Ts_world_camera: Sequence[Array] | Array) -> AxesPoint:

@@ -8,7 +8,7 @@ import numpy as np
 from tracker.calibration.check.diagnosis import Diagnosis, diagnose, glance
 from tracker.calibration.check.fault_search import prior_sigmas
 from tracker.calibration.check.findings import CameraFinding, findings, sentence
-from tracker.calibration.check.point_adjustment import NEWS
+from tracker.calibration.check.lens_priors import NEWS
 from tracker.calibration.check.residual_pieces import ResidualPieces, residual_pieces
 from tracker.calibration.check.single_frames import FrameScore, find_change, score_frame
 from tracker.calibration.check.viewed_frames import ViewedFrame
@@ -167,13 +167,12 @@ def held_out_scores(
     others = [k for k in recording.credible_frames() if k not in check.frames and k >= since]
     if not others:
         return []
-    sigmas, state = prior_sigmas(recording.fps), check.diagnosis.state
-    nothing, out = np.zeros_like(check.corrections), []
+    state, nothing, out = check.diagnosis.state, np.zeros_like(check.corrections), []
     chosen = recording.diverse(others, n)
     for i, seen in enumerate(recording.seen(chosen, part_of(report, 0.0, 0.5))):
         report("comparing on other frames", 0.5 + 0.5 * i / len(chosen))
         parameters = [SizeParameters(b.model) for b in seen.bodies]
-        before, after = (score_frame(seen, parameters, state.sizes, c, sigmas) for c in (nothing, check.corrections))
+        before, after = (score_frame(seen, parameters, state.sizes, c) for c in (nothing, check.corrections))
         out.append((before, after))
     return out
 
@@ -235,9 +234,7 @@ class _Changes:
                 if k not in scores:
                     parameters = [SizeParameters(b.model) for b in seen.bodies]
                     state = self._check.diagnosis.state
-                    before, after = (
-                        score_frame(seen, parameters, state.sizes, c, self._sigmas) for c in (without, corrections)
-                    )
+                    before, after = (score_frame(seen, parameters, state.sizes, c) for c in (without, corrections))
                     scores[k] = before, after
             ordered = [scores[k] for k in sorted(scores)]
             change = find_change(ordered, index, columns, corrections[index], self._sigmas)

@@ -8,9 +8,9 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.viewed_frames import ViewedFrame, spread_poses
+from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.compute.progress import Report, unreported
-from tracker.compute.sampling import spread_indices
+from tracker.compute.sampling import farthest_first, spread_indices
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import learn_static_edges
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M
@@ -92,7 +92,7 @@ class PosedRecording:
     def diverse(self, frames: Sequence[int], n: int) -> list[int]:
         """Choose frames with poses as different as possible, in order; none of a pose that was chosen before."""
         joints = np.array([np.concatenate([own[k].points_world for own in self.poses]) for k in frames])
-        return [frames[i] for i in spread_poses(joints, n, SAME_POSE_M, MIN_FRAMES)]
+        return [frames[i] for i in sorted(farthest_first(joints, n, SAME_POSE_M, MIN_FRAMES))]
 
     def seen(self, frames: Sequence[int], report: Report = unreported) -> list[ViewedFrame]:
         """Read what the views show on frames."""

@@ -182,20 +182,18 @@ def _record(arguments: CalibrateArguments, found: "FilmedCalibration") -> dict[s
     """Return the result as plain data; docs/calibration.md lists its keys."""
     import numpy as np
 
+    from app.cli.calibration.person_report import shared_record
+
     board, rig = found.found, found.found.rig
     cameras = [
         {
-            "name": c.name,
-            "size": list(c.size),
-            "focal_px": [float(c.K[0, 0]), float(c.K[1, 1])],
-            "focal_sigma_percent": 100 * float(board.focal_sigmas[i]),
-            "depth_ratio": board.lenses[i].depth_ratio,
+            "depth_ratio": lens.depth_ratio,
             "views": np.unique(found.views.seen.frames[found.views.seen.cameras == i]).size,
             "noise_px": float(rig.fit.sigmas_px[i]),
-            "held_out_px": board.held_out_rms_px(i),
         }
-        for i, c in enumerate(found.cameras)
+        for i, lens in enumerate(board.lenses)
     ]
+    shared = shared_record(cameras, rig.fit, board.held_out, rig.volume, rig.points_world)
     return {
         "out": str(arguments.out),
         "layout": arguments.layout,
@@ -204,14 +202,9 @@ def _record(arguments: CalibrateArguments, found: "FilmedCalibration") -> dict[s
         "views_from_behind": found.views.n_from_behind,
         "corners": len(found.views.seen.px),
         "adjusted_frames": len(rig.frames),
-        "cameras": cameras,
-        "held_out_frames": board.held_out.tolist(),
-        "held_out_px": board.held_out_rms_px(),
-        "held_out_median_px": float(np.median(board.held_out_px)) if len(board.held_out_px) else None,
-        "volume_m": np.ptp(rig.points_world, axis=0).tolist(),
-        "expected_error_mm": 1000 * rig.volume.expected_m,
-        "interval_mm": [1000 * rig.volume.low_m, 1000 * rig.volume.high_m],
+        "held_out_frames": board.held_out.frames.tolist(),
         "notes": list(board.notes),
+        **shared,
     }
 
 

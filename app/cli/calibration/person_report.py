@@ -1,10 +1,14 @@
-"""The report of `quadrille calibrate --people`."""
+"""The report of `quadrille calibrate --people`, and what that of `--board` shares with it."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from tracker.calibration.boards.expected_error import VolumeError
+    from tracker.calibration.check.held_out import HeldOut
+    from tracker.calibration.check.reprojection import RigFit
     from tracker.calibration.self_calibration.person_calibration import PersonCalibration
 
 
@@ -12,18 +16,8 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
     """Return the result as plain data; docs/calibration.md lists its keys."""
     adjusted = found.adjusted
     joints = found.world.joints_world[np.isfinite(found.world.joints_world).all(axis=-1)]
-    cameras = [
-        {
-            "name": c.name,
-            "size": list(c.size),
-            "focal_px": [float(c.K[0, 0]), float(c.K[1, 1])],
-            "focal_sigma_percent": 100 * float(adjusted.focal_sigmas[i]),
-            "joints": int(found.seen.is_seen[:, i].sum()),
-            "held_out_px": found.held_out_rms_px(i),
-        }
-        for i, c in enumerate(found.cameras)
-    ]
     people, seen = found.identified, found.seen
+    cameras = [{"joints": int(n)} for n in seen.is_seen.sum(axis=(0, 2))]
     by_person = seen.is_seen.reshape(*seen.is_seen.shape[:2], seen.n_people, -1)
     shared = (by_person.any(axis=3).sum(axis=1) > 1).sum(axis=0)
     return {
@@ -33,16 +27,43 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
         "frames": len(seen.px),
         "joints": len(joints),
         "points": found.points,
-        "cameras": cameras,
         "noise_px": adjusted.sigma_px,
-        "held_out_frames": len(found.held_out),
-        "held_out_px": found.held_out_rms_px(),
-        "held_out_median_px": float(np.median(found.held_out_px)) if len(found.held_out_px) else None,
-        "volume_m": np.ptp(joints, axis=0).tolist(),
-        "expected_error_mm": 1000 * found.volume.expected_m,
-        "interval_mm": [1000 * found.volume.low_m, 1000 * found.volume.high_m],
+        "held_out_frames": len(found.held_out.frames),
         "scale_sigma_percent": 100 * found.scale_sigma,
         "notes": list(found.notes),
+        **shared_record(cameras, adjusted.fit, found.held_out, found.volume, joints),
+    }
+
+
+def shared_record(
+    rows: Sequence[dict[str, Any]], fit: "RigFit", held_out: "HeldOut", volume: "VolumeError", points_world: np.ndarray
+) -> dict[str, Any]:  # fmt: skip
+    """Return what boards and people tell alike of cameras, each with a row of its own.
+
+    Args:
+        rows: further entries of each camera.
+        fit: of all cameras.
+        held_out: errors on frames held out.
+        volume: error in the volume.
+        points_world: points in it, (P, 3), metres.
+    """
+    return {
+        "cameras": [
+            {
+                "name": c.name,
+                "size": list(c.size),
+                "focal_px": [float(c.K[0, 0]), float(c.K[1, 1])],
+                "focal_sigma_percent": 100 * float(sigma),
+                **row,
+                "held_out_px": held_out.rms_px(i),
+            }
+            for i, (c, row, sigma) in enumerate(zip(fit.rig.cameras, rows, fit.focal_sigmas, strict=True))
+        ],
+        "held_out_px": held_out.rms_px(),
+        "held_out_median_px": float(np.median(held_out.px)) if len(held_out.px) else None,
+        "volume_m": np.ptp(points_world, axis=0).tolist(),
+        "expected_error_mm": 1000 * volume.expected_m,
+        "interval_mm": [1000 * volume.low_m, 1000 * volume.high_m],
     }
 
 

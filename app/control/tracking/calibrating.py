@@ -13,7 +13,6 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.calibration import CalibrationState, CorrectedFrame
 from app.state.state import State
 from tracker.body.model import PosedBody
-from tracker.calibration.check.fault_search import prior_sigmas
 from tracker.calibration.check.single_frames import score_frame
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.size_parameters import SizeParameters
@@ -185,11 +184,8 @@ class Calibrating:
             return
         (seen,), shown = recording.seen([state.frame]), self._session_state.frames.observer
         parameters = [SizeParameters(b.model) for b in seen.bodies]
-        sizes, sigmas = check.diagnosis.state.sizes, prior_sigmas(session.fps)
-        corrections = check.corrections_on(state.frame)
-        before, after = (
-            score_frame(seen, parameters, sizes, c, sigmas) for c in (np.zeros_like(corrections), corrections)
-        )
+        sizes, corrections = check.diagnosis.state.sizes, check.corrections_on(state.frame)
+        before, after = (score_frame(seen, parameters, sizes, c) for c in (np.zeros_like(corrections), corrections))
         models = [p.body(s) for p, s in zip(parameters, sizes, strict=True)]
         bodies = tuple(
             tuple(

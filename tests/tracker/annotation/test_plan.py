@@ -1,11 +1,10 @@
 """Tasks with their states, comments, and the choice of frames."""
 
-import numpy as np
 import pytest
 from annotated_copies import new_store, pose
 
 from tracker.annotation.comments import add_comment, read_comments, resolve_comment
-from tracker.annotation.frame_choice import dealt, diverse_frames, doubted_frames, spread_choice
+from tracker.annotation.frame_choice import dealt, diverse_frames, doubted_frames
 from tracker.annotation.plan import add_tasks, count_states, decide, read_tasks
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
@@ -167,13 +166,6 @@ def test_frames_are_dealt_out_in_turns_or_all_to_each():
     assert dealt([0, 5, 9], [], each=False) == [(0, ""), (5, ""), (9, "")]
     assert dealt([0, 5, 9], ["a", "b"], each=False) == [(0, "a"), (5, "b"), (9, "a")]
     assert dealt([0, 5], ["a", "b"], each=True) == [(0, "a"), (5, "a"), (0, "b"), (5, "b")]
-
-
-def test_points_are_chosen_far_from_one_another():
-    points = np.array([[0.0], [0.1], [9.0], [5.0], [5.1], [9.1]])
-    assert list(spread_choice(points, 3)) == [3, 0, 5]
-    assert list(spread_choice(np.zeros((4, 2)), 3)) == [0]
-    assert list(spread_choice(np.zeros((0, 2)), 3)) == []
 
 
 def test_diverse_poses_differ_in_posture_not_in_place():

@@ -11,6 +11,5 @@ __all__ = [
     "expected_error",
     "footage_calibration",
     "lens_fit",
-    "rig_fit",
     "view_choice",
 ]

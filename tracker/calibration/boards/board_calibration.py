@@ -9,14 +9,12 @@ from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_problem import SeenCorners
 from tracker.calibration.boards.camera_graph import link_cameras
 from tracker.calibration.boards.lens_fit import TOLD_FOCAL, LensFit, blank_camera, fit_lens
-from tracker.calibration.boards.rig_fit import HELD_OUT_EVERY, RigCalibration, adjust_rig, held_out_errors
+from tracker.calibration.boards.rig_fit import RigCalibration, adjust_rig, held_out_errors
 from tracker.calibration.boards.view_choice import MAX_LENS_VIEWS, choose_frames, choose_views, outlines, posed_views
-from tracker.calibration.check.reprojection import column_ends
+from tracker.calibration.check.held_out import HeldOut, held_out_of
 from tracker.calibration.check.solvable import check_apart, solvable
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import CalibrationError
-from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.camera_columns import FOCAL
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lengths import USUAL_SIZES
 
@@ -36,21 +34,12 @@ class BoardCalibration:
     rig: RigCalibration
     lenses: tuple[LensFit, ...]
     """Lens of each camera as fitted to its own views."""
-    held_out: IntArray
-    """Frames that were held out of a first adjustment, for `held_out_px`; the second one, of `rig`, uses all."""
+    held_out: HeldOut
+    """Corners on frames that were held out of a first adjustment."""
     first_cameras: tuple[Camera, ...]
     """Cameras of the first adjustment."""
     held_out_corners: SeenCorners
-    """Corners on them."""
-    held_out_px: Array
-    """Distance of each of these to its projection, (N,), px."""
-    focal_sigmas: Array
-    """Standard deviation of each focal length, as a share of it, (n_cameras,)."""
-
-    def held_out_rms_px(self, camera: int | None = None) -> float:
-        """Return the root mean square error on the frames held out, of one camera or all; NaN without corners."""
-        px = self.held_out_px if camera is None else self.held_out_px[self.held_out_corners.cameras == camera]
-        return float(np.sqrt(np.mean(px**2))) if len(px) else float("nan")
+    """Corners on the frames that were held out."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -70,7 +59,7 @@ class BoardCalibration:
             f"camera '{lens.camera.name}': the board does not tell its focal length better than to {100 * sigma:.1f}%: "
             f"the farthest corner was {lens.depth_ratio:.1f} times as far away as the nearest; film the board nearer, "
             "farther and tilted"
-            for lens, sigma in zip(self.lenses, self.focal_sigmas, strict=True)
+            for lens, sigma in zip(self.lenses, self.rig.fit.focal_sigmas, strict=True)
             if sigma > TOLD_FOCAL
         )
 
@@ -135,7 +124,7 @@ def _calibrated(
     start = [replace(lens.camera, T_world_camera=T) for lens, T in zip(lenses, Ts, strict=True)]
     sigmas = np.array([lens.sigma_px for lens in lenses])
     frames = choose_frames(views, len(blanks))
-    held_out = frames[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]
+    held_out = held_out_of(frames)
     if needed_frame is not None:
         frames = np.union1d(frames, [needed_frame])
     first = adjust_rig(board, seen.in_frames(np.setdiff1d(frames, held_out)), start, blanks, poses, sigmas)
@@ -144,8 +133,8 @@ def _calibrated(
     adjusting(1.0)
     corners, errors = held_out_errors(board, seen.in_frames(held_out), first.cameras, poses, rig.fit.sigmas_px)
     checking(1.0)
-    off = np.linalg.norm(errors, axis=1)
-    return BoardCalibration(rig, tuple(lenses), held_out, first.cameras, corners, off, _focal_sigmas(rig))
+    errors_on_them = HeldOut(held_out, corners.cameras, np.linalg.norm(errors, axis=1))
+    return BoardCalibration(rig, tuple(lenses), errors_on_them, first.cameras, corners)
 
 
 def _check_determined(found: BoardCalibration, board: Board) -> None:
@@ -165,15 +154,10 @@ def _check_determined(found: BoardCalibration, board: Board) -> None:
             f"one plane, of a board {100 * extent_m:.0f} cm across: it stood still or was moved in its plane, which "
             "tells neither focal lengths nor distances; film it nearer, farther and tilted"
         )
-    worst = int(np.argmax(found.focal_sigmas))
-    if (sigma := float(found.focal_sigmas[worst])) > 10 * TOLD_FOCAL:
+    worst = int(np.argmax(found.rig.fit.focal_sigmas))
+    if (sigma := float(found.rig.fit.focal_sigmas[worst])) > 10 * TOLD_FOCAL:
         raise CalibrationError(
             f"expected views that tell the focal length of camera '{found.rig.cameras[worst].name}' to "
             f"{1000 * TOLD_FOCAL:.0f}% at least, found a standard deviation of {100 * sigma:.0f}%: what it sees fits "
             "a nearer board and a shorter lens as well; film the board nearer, farther and tilted in front of it"
         )
-
-
-def _focal_sigmas(rig: RigCalibration) -> Array:
-    at = np.array(column_ends(rig.cameras)[:-1]) + FOCAL
-    return np.asarray(np.sqrt(np.diag(rig.fit.covariance)[at]))

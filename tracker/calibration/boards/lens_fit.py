@@ -14,7 +14,6 @@ from tracker.calibration.check.reprojection import Prior, Rig, RigFit, fit_rig
 from tracker.compute.sampling import spread_indices
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.geometry.arrays import TINY, IntArray
-from tracker.geometry.camera_columns import FOCAL
 from tracker.geometry.cameras import Camera
 
 _FOCAL_STARTS = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
@@ -109,6 +108,5 @@ def _first_lenses(blank: Camera) -> Iterator[Camera]:
 
 def _lens_fit(problem: BoardProblem, fit: RigFit, n_views: int) -> LensFit:
     depths = problem.locate(fit.rig.own).points_world[:, 2]
-    focal_sigma = float(np.sqrt(fit.covariance[FOCAL, FOCAL]))
     ratio = float(depths.max() / max(TINY, depths.min()))
-    return LensFit(fit.rig.cameras[0], float(fit.sigmas_px[0]), focal_sigma, ratio, n_views)
+    return LensFit(fit.rig.cameras[0], float(fit.sigmas_px[0]), float(fit.focal_sigmas[0]), ratio, n_views)

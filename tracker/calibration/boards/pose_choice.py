@@ -8,7 +8,6 @@ import numpy as np
 from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_problem import BoardProblem, SeenCorners
 from tracker.calibration.boards.view_choice import posed_views
-from tracker.calibration.check.lens_priors import UNKNOWN_LENS, prior_sigmas
 from tracker.calibration.check.reprojection import Prior, Rig
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.geometry import rigid
@@ -68,8 +67,7 @@ def best_poses(problem: BoardProblem, cameras: Sequence[Camera], poses: Poses, n
         poses: of the board in front of them.
         now: present poses, (F, 4, 4), which compete.
     """
-    held = tuple(np.zeros_like(prior_sigmas(c, UNKNOWN_LENS)) for c in cameras)
-    still = problem.with_prior(Prior(tuple(cameras), held))
+    still = problem.with_prior(Prior.held(cameras))
     candidates = [
         [c.T_world_camera @ T for i, c in enumerate(cameras) for T in poses.get((i, int(k)), ())]
         for k in problem.frames

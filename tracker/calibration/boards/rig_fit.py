@@ -11,17 +11,11 @@ from tracker.calibration.boards.board_problem import BoardProblem, SeenCorners
 from tracker.calibration.boards.expected_error import MAX_POINTS, VolumeError, expected_error
 from tracker.calibration.boards.pose_choice import Poses, best_poses, posed_frames
 from tracker.calibration.check.lens_priors import UNKNOWN_LENS, prior_sigmas
-from tracker.calibration.check.reprojection import FINAL, Prior, Rig, RigFit, fit_rig
+from tracker.calibration.check.reprojection import Prior, Rig, RigFit, fit_rig, plain_errors_px
 from tracker.compute.sampling import spread_indices
-from tracker.estimation.fitting.bundle import solve_bundle
-from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.camera_rig import scaled_cameras
 from tracker.geometry.cameras import Camera
-
-HELD_OUT_EVERY = 5
-"""One frame in so many is held out: a fifth, as in fivefold cross-validation."""
-PLAIN_PX = 1000.0
-"""Noise beside which no error is gross, px: the width of a picture. Errors of 10 px then keep their weight to 1e-5."""
 
 
 class RigCalibration(NamedTuple):
@@ -39,10 +33,7 @@ class RigCalibration(NamedTuple):
         """Return the cameras of a world that is larger by a factor; their covariance is that of before."""
         own = self.fit.rig.own.copy()
         own[:, :3, 3] *= scale
-        cameras = tuple(
-            replace(c, T_world_camera=rigid.transform(c.T_world_camera[:3, :3], scale * c.center_world))
-            for c in self.cameras
-        )
+        cameras = scaled_cameras(self.cameras, scale)
         volume = VolumeError(*(scale * error for error in self.volume))
         fit = self.fit._replace(rig=Rig(cameras, own))
         return RigCalibration(cameras, fit, self.frames, volume, scale * self.points_world)
@@ -98,9 +89,5 @@ def held_out_errors(
     seen = seen.in_frames(frames)
     if not len(frames):
         return seen, np.empty((0, 2))
-    held = tuple(np.zeros_like(prior_sigmas(c, UNKNOWN_LENS)) for c in cameras)
-    problem = BoardProblem(board, seen, frames, Prior(tuple(cameras), held), sigmas_px)
-    # Plain squares, as others report them: with so large a noise no error is gross.
-    plain = problem.with_sigmas(np.full(len(cameras), PLAIN_PX))
-    rig = Rig(tuple(cameras), best_poses(problem, cameras, poses))
-    return seen, plain.errors_px(solve_bundle(plain, rig, tolerance=FINAL).state)
+    problem = BoardProblem(board, seen, frames, Prior.held(cameras), sigmas_px)
+    return seen, plain_errors_px(problem, Rig(tuple(cameras), best_poses(problem, cameras, poses)))

@@ -7,6 +7,7 @@ import numpy as np
 
 from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_problem import SeenCorners
+from tracker.compute.sampling import farthest_first
 from tracker.geometry.arrays import Array, IntArray
 
 MIN_CORNERS = 6
@@ -48,10 +49,7 @@ def outlines(
 
 def choose_views(outlines_of_one: dict[int, Array], most: int) -> IntArray:
     """Return frames of one camera, each as different as can be from those before; ascending."""
-    frames = np.array(sorted(outlines_of_one), dtype=np.int64)
-    if not len(frames):
-        return frames
-    return np.sort(frames[_farthest_first(np.stack([outlines_of_one[int(k)] for k in frames]), most)])
+    return np.array(sorted(_order(outlines_of_one, most)), dtype=np.int64)
 
 
 def choose_frames(outlines_of_all: dict[tuple[int, int], Array], n_cameras: int, most: int = MAX_FRAMES) -> IntArray:
@@ -78,15 +76,4 @@ def _order(features: dict[int, Array], most: int) -> list[int]:
     frames = sorted(features)
     if not frames:
         return []
-    return [frames[i] for i in _farthest_first(np.stack([features[k] for k in frames]), most)]
-
-
-def _farthest_first(features: Array, most: int) -> list[int]:
-    """Return indices of rows, (n, m): the one nearest to the mean, then always the farthest from those chosen."""
-    first = int(np.argmin(np.linalg.norm(features - features.mean(axis=0), axis=1)))
-    order, apart = [first], np.linalg.norm(features - features[first], axis=1)
-    while len(order) < min(most, len(features)):
-        order.append(int(np.argmax(apart)))
-        apart = np.minimum(apart, np.linalg.norm(features - features[order[-1]], axis=1))
-        apart[order] = -1.0
-    return order
+    return [frames[i] for i in farthest_first(np.stack([features[k] for k in frames]), most)]

@@ -78,7 +78,7 @@ def diagnose(
         # As few cameras as possible; of as many, those that explain more.
         best = min(best, other, key=lambda s: (len(s.cameras), search.total(start.problem, s)))
     report("done", 1.0)
-    return _diagnosis(search.settled(best))
+    return diagnosis_of(search.settled(best))
 
 
 def glance(frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], fps: float) -> Diagnosis:
@@ -91,22 +91,12 @@ def glance(frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], 
     fit = search.fitted(as_tracked(frames, parameters), ())
     found = search.best(fit, (), ())
     if found is None:
-        return _diagnosis(Selection((), fit))
-    return _diagnosis(Selection(found[:1], found[1]))
+        return diagnosis_of(Selection((), fit))
+    return diagnosis_of(Selection(found[:1], found[1]))
 
 
-def fit_fault(
-    frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], fps: float, fault: Fault
-) -> Diagnosis:
-    """Fit one fault that is known to be there, however little it is worth; the arguments are those of `diagnose`."""
-    search = FaultSearch(frames, parameters, prior_sigmas(fps))
-    before = search.fitted(search.begun().state, ())
-    first = search.refitted(before, (fault,))
-    found = FoundFault(fault, before.cost - first.cost, {})
-    return _diagnosis(search.settled(Selection((found,), first)))
-
-
-def _diagnosis(selection: "Selection") -> Diagnosis:
+def diagnosis_of(selection: Selection) -> Diagnosis:
+    """Return the judgement of a search that kept some faults."""
     fit, kept = selection.fit, selection.kept
     steps = further_steps(fit, [k.fault for k in kept])
     return Diagnosis(fit.state.corrections, covariance_of(fit), kept, steps, fit.state)

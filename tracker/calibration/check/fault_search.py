@@ -194,7 +194,7 @@ class FaultSearch:
         state = selection.fit.state
         problem = self._problem(state, [k.fault for k in selection.kept])
         found = settle_bundle(problem, state, EFFORT.steps, LEAST_GAIN)
-        return selection._replace(fit=_fitted(problem, found))
+        return selection._replace(fit=fitted_rig(problem, found))
 
     def refitted(self, fit: FittedRig, chosen: Collection[Fault], steps: int = EFFORT.steps) -> FittedRig:
         """Fit poses, sizes and chosen corrections on the same evidence further, in some Gauss-Newton steps at most."""
@@ -205,7 +205,7 @@ class FaultSearch:
         known: ArrowEquations | None = None,
     ) -> FittedRig:  # fmt: skip
         problem = problem.with_free(_columns(chosen))
-        return _fitted(problem, solve_bundle(problem, state, steps, least_gain=LEAST_GAIN, known=known))
+        return fitted_rig(problem, solve_bundle(problem, state, steps, least_gain=LEAST_GAIN, known=known))
 
     def best(
         self, fit: FittedRig, chosen: Collection[Fault], without: Collection[int]
@@ -266,7 +266,8 @@ def _columns(faults: Collection[Fault]) -> NDArray[np.int64]:
     return np.concatenate([np.zeros(0, np.int64), *(h.columns for h in faults)])
 
 
-def _fitted(problem: ContourBundle, found: BundleFit[RigState]) -> FittedRig:
+def fitted_rig(problem: ContourBundle, found: BundleFit[RigState]) -> FittedRig:
+    """Return a rig that was fitted, with the poses eliminated."""
     shared, own = problem.free(found.state, found.equations)
     n = found.state.corrections.size
     every = np.concatenate([np.ones(n, np.bool_), shared[n:]])

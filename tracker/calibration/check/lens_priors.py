@@ -33,6 +33,10 @@ horizontal fields of view from 35 to 80 degrees. Sensors have square pixels to s
 CALIBRATED = CameraPrior(np.radians(1.0), 0.05, 0.01, 0.001, 0.005, 0.02, 0.001)
 """A camera that was calibrated once and may have been moved since: by a degree, 5 cm and 1% of its focal length."""
 
+NEWS = 0.5
+"""Largest standard deviation, as a share of that before, at which observations determine a number. At a half they have
+added three times as much as was known."""
+
 
 def prior_sigmas(camera: Camera, prior: CameraPrior, pose: bool = True, lens: bool = True) -> Array:
     """Return the standard deviations of the corrections of a camera, (n_columns,).

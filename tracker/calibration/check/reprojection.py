@@ -7,7 +7,7 @@ the pose of a board. Squared errors s, in standard deviations of a picture, coun
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple, Self
@@ -15,9 +15,17 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.calibration.check.lens_priors import CALIBRATED
 from tracker.estimation.fitting.bundle import ArrowEquations, solve_bundle
-from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.camera_columns import camera_difference, moved_camera, n_columns, project_with_columns
+from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.camera_columns import (
+    FOCAL,
+    ProjectedColumns,
+    camera_difference,
+    moved_camera,
+    n_columns,
+    project_with_columns,
+)
 from tracker.geometry.cameras import Camera
 
 OUTLIER_SIGMAS = 4.0
@@ -29,7 +37,7 @@ _ROUNDS = 12
 """Most fits with noise measured again in between. It settles to 1% within three to six."""
 _SETTLED = 0.01
 """Largest relative change of the noise at which it has settled: 1% of all intervals."""
-_STEPS, _ROUGH, FINAL = 2, 1e-2, 1e-6
+_STEPS, _ROUGH, _FINAL = 2, 1e-2, 1e-6
 """Most steps before the noise is measured again, and relative decreases of the cost at which a fit ends: before the
 noise has settled, and after."""
 _LARGE, _FALL = 0.95, 4.0
@@ -39,6 +47,8 @@ _NOT_SHOWN_PX = 1e4
 _FLOOR = 1e-8
 """Added to second derivatives by own unknowns, 1 / rad^2 or 1 / m^2: groups whose observations are all gross errors
 stay where they are."""
+_PLAIN_PX = 1000.0
+"""Noise beside which no error is gross, px: the width of a picture. Errors of 10 px then keep their weight to 1e-5."""
 _MIN_SIGMA_PX = 0.01
 """Least standard deviation of a corner or a key point, px: none is found more precisely."""
 
@@ -61,6 +71,11 @@ class Observations:
     def of_camera(self, camera: int) -> slice:
         """Return where the observations of a camera stand."""
         return slice(*np.searchsorted(self.cameras, [camera, camera + 1]))
+
+    def of_groups(self, chosen: Mask) -> "Observations":
+        """Return the observations of chosen groups, (G,), with numbers from 0 on without gaps."""
+        at, numbers = chosen[self.groups], np.cumsum(chosen) - 1
+        return Observations(self.cameras[at], numbers[self.groups[at]], self.px[at])
 
 
 class Rig(NamedTuple):
@@ -88,6 +103,13 @@ class Prior:
     """The means."""
     sigmas: tuple[Array, ...]
     """Standard deviations of the corrections of each camera, (n_columns,): 0 holds one, infinity leaves it free."""
+    alike: tuple[tuple[int, ...], ...] = ()
+    """Cameras with lenses of one model and free focal lengths, which differ by a percent."""
+
+    @classmethod
+    def held(cls, cameras: Sequence[Camera]) -> "Prior":
+        """Return the knowledge of cameras that stay."""
+        return cls(tuple(cameras), tuple(np.zeros(n_columns(c)) for c in cameras))
 
 
 class RigFit(NamedTuple):
@@ -104,6 +126,27 @@ class RigFit(NamedTuple):
     """Robust weight of each observation, 0 to 1, (N,)."""
     common_share: float
     """By how much errors of one view agree, at least 1; see `ReprojectionProblem.common_share`."""
+
+    @property
+    def focal_sigmas(self) -> Array:
+        """Standard deviation of each focal length, as a share of it, (n_cameras,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)[np.array(column_ends(self.rig.cameras)[:-1]) + FOCAL]))
+
+
+class _CameraRows(NamedTuple):
+    """Errors of one camera in standard deviations, weighted, and their derivatives."""
+
+    index: int
+    groups: IntArray
+    """Of the observations, (N,)."""
+    by_camera: Array
+    """(N, 2, n)."""
+    by_own: Array
+    """By the own unknowns, (N, 2, m)."""
+    errors: Array
+    """(N, 2, 1)."""
+    cost: float
+    """Half the sum of robust squares."""
 
 
 class ReprojectionProblem(ABC):
@@ -131,6 +174,11 @@ class ReprojectionProblem(ABC):
         self.columns = [np.flatnonzero(sigmas > 0) for sigmas in prior.sigmas]
         self.ends = np.cumsum([0, *(len(columns) for columns in self.columns)])
         self.precision = np.concatenate([s[c] ** -2.0 for s, c in zip(prior.sigmas, self.columns, strict=True)])
+        self.alikeness = np.zeros((len(self.precision), len(self.precision)))
+        """Precision of the focal lengths of lenses of one model, which counts like that of observations, (n, n)."""
+        for cameras in prior.alike:
+            at = [self.ends[i] + int(np.searchsorted(self.columns[i], FOCAL)) for i in cameras]
+            self.alikeness[np.ix_(at, at)] = CALIBRATED.focal**-2 * (np.eye(len(at)) - 1 / len(at))
 
     # --- for subclasses -----------------------------------------------------------------------------------------
 
@@ -146,53 +194,54 @@ class ReprojectionProblem(ABC):
 
     def linearize(self, rig: Rig, below: float = np.inf) -> ArrowEquations:
         """See `BundleProblem`."""
-        out, cost = ArrowEquations.zeros(int(self.ends[-1]), self.n_groups, self.n_own), 0.0
-        located = self.locate(rig.own)
-        for i, camera in enumerate(rig.cameras):
-            at = self.observations.of_camera(i)
-            by_own = None if located.by_own is None else located.by_own[at]
-            cost += self._add_camera(out, i, camera, Located(located.points_world[at], by_own))
-        diagonal = np.arange(self.n_own)
-        out.own_hessians[:, diagonal, diagonal] += _FLOOR
+        out = self.observed(rig)
         moves = zip(self.prior.cameras, rig.cameras, self.columns, strict=True)
         offsets = np.concatenate([camera_difference(before, now)[columns] for before, now, columns in moves])
-        out.gradient[:] += self.precision * offsets
-        out.hessian[:] += np.diag(self.precision)
-        return out._replace(cost=cost + 0.5 * float(self.precision @ offsets**2))
+        precision = np.diag(self.precision) + self.alikeness
+        out.gradient[:] += precision @ offsets
+        out.hessian[:] += precision
+        return out._replace(cost=out.cost + 0.5 * float(offsets @ precision @ offsets))
 
-    def _add_camera(self, out: ArrowEquations, index: int, camera: Camera, located: Located) -> float:
-        """Add the equations of one camera; return its cost."""
-        J, own, r, cost = self._scaled_rows(index, camera, located)
-        part, flat = slice(self.ends[index], self.ends[index + 1]), J.reshape(2 * len(J), J.shape[2])
-        out.gradient[part] += flat.T @ r.ravel()
-        out.hessian[part, part] += flat.T @ flat
-        groups, transposed = self.observations.groups[self.observations.of_camera(index)], own.swapaxes(1, 2)
-        _add(out.own_gradients, groups, (transposed @ r)[..., 0])
-        _add(out.own_hessians, groups, transposed @ own)
-        _add(out.cross[:, :, part], groups, transposed @ J)
-        return cost
+    def observed(self, rig: Rig) -> ArrowEquations:
+        """Return the normal equations of the observations, without the prior."""
+        out, cost = ArrowEquations.zeros(int(self.ends[-1]), self.n_groups, self.n_own), 0.0
+        for of in self._scaled_rows(rig):
+            part = slice(self.ends[of.index], self.ends[of.index + 1])
+            flat = of.by_camera.reshape(2 * len(of.groups), part.stop - part.start)
+            out.gradient[part] += flat.T @ of.errors.ravel()
+            out.hessian[part, part] += flat.T @ flat
+            transposed = of.by_own.swapaxes(1, 2)
+            _add(out.own_gradients, of.groups, (transposed @ of.errors)[..., 0])
+            _add(out.own_hessians, of.groups, transposed @ of.by_own)
+            _add(out.cross[:, :, part], of.groups, transposed @ of.by_camera)
+            cost += of.cost
+        diagonal = np.arange(self.n_own)
+        out.own_hessians[:, diagonal, diagonal] += _FLOOR
+        return out._replace(cost=cost)
 
-    def _scaled_rows(self, index: int, camera: Camera, located: Located) -> tuple[Array, Array, Array, float]:
-        """Return rows in standard deviations, weighted, and the cost of a camera.
+    def _scaled_rows(self, rig: Rig) -> Iterator[_CameraRows]:
+        """Yield the rows of each camera. Points that it does not show have rows of 0 and the largest robust square."""
+        located = self.locate(rig.own)
+        for index, camera in enumerate(rig.cameras):
+            at, sigma = self.observations.of_camera(index), self.sigmas_px[index]
+            found = project_with_columns(camera, located.points_world[at])
+            errors = found.px - self.observations.px[at]
+            s = np.sum(errors**2, axis=1) / sigma**2
+            shown = np.isfinite(s)
+            scale = (np.sqrt(np.where(shown, robust_weights(s), 0.0)) / sigma)[:, None, None]
+            J, own = self.by_unknowns(found, at, index), found.by_point
+            if not shown.all():
+                J, own, errors = (np.where(np.isfinite(rows), rows, 0.0) for rows in (J, own, errors))
+            if located.by_own is not None:
+                own = own @ located.by_own[at]
+            cost = 0.5 * float(robust_squares(np.where(shown, s, np.inf)).sum())
+            yield _CameraRows(
+                index, self.observations.groups[at], J * scale, own * scale, errors[:, :, None] * scale, cost
+            )
 
-        Returns:
-            Derivatives by the camera, (N, 2, n), and by the own unknowns, (N, 2, m); errors, (N, 2, 1); half the sum of
-            robust squares. Points that the camera does not show have rows of 0 and the largest robust square.
-        """
-        sigma = self.sigmas_px[index]
-        found = project_with_columns(camera, located.points_world)
-        errors = found.px - self.observations.px[self.observations.of_camera(index)]
-        s = np.sum(errors**2, axis=1) / sigma**2
-        shown = np.isfinite(s)
-        scale = np.sqrt(np.where(shown, _weights(s), 0.0)) / sigma
-        J, own = found.by_camera[:, :, self.columns[index]], found.by_point
-        if not shown.all():
-            J, own, errors = (np.where(np.isfinite(rows), rows, 0.0) for rows in (J, own, errors))
-        if located.by_own is not None:
-            own = own @ located.by_own
-        cost = 0.5 * float(np.where(shown, s / (1 + s / OUTLIER_SIGMAS**2), OUTLIER_SIGMAS**2).sum())
-        scale = scale[:, None, None]
-        return J * scale, own * scale, errors[:, :, None] * scale, cost
+    def by_unknowns(self, found: ProjectedColumns, at: slice, camera: int) -> Array:
+        """Return the derivatives of some projections by the unknowns of their camera, (N, 2, n)."""
+        return found.by_camera[:, :, self.columns[camera]]
 
     def moved(self, rig: Rig, shared: Array, own: Array) -> Rig:
         """See `BundleProblem`."""
@@ -215,21 +264,18 @@ class ReprojectionProblem(ABC):
         A board that moves while cameras film it at slightly different times shifts all its corners together. A view
         with such errors holds less information than its number of corners promises; it is a camera's part of a group.
         """
-        equations, located = self.linearize(rig), self.locate(rig.own)
-        if located.by_own is None:
+        if self.locate(rig.own).by_own is None:
             return 1.0
-        inverse = np.linalg.pinv(equations.own_hessians, hermitian=True)
+        inverse = np.linalg.pinv(self.observed(rig).own_hessians, hermitian=True)
         squares, expected, lone = 0.0, 0.0, 0.0
-        for i, camera in enumerate(rig.cameras):
-            at = self.observations.of_camera(i)
-            groups = self.observations.groups[at]
-            _, own, r, _ = self._scaled_rows(i, camera, Located(located.points_world[at], located.by_own[at]))
+        for of in self._scaled_rows(rig):
             sums, own_sums = np.zeros((self.n_groups, 2)), np.zeros((self.n_groups, 2, self.n_own))
-            _add(sums, groups, r[..., 0])
-            _add(own_sums, groups, own)
-            counts = np.maximum(np.bincount(groups, minlength=self.n_groups), 1)
-            weights = np.bincount(groups, np.sum(own**2, axis=(1, 2)) > 0, self.n_groups)
-            squares, lone = squares + float(np.sum(sums**2 / counts[:, None])), lone + float(np.sum(r**2))
+            _add(sums, of.groups, of.errors[..., 0])
+            _add(own_sums, of.groups, of.by_own)
+            counts = np.maximum(np.bincount(of.groups, minlength=self.n_groups), 1)
+            weights = np.bincount(of.groups, np.sum(of.by_own**2, axis=(1, 2)) > 0, self.n_groups)
+            squares += float(np.sum(sums**2 / counts[:, None]))
+            lone += float(np.sum(of.errors**2))
             leverages = np.einsum("gij,gjk,gik->g", own_sums, inverse, own_sums) / counts
             expected += float(np.sum(2 * weights / counts - leverages))
         variance = lone / (2 * len(self.observations.px) * self.left)
@@ -276,26 +322,20 @@ class ReprojectionProblem(ABC):
 
     def _left_in_cameras(self, rig: Rig) -> Array:
         """Return the same share of the errors in each camera, (n_cameras,), by the leverage of its observations."""
-        equations, located = self.linearize(rig), self.locate(rig.own)
-        inverse = np.linalg.pinv(equations.own_hessians, hermitian=True)
+        inverse = np.linalg.pinv(self.observed(rig).own_hessians, hermitian=True)
         out = np.ones(len(rig.cameras))
-        for i, camera in enumerate(rig.cameras):
-            at = self.observations.of_camera(i)
-            if at.start == at.stop:
-                continue
-            by_own = None if located.by_own is None else located.by_own[at]
-            own = self._scaled_rows(i, camera, Located(located.points_world[at], by_own))[1]
-            leverage = np.einsum("nij,njk,nik->", own, inverse[self.observations.groups[at]], own)
-            spent = leverage + len(self.columns[i])
-            n = 2 * (at.stop - at.start)
-            out[i] = max(1.0, n - spent) / n
+        for of in self._scaled_rows(rig):
+            if n := 2 * len(of.groups):
+                leverage = np.einsum("nij,njk,nik->", of.by_own, inverse[of.groups], of.by_own)
+                out[of.index] = max(1.0, n - leverage - len(self.columns[of.index])) / n
         return out
 
     def group_costs(self, rig: Rig) -> Array:
         """Return the robust cost of the observations of each group, (G,)."""
         s = self._squares_px2(rig) / self.sigmas_px[self.observations.cameras] ** 2
-        robust = s / (1 + s / OUTLIER_SIGMAS**2)
-        return np.asarray(0.5 * np.bincount(self.observations.groups, robust, self.n_groups), dtype=np.float64)
+        return np.asarray(
+            0.5 * np.bincount(self.observations.groups, robust_squares(s), self.n_groups), dtype=np.float64
+        )
 
     def with_sigmas(self, sigmas_px: Array) -> Self:
         """Return the problem with other standard deviations."""
@@ -332,19 +372,24 @@ def fit_rig(problem: ReprojectionProblem, rig: Rig) -> RigFit:
             if is_settled:
                 break
             rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
-    rig = solve_bundle(problem, rig, tolerance=FINAL).state
+    rig = solve_bundle(problem, rig, tolerance=_FINAL).state
     return _result(problem, rig)
 
 
+def plain_errors_px(problem: ReprojectionProblem, rig: Rig) -> Array:
+    """Fit own unknowns by plain squares, as others report them, to cameras that stay; return the errors, (N, 2), px."""
+    plain = problem.with_sigmas(np.full(len(rig.cameras), _PLAIN_PX)).with_prior(Prior.held(rig.cameras))
+    return plain.errors_px(solve_bundle(plain, rig, tolerance=_FINAL).state)
+
+
 def _result(problem: ReprojectionProblem, rig: Rig) -> RigFit:
-    equations, errors = problem.linearize(rig), problem.errors_px(rig)
+    errors = problem.errors_px(rig)
     squares = np.sum(errors**2, axis=1) / problem.sigmas_px[problem.observations.cameras] ** 2
     squares = np.nan_to_num(squares, nan=np.inf)
-    weights, prior = _weights(squares), np.diag(problem.precision)
-    data = equations._replace(hessian=equations.hessian - prior).reduced()[1]
-    share = problem.common_share(rig)
+    weights, share = robust_weights(squares), problem.common_share(rig)
     information = _information(squares, weights, problem.left) / share
-    precision = information * data + prior
+    data = problem.observed(rig).reduced()[1] + problem.alikeness
+    precision = information * data + np.diag(problem.precision)
     if not np.isfinite(precision).all():
         raise np.linalg.LinAlgError("numbers that are not finite")
     covariance = inverse(precision)
@@ -379,8 +424,14 @@ def _information(squares: Array, weights: Array, left: float) -> float:
     return float(np.mean(slopes) ** 2 / (variance * np.mean(weights)))
 
 
-def _weights(squares: Array) -> Array:
+def robust_weights(squares: Array) -> Array:
+    """Return the weights of errors by their squares in variances."""
     return np.asarray(1 / (1 + squares / OUTLIER_SIGMAS**2) ** 2)
+
+
+def robust_squares(squares: Array) -> Array:
+    """Return as how much squared errors in variances count; infinite ones as the square of `OUTLIER_SIGMAS`."""
+    return np.asarray(OUTLIER_SIGMAS**2 - OUTLIER_SIGMAS**4 / (OUTLIER_SIGMAS**2 + squares))
 
 
 def _add(target: Array, groups: IntArray, values: Array) -> None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.fault_search import EFFORT, LEAST_GAIN
+from tracker.calibration.check.fault_search import EFFORT, LEAST_GAIN, fitted_rig
 from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
 from tracker.estimation.acquisition.contour_bundle import ContourBundle, RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
@@ -30,7 +30,7 @@ class FrameScore(NamedTuple):
 
 
 def score_frame(
-    frame: ViewedFrame, parameters: Sequence[SizeParameters], sizes: Sequence[Array], corrections: Array, sigmas: Array
+    frame: ViewedFrame, parameters: Sequence[SizeParameters], sizes: Sequence[Array], corrections: Array
 ) -> FrameScore:
     """Fit the poses of a frame to all contours under given cameras and sizes.
 
@@ -39,20 +39,12 @@ def score_frame(
         parameters: of each person's body.
         sizes: of each person, (n_sizes,).
         corrections: of each camera, (V, N_CORRECTIONS).
-        sigmas: standard deviations of corrections in their prior, (N_CORRECTIONS,).
     """
     state = RigState(corrections, tuple(sizes), tuple(b.values for b in frame.bodies))
-    problem = ContourBundle(seen_people([frame]), parameters, corrections, sigmas, kinds=())
-    found = solve_bundle(problem, state, EFFORT.steps, least_gain=LEAST_GAIN)
-    n = corrections.size
-    cameras = np.arange(len(found.equations.gradient)) < n
-    gradient, hessian = found.equations.held(cameras, problem.free(found.state, found.equations)[1]).reduced()
-    prior = np.tile(1 / sigmas**2, len(corrections))
-    held = corrections.ravel()
-    cost = found.cost - 0.5 * float(np.sum(prior * held**2))
-    return FrameScore(
-        frame.frame, cost, gradient[:n] - prior * held, hessian[:n, :n] - np.diag(prior), found.state.poses
-    )
+    anything = np.full(N_CORRECTIONS, np.inf)  # no prior of the corrections
+    problem = ContourBundle(seen_people([frame]), parameters, corrections, anything, kinds=())
+    fit = fitted_rig(problem, solve_bundle(problem, state, EFFORT.steps, least_gain=LEAST_GAIN))
+    return FrameScore(frame.frame, fit.cost, fit.gradient, fit.hessian, fit.state.poses)
 
 
 class Change(NamedTuple):

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from tracker.body.model import PosedBody
 from tracker.body.motion.pose_path import PosePath
 from tracker.estimation.acquisition.contour_bundle import RigState, SeenPerson, later
@@ -64,31 +62,3 @@ def _accepted(view: ViewEvidence, bodies: Sequence[PosedBody], correction: Array
     pieces = contour.pieces_px[~contour.occluded]
     chosen = accept_segments(view.samples, pieces, ACCEPTED_SHARE * view.theta_px)
     return with_segments(view, chosen if view.is_static is None else chosen & ~view.is_static)
-
-
-def spread_poses(joints: Array, n: int, apart_m: float = 0.0, fewest: int = 1) -> list[int]:
-    """Choose frames with poses as different as possible, in order.
-
-    Each is the one farthest from those before (Gonzalez 1985). Two poses are as far apart as the joint that moves most.
-
-    Args:
-        joints: of each frame, (F, J, 3), metres.
-        n: number of frames to choose.
-        apart_m: least distance between two of them, metres. Frames of one pose show the same errors of a body's shape.
-        fewest: number of frames that are chosen at any distance.
-    """
-
-    def far_from(i: int) -> Array:
-        return np.asarray(np.linalg.norm(joints - joints[i], axis=2).max(axis=1))
-
-    flat = joints.reshape(len(joints), -1)
-    chosen = [int(np.argmin(np.linalg.norm(flat - flat.mean(axis=0), axis=1)))]
-    nearest = np.full(len(joints), np.inf)
-    while len(chosen) < min(n, len(joints)):
-        nearest = np.minimum(nearest, far_from(chosen[-1]))
-        nearest[chosen[-1]] = -1.0  # Equal poses are chosen, too, but each frame once.
-        farthest = int(np.argmax(nearest))
-        if nearest[farthest] < apart_m and len(chosen) >= fewest:
-            break
-        chosen.append(farthest)
-    return sorted(chosen)

@@ -18,11 +18,12 @@ from tracker.calibration.self_calibration.joint_adjustment import Gauge, Unknown
 from tracker.calibration.self_calibration.person_calibration import adjusted_to
 from tracker.calibration.self_calibration.rival_cameras import Solution, Solutions, compared
 from tracker.calibration.self_calibration.seen_joints import SeenJoints
-from tracker.calibration.self_calibration.stature import metres_per_unit, scaled_by
+from tracker.calibration.self_calibration.stature import metres_per_unit
 from tracker.calibration.self_calibration.two_views import TwoViews, relate
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_rig import scaled_cameras
 from tracker.geometry.cameras import Camera
 
 
@@ -66,7 +67,7 @@ def _completed(
     scale = metres_per_unit(joints, seen.names, statures_m)
     joints = joints * scale
     sigma_px = start.adjusted.sigma_px
-    placed = dict(zip(start.pair, scaled_by(start.adjusted.cameras, scale), strict=True))
+    placed = dict(zip(start.pair, scaled_cameras(start.adjusted.cameras, scale), strict=True))
     while len(placed) < len(lenses):
         known = np.isfinite(joints).all(axis=-1)
         counts = {i: int((known & seen.is_seen[:, i]).sum()) for i in range(len(lenses)) if i not in placed}

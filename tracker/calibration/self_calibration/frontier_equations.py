@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.reprojection import column_ends, inverse
+from tracker.calibration.check.point_problem import PointProblem
+from tracker.calibration.check.reprojection import Prior, column_ends, inverse
 from tracker.calibration.self_calibration.frontier_points import FrontierPoints
 from tracker.calibration.self_calibration.joint_adjustment import AdjustedJoints
-from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.geometry.camera_columns import project_with_columns
+from tracker.geometry.arrays import Array, Mask
+from tracker.geometry.camera_columns import ProjectedColumns, n_columns
 
 
 class BorderErrors(NamedTuple):
@@ -57,6 +58,34 @@ class FrontierEquations(NamedTuple):
         return max(1.0, (1 - 1 / len(moves)) * found / expected)
 
 
+class _BorderProblem(PointProblem):
+    """Points on borders of silhouettes: cameras see all of them farther out than they are by one distance each."""
+
+    def __init__(self, found: AdjustedJoints, outward: Array) -> None:
+        """State the problem of an adjustment, by all corrections of each camera and then its border.
+
+        Args:
+            found: the adjustment.
+            outward: direction out of the silhouette at each observed point, (N, 2).
+        """
+        free = tuple(np.full(n_columns(c) + 1, np.inf) for c in found.cameras)
+        super().__init__(found.observed, Prior(found.cameras, free), len(found.fit.rig.own), found.fit.sigmas_px)
+        self._outward = outward
+
+    def by_unknowns(self, found: ProjectedColumns, at: slice, camera: int) -> Array:
+        """See `ReprojectionProblem`."""
+        return np.concatenate([found.by_camera, -self._outward[at, :, None]], axis=2)
+
+    def reduced(self, found: AdjustedJoints, chosen: Mask) -> tuple[Array, Array]:
+        """Return gradient, (n + V,), and Hessian of some points, (P,), which are eliminated; borders come last."""
+        part = self.with_groups(chosen)
+        part._outward = self._outward[chosen[self.observations.groups]]
+        gradient, hessian = part.observed(found.fit.rig._replace(own=found.fit.rig.own[chosen])).reduced()
+        borders = self.ends[1:] - 1
+        order = np.concatenate([np.setdiff1d(np.arange(len(gradient)), borders), borders])
+        return gradient[order], hessian[np.ix_(order, order)]
+
+
 def frontier_equations(found: AdjustedJoints, points: FrontierPoints) -> FrontierEquations:
     """Linearize the errors of an adjustment and eliminate its points.
 
@@ -64,49 +93,15 @@ def frontier_equations(found: AdjustedJoints, points: FrontierPoints) -> Frontie
         found: the adjustment of frontier points, whose borders may have been moved.
         points: the frontier points.
     """
-    ends, n_frames = column_ends(found.cameras), len(points.outward)
-    size, n_stretches = ends[-1] + len(found.cameras), min(BORDER.stretches, n_frames)
-    out = FrontierEquations(
-        np.zeros((n_stretches, size, size)), np.zeros((n_stretches, size)), np.zeros((size, 2 * points.seen.n_joints))
-    )
-    frames, joints = np.divmod(found.observed.groups, points.seen.n_joints)
-    for joint in range(points.seen.n_joints):
-        rows = [np.flatnonzero((joints == joint) & (found.observed.cameras == i)) for i in range(len(found.cameras))]
-        pair = [i for i, at in enumerate(rows) if len(at)]
-        if not pair:
-            continue
-        assert len(pair) == 2, "a frontier point belongs to two cameras"
-        columns = [np.array([*range(ends[i], ends[i + 1]), ends[-1] + i]) for i in pair]
-        stretches = frames[rows[pair[0]]] * n_stretches // n_frames
-        blocks = _blocks(found, points, joint, [(i, rows[i]) for i in pair])
-        for a, own in enumerate(columns):
-            for b, other in enumerate(columns):
-                H = blocks[a][b]
-                np.add.at(out.hessians, (stretches[:, None, None], own[:, None], other), H[:, :-1, :-1])
-                np.add.at(out.gradients, (stretches[:, None], own), H[:, :-1, -1])
-                out.by_place[own, 2 * joint + b] += H[:, :-1, -2].sum(axis=0)
-    return out
-
-
-def _blocks(
-    found: AdjustedJoints, points: FrontierPoints, joint: int, observed: list[tuple[int, IntArray]]
-) -> list[list[Array]]:
-    """Return products of the rows of two cameras, (F, m, m) each, in which the points are eliminated.
-
-    Rows are derivatives by a camera and its border, and then the errors.
-    """
-    rows, by_points = list[Array](), list[Array]()
-    scale = np.sqrt(found.fit.weights) / found.fit.sigmas_px[found.observed.cameras]
-    for i, at in observed:
-        groups = found.observed.groups[at]
-        derived = project_with_columns(found.cameras[i], found.points_world[groups])
-        outward = points.outward[groups // points.seen.n_joints, i, joint]
-        row = np.concatenate([derived.by_camera, -outward[:, :, None], found.fit.errors_px[at, :, None]], axis=2)
-        rows.append(np.nan_to_num(row * scale[at, None, None]))
-        by_points.append(np.nan_to_num(derived.by_point * scale[at, None, None]))
-    cross = [p.swapaxes(1, 2) @ row for p, row in zip(by_points, rows, strict=True)]
-    variances = np.linalg.pinv(sum(p.swapaxes(1, 2) @ p for p in by_points), hermitian=True)
-    out = [[-a.swapaxes(1, 2) @ variances @ b for b in cross] for a in cross]
-    for i, row in enumerate(rows):
-        out[i][i] = out[i][i] + row.swapaxes(1, 2) @ row
-    return out
+    frames, joints = np.divmod(found.numbers, points.seen.n_joints)
+    at = found.observed
+    problem = _BorderProblem(found, points.outward[frames[at.groups], at.cameras, joints[at.groups]])
+    n_frames = len(points.outward)
+    stretches = frames * min(BORDER.stretches, n_frames) // n_frames
+    parts = [problem.reduced(found, stretches == s) for s in range(min(BORDER.stretches, n_frames))]
+    gradients, hessians = (np.array(own) for own in zip(*parts, strict=True))
+    n, by_place = column_ends(found.cameras)[-1], list[Array]()
+    for joint in np.unique(joints):
+        hessian = problem.reduced(found, joints == joint)[1]
+        by_place += [hessian[:, n + i] for i in np.unique(at.cameras[joints[at.groups] == joint])]
+    return FrontierEquations(hessians, gradients, np.array(by_place).T)

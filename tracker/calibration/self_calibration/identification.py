@@ -14,11 +14,12 @@ from tracker.calibration.self_calibration.people_matching import MatchedPeople, 
 from tracker.calibration.self_calibration.person_calibration import Identified, adjusted_to
 from tracker.calibration.self_calibration.rival_cameras import Solution
 from tracker.calibration.self_calibration.seen_joints import SeenJoints, joints_of_people, own_columns
-from tracker.calibration.self_calibration.stature import metres_per_unit, scaled_by
+from tracker.calibration.self_calibration.stature import metres_per_unit
 from tracker.compute.sampling import spread_indices
 from tracker.errors import CalibrationError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import IntArray
+from tracker.geometry.camera_rig import scaled_cameras
 from tracker.geometry.cameras import Camera
 from tracker.geometry.robust_triangulation import Views
 from tracker.interchange.observations.observed import ObservationSet
@@ -133,7 +134,7 @@ def _spread(persons: IntArray) -> IntArray:
 
 def _in_metres(adjusted: AdjustedJoints, seen: SeenJoints, statures_m: Sequence[float]) -> tuple[Camera, ...]:
     scale = metres_per_unit(seen.by_joint(adjusted.points_world), seen.names, statures_m)
-    return scaled_by(adjusted.cameras, scale)
+    return scaled_cameras(adjusted.cameras, scale)
 
 
 def _frequent(matched: MatchedPeople, names: Sequence[str]) -> tuple[tuple[str, ...], IntArray]:

@@ -6,42 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.lens_priors import CALIBRATED, UNKNOWN_LENS
-from tracker.calibration.check.point_adjustment import PointProblem, triangulate_all
-from tracker.calibration.check.reprojection import Observations, Prior, Rig, RigFit, column_ends, fit_rig
+from tracker.calibration.check.lens_priors import UNKNOWN_LENS
+from tracker.calibration.check.point_problem import PointProblem, triangulate_all
+from tracker.calibration.check.reprojection import Observations, Prior, Rig, RigFit, fit_rig
 from tracker.errors import CalibrationError
-from tracker.estimation.fitting.bundle import ArrowEquations
-from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.geometry.camera_columns import FOCAL, POSE, SHIFT, camera_difference, n_columns
+from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.camera_columns import FOCAL, POSE, SHIFT, n_columns
 from tracker.geometry.cameras import ROUNDING_PX2, Camera
-
-
-class AlikeLenses(PointProblem):
-    """Free points in cameras of which some have lenses of one model: their focal lengths differ by a percent."""
-
-    def __init__(self, problem: PointProblem, alike: Sequence[Sequence[int]]) -> None:
-        """State a problem.
-
-        Args:
-            problem: the same without that knowledge.
-            alike: cameras with lenses of one model, and free focal lengths.
-        """
-        super().__init__(problem.observations, problem.prior, problem.n_groups, problem.sigmas_px)
-        self._alike = alike
-
-    def linearize(self, rig: Rig, below: float = np.inf) -> ArrowEquations:
-        """See `BundleProblem`."""
-        out, cost = super().linearize(rig), 0.0
-        precision = CALIBRATED.focal**-2
-        logs = [camera_difference(b, c)[FOCAL] for b, c in zip(self.prior.cameras, rig.cameras, strict=True)]
-        for cameras in self._alike:
-            at = [self.ends[i] + int(np.searchsorted(self.columns[i], FOCAL)) for i in cameras]
-            apart = precision * (np.eye(len(at)) - np.full((len(at), len(at)), 1 / len(at)))
-            own = np.array([logs[i] for i in cameras])
-            out.gradient[at] += apart @ own
-            out.hessian[np.ix_(at, at)] += apart
-            cost += 0.5 * float(own @ apart @ own)
-        return out._replace(cost=out.cost + cost)
 
 
 class Gauge(NamedTuple):
@@ -69,8 +40,10 @@ class AdjustedJoints:
     cameras: tuple[Camera, ...]
     points_world: Array
     """(P, 3), in the unit of the distance that was held; NaN for joints that two cameras do not determine."""
+    numbers: IntArray
+    """Rows of `points_world` that two cameras determine, ascending, (G,): the groups of `observed` and `fit`."""
     observed: Observations
-    """Observations that took part; their groups are numbers of rows of `points_world`."""
+    """Observations that took part."""
     fit: RigFit
     """Its covariance heeds that errors agree, and that of rounding at least."""
     share: float
@@ -80,12 +53,6 @@ class AdjustedJoints:
     def sigma_px(self) -> float:
         """Standard deviation of a joint along each axis of a picture, px; at least that of rounding to whole pixels."""
         return max(float(np.median(self.fit.sigmas_px)), ROUNDING_PX2**0.5)
-
-    @property
-    def focal_sigmas(self) -> Array:
-        """Standard deviation of each focal length, as a share of it, (n_cameras,)."""
-        at = np.array(column_ends(self.cameras)[:-1]) + FOCAL
-        return np.asarray(np.sqrt(np.diag(self.fit.covariance)[at]))
 
 
 def adjust_joints(
@@ -109,17 +76,14 @@ def adjust_joints(
     """
     points, determined = triangulate_all(cameras, observations)
     numbers = np.flatnonzero(determined)
-    seen = among(observations, determined)
+    seen = observations.of_groups(determined)
     if not len(seen.px):
         return None
-    prior = _prior(cameras, gauge, lenses)
-    alike = lenses.alike if lenses else ()
-    problem = PointProblem(seen, prior, len(numbers), np.ones(len(cameras)))
-    fit, share = _fitted(AlikeLenses(problem, alike), Rig(tuple(cameras), points[numbers]), numbers % n_joints)
+    problem = PointProblem(seen, _prior(cameras, gauge, lenses), len(numbers), np.ones(len(cameras)))
+    fit, share = _fitted(problem, Rig(tuple(cameras), points[numbers]), numbers % n_joints)
     out = np.full(points.shape, np.nan)
     out[numbers] = fit.rig.own
-    observed = replace(seen, groups=numbers[seen.groups])
-    return AdjustedJoints(fit.rig.cameras, out, observed, fit, share)
+    return AdjustedJoints(fit.rig.cameras, out, numbers, seen, fit, share)
 
 
 def no_common_view() -> CalibrationError:
@@ -128,13 +92,6 @@ def no_common_view() -> CalibrationError:
         "expected joints that two cameras see from different sides, found none; film the person by cameras that stand "
         "at an angle to each other"
     )
-
-
-def among(observations: Observations, determined: Mask) -> Observations:
-    """Return the observations of determined points, with groups from 0 on without gaps."""
-    at = determined[observations.groups]
-    numbers: IntArray = np.cumsum(determined) - 1
-    return Observations(observations.cameras[at], numbers[observations.groups[at]], observations.px[at])
 
 
 def _prior(cameras: Sequence[Camera], gauge: Gauge, lenses: UnknownLenses | None) -> Prior:
@@ -153,7 +110,7 @@ def _prior(cameras: Sequence[Camera], gauge: Gauge, lenses: UnknownLenses | None
         replace(b, T_world_camera=c.T_world_camera)
         for b, c in zip(lenses.means if lenses else cameras, cameras, strict=True)
     )
-    return Prior(means, tuple(sigmas))
+    return Prior(means, tuple(sigmas), lenses.alike if lenses else ())
 
 
 def _fitted(problem: PointProblem, rig: Rig, joints: IntArray) -> tuple[RigFit, float]:
@@ -161,8 +118,8 @@ def _fitted(problem: PointProblem, rig: Rig, joints: IntArray) -> tuple[RigFit, 
     fit = fit_rig(problem, rig)
     share = _agreement(fit, problem.observations, joints)
     if share > 1 and any(0 < s < np.inf for s in np.concatenate(problem.prior.sigmas)):
-        weaker = Prior(problem.prior.cameras, tuple(s / np.sqrt(share) for s in problem.prior.sigmas))
-        fit = fit_rig(problem.with_prior(weaker), fit.rig)
+        sigmas = tuple(s / np.sqrt(share) for s in problem.prior.sigmas)
+        fit = fit_rig(problem.with_prior(replace(problem.prior, sigmas=sigmas)), fit.rig)
     errors = np.nan_to_num(fit.errors_px) * fit.weights[:, None]
     exact = max(1.0, ROUNDING_PX2 / max(float(np.mean(errors**2)), np.finfo(float).tiny))
     return fit._replace(covariance=share * exact * fit.covariance), share

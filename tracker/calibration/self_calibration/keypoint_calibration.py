@@ -7,8 +7,8 @@ import numpy as np
 
 from tracker.calibration.boards.board_calibration import FLAT_SHARE
 from tracker.calibration.boards.camera_graph import MIN_SHARED
-from tracker.calibration.boards.rig_fit import HELD_OUT_EVERY
 from tracker.calibration.boards.view_choice import MAX_FRAMES, MAX_LENS_VIEWS
+from tracker.calibration.check.held_out import held_out_of
 from tracker.calibration.check.solvable import check_apart
 from tracker.calibration.self_calibration.identification import Statures, first_cameras
 from tracker.calibration.self_calibration.joint_adjustment import UnknownLenses
@@ -30,13 +30,13 @@ from tracker.calibration.self_calibration.stature import (
     metres_by_person,
     metres_per_unit,
     scale_sigma,
-    scaled_by,
     upright,
 )
 from tracker.compute.progress import Report, stages, unreported
 from tracker.compute.sampling import spread_indices
 from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.geometry.camera_rig import scaled_cameras
 from tracker.geometry.cameras import Camera
 from tracker.interchange.observations.observed import ObservationSet
 from tracker.interchange.observations.shifts import view_shifts
@@ -85,32 +85,31 @@ def _calibrated(
     first = first_cameras(_spread(observations), cameras, statures_m, lenses)
     seen, gauge, statures = first.seen, first.gauge, first.statures_m
     chaining(1.0)
-    held_out = np.arange(len(seen.px))[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]
+    held_out = held_out_of(np.arange(len(seen.px)))
     rest = seen.on_frames(np.setdiff1d(np.arange(len(seen.px)), held_out))
     before = adjusted_to(first.cameras, rest, gauge, lenses)
     adjusting(0.5)
     adjusted = adjusted_to(before.cameras, seen, gauge, lenses)
     adjusting(1.0)
-    on_them, errors_px = held_out_errors(before.cameras, seen.on_frames(held_out))
+    errors = held_out_errors(before.cameras, held_out, seen.on_frames(held_out))
     checking(1.0)
     joints = seen.by_joint(adjusted.points_world)
     scale = metres_per_unit(joints, seen.names, statures)
     volume = volume_error(adjusted, scale)
-    _require_in_step(observations, scaled_by(adjusted.cameras, scale), fps)
+    _require_in_step(observations, scaled_cameras(adjusted.cameras, scale), fps)
     require_determined(volume, adjusted, seen, scale)
     _require_motion(scale * joints, float(np.nanmean(statures)))
     require_unmirrored(adjusted.cameras, adjusted.observed, adjusted.sigma_px)
     require_one_solution(Solution(adjusted, gauge), first.rivals, seen, lenses)
     by_person = scale * joints.reshape(-1, len(seen.names), 3)
-    world = upright(scaled_by(adjusted.cameras, scale), by_person, seen.names, float(np.nanmean(statures)))
+    world = upright(scaled_cameras(adjusted.cameras, scale), by_person, seen.names, float(np.nanmean(statures)))
     check_apart(world.cameras)
     scales = metres_by_person(joints, seen.names, statures)
     given = None if statures_m is None else float(np.nanmean(statures))
     sigma = scale_sigma(given, int(np.isfinite(scales).sum()))
     notes = (*scale_notes(given, sigma), *_people_notes(scales), *lens_notes(adjusted, has_lenses), _up_note(world))
     return PersonCalibration(
-        world, adjusted, seen, held_out, on_them.cameras, errors_px, volume, sigma, (*notes, *first.notes),
-        identified=first.identified,
+        world, adjusted, seen, errors, volume, sigma, (*notes, *first.notes), identified=first.identified
     )  # fmt: skip
 
 

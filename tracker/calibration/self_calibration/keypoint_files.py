@@ -4,7 +4,6 @@ from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 from tracker.calibration.boards.footage_calibration import footage_paths
 from tracker.calibration.boards.lens_fit import blank_camera
@@ -22,7 +21,6 @@ from tracker.formats.calibrations.reading import read_cameras
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lengths import check_heights
 from tracker.interchange.observations.importing import plan_import
-from tracker.interchange.observations.observed import ObservationSet
 from tracker.interchange.observations.plans import ImportPlan, MaskPlan
 from tracker.interchange.observations.request import ImportRequest
 from tracker.interchange.plausibility.examine import examine_keypoints
@@ -56,14 +54,6 @@ class FilmedPerson:
     """Whether people and lenses of unusual sizes are taken."""
 
 
-class KeyPoints(NamedTuple):
-    """Key points of a person in footage."""
-
-    observations: ObservationSet
-    blanks: tuple[Camera, ...]
-    """Cameras at the origin with a lens as unknown lenses are on average."""
-
-
 def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalibration:
     """Calibrate the cameras that have filmed a person.
 
@@ -82,16 +72,20 @@ def _calibrate(filmed: FilmedPerson, report: Report) -> PersonCalibration:
     if not filmed.any_size:
         check_heights(filmed.stature_m, CalibrationError)
     paths = footage_paths(filmed.videos, filmed.camera_paths, filmed.offsets)
-    session = _session_of(filmed.keypoints, paths, filmed.offsets, filmed.common_frames)
+    session = footage_session(filmed.keypoints, paths, filmed.offsets, filmed.common_frames)
     blanks = tuple(c.camera for c in session.cameras)
     cameras = blanks if filmed.lenses is None else _with_lenses(blanks, filmed.lenses, filmed.any_size)
     has_lenses = filmed.lenses is not None
-    plan = None if filmed.keypoints is None else _plan(session, filmed.keypoints, filmed.skeleton)
+    plan = None if filmed.keypoints is None else plan_of_files(session, filmed.keypoints, filmed.skeleton)
     if plan is not None and not isinstance(plan, MaskPlan):
-        found = _keypoints(plan, filmed.keypoints, blanks)
+        if plan.observations.points is None:
+            raise CalibrationError(
+                f"expected key points in pictures, found points in space in {filmed.keypoints}; name the files of a "
+                "pose detector"
+            )
         fps = max(session.fps, 25.0)  # folders of images state none
-        result = calibrate_by_person(found.observations, cameras, filmed.stature_m, has_lenses, report, fps)
-        if doubts := examine_keypoints(found.observations, result.world.cameras, session.fps):
+        result = calibrate_by_person(plan.observations, cameras, filmed.stature_m, has_lenses, report, fps)
+        if doubts := examine_keypoints(plan.observations, result.world.cameras, session.fps):
             raise doubts[0]
         return result
     if isinstance(filmed.stature_m, Mapping):
@@ -129,25 +123,7 @@ def _with_lenses(blanks: Sequence[Camera], path: Path, any_size: bool) -> tuple[
     return tuple(out)
 
 
-def read_keypoints(
-    files: Path, paths: Mapping[str, Path], offsets: Mapping[str, int], common_frames: bool
-) -> KeyPoints:
-    """Read key points and the sizes of the pictures that they lie in.
-
-    Args:
-        files: file or folder of key points.
-        paths: footage by camera name.
-        offsets: frame k of all is frame k + offset of a camera.
-        common_frames: whether to leave out frames at the end that some cameras lack.
-
-    Raises:
-        TrackerError: files cannot be read, or do not fit the footage.
-    """
-    session = _session_of(files, paths, offsets, common_frames)
-    return _keypoints(_plan(session, files), files, tuple(c.camera for c in session.cameras))
-
-
-def _session_of(
+def footage_session(
     files: Path | None, paths: Mapping[str, Path], offsets: Mapping[str, int], common_frames: bool
 ) -> Session:
     """Return a session that states which cameras and frames there are; nothing of it is written."""
@@ -165,23 +141,18 @@ def _session_of(
     return Session(place.parent, place.name, max(rates, default=1.0), n_frames, sources, ())
 
 
-def _plan(session: Session, files: Path, skeleton: Path | None = None) -> ImportPlan | MaskPlan:
+def plan_of_files(session: Session, files: Path, skeleton: Path | None = None) -> ImportPlan | MaskPlan:
+    """Return the plan to import files of key points or masks, of which none is written.
+
+    Raises:
+        TrackerError: files cannot be read, or do not fit the footage.
+    """
     plan = plan_import(session, ImportRequest(_PERSON, (files,), (_PERSON,), skeleton), calibrated=False)
     if plan.problems:
         kind = "masks" if isinstance(plan, MaskPlan) else "key points"
         raise CalibrationError(f"{plan.problems[0]}; correct the files of {kind}")
     _require_files({v.camera for v in plan.views if v.place is None}, files)
     return plan
-
-
-def _keypoints(plan: ImportPlan | MaskPlan, files: Path | None, blanks: tuple[Camera, ...]) -> KeyPoints:
-    if isinstance(plan, MaskPlan):
-        raise CalibrationError(f"expected key points in pictures, found masks in {files}; name files of key points")
-    if plan.observations.points is None:
-        raise CalibrationError(
-            f"expected key points in pictures, found points in space in {files}; name the files of a pose detector"
-        )
-    return KeyPoints(plan.observations, blanks)
 
 
 def _require_files(without: Collection[str], files: Path) -> None:

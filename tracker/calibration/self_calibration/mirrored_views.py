@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.calibration.check.point_adjustment import triangulate_all
+from tracker.calibration.check.point_problem import triangulate_all
 from tracker.calibration.check.reprojection import Observations
 from tracker.calibration.self_calibration.camera_chain import pose_before_joints
 from tracker.errors import CalibrationError

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibration.self_calibration.seen_joints import points_of_person
+from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.robust_triangulation import INLIER_M, Views, triangulate_points
 from tracker.interchange.observations.joints import side_pairs
@@ -65,27 +66,18 @@ def _ray_gaps(observations: ObservationSet, views: Views) -> Array:
     points = observations.points
     assert points is not None
     rays = point_rays(views, points.points_px, points.is_known)
-    mirrored = np.arange(rays.shape[3])
+    same = np.arange(rays.shape[3])
+    mirrored = same.copy()
     for left, right in (pair for group in side_pairs(observations) for pair in group):
         mirrored[[left, right]] = right, left
     n_frames, n_views, n_detections = rays.shape[:3]
     out = np.full((n_frames, n_views, n_detections, n_views, n_detections), np.nan)
     for a in range(n_views):
         for b in range(a + 1, n_views):
-            baseline = views.centers[b] - views.centers[a]
             for d in range(n_detections):
-                own = rays[:, a, d, None]
-                apart = [_apart(own, other, baseline) for other in (rays[:, b], rays[:, b][:, :, mirrored])]
-                out[:, a, d, b] = out[:, b, :, a, d] = np.fmin(*apart)
+                apart = [views.ray_distances(a, b, rays[:, a, d, None], rays[:, b][:, :, i]) for i in (same, mirrored)]
+                out[:, a, d, b] = out[:, b, :, a, d] = np.fmin(*(known_median(np.moveaxis(x, -1, 0)) for x in apart))
     return out
-
-
-def _apart(u: Array, v: Array, baseline: Array) -> Array:
-    """Return the median distance of rays of the same points, (F, D), metres."""
-    across = np.cross(u, v)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distances = np.abs(across @ baseline) / np.linalg.norm(across, axis=-1)
-    return _medians(distances)
 
 
 def _grouped(gaps: Array, present: Mask) -> IntArray:
@@ -127,7 +119,7 @@ def _costs(gaps: Array, groups: IntArray, v: int) -> Array:
     out = np.full((groups.size, groups.shape[1]), np.nan)
     for g in np.unique(groups[groups >= 0]):
         members = [(w, d) for w, d in zip(*np.nonzero(groups == g), strict=True) if w != v]
-        out[g] = _medians(np.array([gaps[v, :, w, d] for w, d in members]).reshape(-1, groups.shape[1]).T)
+        out[g] = known_median(np.array([gaps[v, :, w, d] for w, d in members]).reshape(-1, groups.shape[1]))
     return out
 
 
@@ -152,14 +144,7 @@ def _places(observations: ObservationSet, views: Views, is_own: Mask) -> Array:
     px, confidence = points_of_person(observations, is_own)
     px = views.undistorted(px)
     found = triangulate_points(views, px, np.where(np.isfinite(px).all(axis=-1), confidence, 0.0)).points_world
-    return _medians(np.moveaxis(found, 1, -1))
-
-
-def _medians(values: Array) -> Array:
-    """Return the medians of the known values along the last axis; NaN where there is none."""
-    out, known = np.full(values.shape[:-1], np.nan), np.isfinite(values).any(axis=-1)
-    out[known] = np.nanmedian(values[known], axis=-1)
-    return out
+    return known_median(np.moveaxis(found, 1, 0))
 
 
 def _followed(votes: IntArray, places: Array, present: list[IntArray]) -> IntArray:

@@ -1,33 +1,30 @@
 """Cameras that a person has calibrated, and how well they are determined: alike for key points and silhouettes."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from tracker.calibration.boards.expected_error import MAX_POINTS, VolumeError, expected_error
 from tracker.calibration.boards.lens_fit import TOLD_FOCAL
-from tracker.calibration.boards.rig_fit import PLAIN_PX
-from tracker.calibration.check.lens_priors import UNKNOWN_LENS
-from tracker.calibration.check.point_adjustment import NEWS, PointProblem, require_spread, triangulate_all
-from tracker.calibration.check.reprojection import FINAL, Observations, Prior, Rig
+from tracker.calibration.check.held_out import HeldOut
+from tracker.calibration.check.lens_priors import NEWS, UNKNOWN_LENS
+from tracker.calibration.check.point_problem import PointProblem, require_spread, triangulate_all
+from tracker.calibration.check.reprojection import Prior, Rig, plain_errors_px
 from tracker.calibration.self_calibration.joint_adjustment import (
     AdjustedJoints,
     Gauge,
     UnknownLenses,
     adjust_joints,
-    among,
     no_common_view,
 )
 from tracker.calibration.self_calibration.seen_joints import SeenJoints
 from tracker.calibration.self_calibration.stature import Upright
 from tracker.compute.sampling import spread_indices
 from tracker.errors import CalibrationError
-from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
-from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.camera_columns import n_columns
+from tracker.geometry.arrays import IntArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.robust_triangulation import INLIER_M
 
@@ -56,12 +53,8 @@ class PersonCalibration:
     """The adjustment of all frames, in a world of its own."""
     seen: SeenJoints
     """Joints of the frames that were used, with sides mended."""
-    held_out: IntArray
-    """Which of them a first adjustment left out, for `held_out_px`."""
-    held_out_cameras: IntArray
-    """Camera of each observation on them, (N,)."""
-    held_out_px: Array
-    """Distance of each of these to the projection of its triangulated joint, (N,), px."""
+    held_out: HeldOut
+    """Observations on those of them that a first adjustment left out."""
     volume: VolumeError
     """Error of triangulated joints, without that of the scale."""
     scale_sigma: float
@@ -72,11 +65,6 @@ class PersonCalibration:
     """Name of the points in the pictures."""
     identified: Identified = ONE_PERSON
     """The people whose points they are."""
-
-    def held_out_rms_px(self, camera: int | None = None) -> float:
-        """Return the root mean square error on the frames held out, of one camera or all; NaN without joints."""
-        px = self.held_out_px if camera is None else self.held_out_px[self.held_out_cameras == camera]
-        return float(np.sqrt(np.mean(px**2))) if len(px) else float("nan")
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -105,25 +93,23 @@ def adjusted_to(
     found = adjust_joints(cameras, seen.observations(), seen.n_joints, gauge, lenses)
     if found is None:
         raise failure()
-    numbers, groups = np.unique(found.observed.groups, return_inverse=True)
-    require_spread(Rig(found.cameras, found.points_world[numbers]), replace(found.observed, groups=groups))
+    require_spread(found.fit.rig, found.observed)
     return found
 
 
-def held_out_errors(cameras: Sequence[Camera], seen: SeenJoints) -> tuple[Observations, Array]:
-    """Return joints on frames that cameras were not fitted to, and their distances from projections, (N,), px.
+def held_out_errors(cameras: Sequence[Camera], frames: IntArray, seen: SeenJoints) -> HeldOut:
+    """Return the errors of joints on frames that cameras were not fitted to.
 
     Joints are triangulated by plain least squares; nothing else moves.
     """
     observations = seen.observations()
     points, determined = triangulate_all(cameras, observations)
-    observed = among(observations, determined)
+    observed = observations.of_groups(determined)
     if not len(observed.px):
-        return observed, np.zeros(0)
-    held = Prior(tuple(cameras), tuple(np.zeros(n_columns(c)) for c in cameras))
-    plain = PointProblem(observed, held, int(determined.sum()), np.full(len(cameras), PLAIN_PX))
-    rig = solve_bundle(plain, Rig(tuple(cameras), points[determined]), tolerance=FINAL).state
-    return observed, np.linalg.norm(plain.errors_px(rig), axis=1)
+        return HeldOut(frames, observed.cameras, np.zeros(0))
+    problem = PointProblem(observed, Prior.held(cameras), int(determined.sum()), np.ones(len(cameras)))
+    errors = plain_errors_px(problem, Rig(tuple(cameras), points[determined]))
+    return HeldOut(frames, observed.cameras, np.linalg.norm(errors, axis=1))
 
 
 def volume_error(adjusted: AdjustedJoints, scale: float) -> VolumeError:
@@ -138,7 +124,7 @@ def require_determined(
     volume: VolumeError, adjusted: AdjustedJoints, seen: SeenJoints, scale: float, points: str = "joints"
 ) -> None:
     """Refuse unknown focal lengths, and cameras by which a joint could be taken for another one."""
-    for camera, sigma in zip(adjusted.cameras, adjusted.focal_sigmas, strict=True):
+    for camera, sigma in zip(adjusted.cameras, adjusted.fit.focal_sigmas, strict=True):
         if sigma > NEWS * UNKNOWN_LENS.focal:
             raise CalibrationError(
                 f"expected {points} that show the focal length of camera '{camera.name}', found it not determined by "
@@ -176,7 +162,7 @@ def lens_notes(adjusted: AdjustedJoints, has_lenses: bool) -> tuple[str, ...]:
     if has_lenses:
         return ()
     out = ["principal points in the middle, no distortion and one focal length for pictures of one size were assumed"]
-    for camera, sigma in zip(adjusted.cameras, adjusted.focal_sigmas, strict=True):
+    for camera, sigma in zip(adjusted.cameras, adjusted.fit.focal_sigmas, strict=True):
         if sigma > TOLD_FOCAL:
             out.append(f"camera '{camera.name}': the joints do not tell its focal length better than to {sigma:.1%}")
     return tuple(out)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.reprojection import OUTLIER_SIGMAS
+from tracker.calibration.check.reprojection import OUTLIER_SIGMAS, robust_squares
 from tracker.calibration.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses, adjust_joints
 from tracker.calibration.self_calibration.person_calibration import volume_error
 from tracker.calibration.self_calibration.seen_joints import SeenJoints
@@ -82,12 +82,10 @@ def misfits(found: Sequence[AdjustedJoints], seen: SeenJoints) -> Array:
     not determine are gross errors.
     """
     best = min(found, key=lambda a: a.sigma_px * len(seen.observations().px) / len(a.observed.px))
-    n, limit = len(seen.observations().px), OUTLIER_SIGMAS**2
-    out = []
+    n, out = len(seen.observations().px), []
     for solution in found:
         squares = np.nan_to_num(np.sum(solution.fit.errors_px**2, axis=1), nan=np.inf) / best.sigma_px**2
-        robust = limit - limit**2 / (limit + squares)
-        out.append(0.5 * (robust.sum() + limit * (n - len(squares))))
+        out.append(0.5 * (robust_squares(squares).sum() + OUTLIER_SIGMAS**2 * (n - len(squares))))
     return np.array(out) / best.share
 
 

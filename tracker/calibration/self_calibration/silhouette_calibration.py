@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from tracker.calibration.boards.camera_graph import MIN_SHARED
-from tracker.calibration.boards.rig_fit import HELD_OUT_EVERY
 from tracker.calibration.boards.view_choice import MAX_FRAMES
-from tracker.calibration.check.point_adjustment import triangulate_all
+from tracker.calibration.check.held_out import held_out_of
+from tracker.calibration.check.point_problem import triangulate_all
 from tracker.calibration.check.solvable import check_apart
 from tracker.calibration.self_calibration.frontier_adjustment import adjust_frontier
 from tracker.calibration.self_calibration.frontier_points import frontier_points
@@ -32,7 +32,7 @@ from tracker.calibration.self_calibration.silhouette_chain import (
     fitted_to_frontier,
     silhouette_chains,
 )
-from tracker.calibration.self_calibration.stature import STATURE_SIGMA, scaled_by, upright_by_ends
+from tracker.calibration.self_calibration.stature import STATURE_SIGMA, upright_by_ends
 from tracker.compute.progress import Report, stages, unreported
 from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.compute.sampling import spread_indices
@@ -40,6 +40,7 @@ from tracker.compute.threads import one_blas_thread
 from tracker.errors import CalibrationError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
+from tracker.geometry.camera_rig import scaled_cameras
 from tracker.geometry.cameras import Camera
 
 _REMEDIES: Mapping[Flaw, str] = {
@@ -90,15 +91,14 @@ def _calibrated(
     placed, gauge = _placed(seen, cameras, lenses)
     chaining(1.0)
     n_frames = len(seen.hulls_px)
-    held_out = np.arange(n_frames)[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]
+    held_out = held_out_of(np.arange(n_frames))
     rest = seen.on_frames(np.setdiff1d(np.arange(n_frames), held_out))
     before, _ = adjust_frontier(placed, rest.hulls_px, gauge, lenses, EFFORT.rounds + 1)
     adjusting(0.5)
     adjusted, points = adjust_frontier(before.cameras, seen.hulls_px, gauge, lenses, EFFORT.rounds + 1)
     adjusting(1.0)
-    on_them, errors_px = held_out_errors(
-        before.cameras, frontier_points(seen.on_frames(held_out).hulls_px, before.cameras).seen
-    )
+    on_them = frontier_points(seen.on_frames(held_out).hulls_px, before.cameras).seen
+    errors = held_out_errors(before.cameras, held_out, on_them)
     checking(1.0)
     found, determined = triangulate_all(adjusted.cameras, seen.standing.observations())
     ends = seen.standing.by_joint(np.where(determined[:, None], found, np.nan))
@@ -113,14 +113,12 @@ def _calibrated(
     require_determined(volume, adjusted, points, scale, "silhouettes")
     sigma = _scale_sigma(statures, stature_m)
     world = upright_by_ends(
-        scaled_by(adjusted.cameras, scale), scale * ends, scale * points.by_joint(adjusted.points_world)
+        scaled_cameras(adjusted.cameras, scale), scale * ends, scale * points.by_joint(adjusted.points_world)
     )
     check_apart(world.cameras)
     notes = (*scale_notes(stature_m, sigma), *_lens_notes(adjusted, has_lenses), _up_note(world.lean_rad))
     notes += under_floor_notes(world.joints_world)
-    return PersonCalibration(
-        world, adjusted, points, held_out, on_them.cameras, errors_px, volume, sigma, notes, "frontier points"
-    )
+    return PersonCalibration(world, adjusted, points, errors, volume, sigma, notes, "frontier points")
 
 
 def under_floor_notes(points_world: Array) -> tuple[str, ...]:

@@ -97,13 +97,6 @@ def scale_sigma(stature_m: float | None, n_people: int = 1) -> float:
     return float(np.hypot(of_proportions, STATURE_SIGMA if stature_m is None else 0.0) / np.sqrt(n_people))
 
 
-def scaled_by(cameras: Sequence[Camera], factor: float) -> tuple[Camera, ...]:
-    """Return cameras in a world that is larger by a factor."""
-    return tuple(
-        replace(c, T_world_camera=rigid.transform(c.T_world_camera[:3, :3], factor * c.center_world)) for c in cameras
-    )
-
-
 def upright(cameras: Sequence[Camera], joints: Array, names: Sequence[str], stature_m: float) -> Upright:
     """Turn a world so that z points from the ankles to the shoulders, and put its origin on the floor.
 

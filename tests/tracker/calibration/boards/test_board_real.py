@@ -85,7 +85,7 @@ def test_held_out_errors_are_below_those_of_caliscopes_calibration(folder, found
             (c, k, i, px)
             for (c, k), corners in sorted(caliscopes_views.items())
             for i, px in sorted(corners.items())
-            if k in result.held_out
+            if k in result.held_out.frames
         ]
         seen = SeenCorners(*(np.array(column) for column in zip(*rows, strict=True)))
     sigmas = result.rig.fit.sigmas_px

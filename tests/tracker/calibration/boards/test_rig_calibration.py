@@ -47,17 +47,17 @@ def test_a_rig_is_calibrated(rig, found):
     assert volume.low_m < volume.expected_m < volume.high_m
     assert 0.3 * volume.low_m < true < 3 * volume.high_m
     np.testing.assert_allclose(found.rig.fit.sigmas_px, rig.sigmas_px, rtol=0.25)
-    for camera, expected, sigma in zip(found.rig.cameras, rig.cameras, found.focal_sigmas, strict=True):
+    for camera, expected, sigma in zip(found.rig.cameras, rig.cameras, found.rig.fit.focal_sigmas, strict=True):
         assert abs(np.log(camera.K[0, 0] / expected.K[0, 0])) < 4 * sigma + 0.001
 
 
 @pytest.mark.slow
 def test_held_out_frames_took_no_part(rig, found):
-    assert len(found.held_out) >= 8
-    assert set(found.held_out_corners.frames) <= set(found.held_out)
+    assert len(found.held_out.frames) >= 8
+    assert set(found.held_out_corners.frames) <= set(found.held_out.frames)
     # The median is not moved by the gross errors. Of a Gaussian error in the plane it is 1.18 standard deviations.
     for i, sigma in enumerate(rig.sigmas_px):
-        off = found.held_out_px[found.held_out_corners.cameras == i]
+        off = found.held_out.px[found.held_out.cameras == i]
         assert np.median(off) == pytest.approx(1.18 * sigma, rel=0.35)
 
 
@@ -67,7 +67,7 @@ def test_errors_of_wrong_cameras_are_seen_on_held_out_frames(rig, found):
     cameras = list(found.rig.cameras)
     step = np.zeros(15)
     step[POSE] = [0, 0.01, 0, 0, 0, 0]
-    seen = rig.seen.in_frames(found.held_out)
+    seen = rig.seen.in_frames(found.held_out.frames)
     poses = pose_choice.board_poses(rig.board, seen, *(replace(c, T_world_camera=np.eye(4)) for c in cameras))
     sigmas = found.rig.fit.sigmas_px
     right = held_out_errors(rig.board, seen, cameras, poses, sigmas)[1]

@@ -1,4 +1,4 @@
-"""Since when a camera is off, and which frames are used."""
+"""Since when a camera is off."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ from rig_scenes import FPS
 
 from tracker.calibration.check.fault_search import prior_sigmas
 from tracker.calibration.check.single_frames import FrameScore, find_change
-from tracker.calibration.check.viewed_frames import spread_poses
 from tracker.geometry.camera_correction import N_CORRECTIONS
 
 SIGMAS = prior_sigmas(FPS)
@@ -50,12 +49,3 @@ def test_a_camera_that_is_far_off_on_all_frames_never_changed():
         near = H @ random.normal(scale=1e-3, size=N_CORRECTIONS)
         scores.append((FrameScore(k, 100.0, slope, 1e-3 * H), FrameScore(k, 10.0, near, H)))
     assert find_change(scores, 0, np.arange(3), correction, SIGMAS).first == 0
-
-
-def test_poses_are_as_different_as_possible():
-    joints = np.zeros((12, 5, 3))
-    joints[3], joints[7], joints[9] = 1.0, -1.0, [0, 2.0, 0]
-    assert {3, 7, 9} < set(spread_poses(joints, 4))
-    assert spread_poses(joints, 50) == [*range(12)]
-    assert len(spread_poses(joints, 50, apart_m=0.1)) == 4
-    assert len(spread_poses(joints, 50, apart_m=0.1, fewest=6)) == 6

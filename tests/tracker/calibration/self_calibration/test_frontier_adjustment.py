@@ -62,7 +62,7 @@ def test_unknown_lenses_add_to_the_error():
     started = [replace(m, K=c.K) for m, c in zip(means, CAMERAS, strict=True)]
     unknown = adjusted(hulls_of(), UnknownLenses(means, ((0, 1, 2),)), started)
     assert volume_error(unknown, 1.0).expected_m > 2 * volume_error(known, 1.0).expected_m
-    assert np.all(unknown.focal_sigmas > 0)
+    assert np.all(unknown.fit.focal_sigmas > 0)
     assert max(abs(c.distortion[0]) for c in unknown.cameras) > 0
 
 

@@ -8,9 +8,9 @@ from filmed_people import blanks, dancing, observed, rig
 
 from tracker.calibration.boards.expected_error import expected_error
 from tracker.calibration.check.lens_priors import CALIBRATED
-from tracker.calibration.check.point_adjustment import PointProblem
+from tracker.calibration.check.point_problem import PointProblem
 from tracker.calibration.check.reprojection import Observations, Prior, Rig, column_ends
-from tracker.calibration.self_calibration.joint_adjustment import AlikeLenses, Gauge, UnknownLenses, adjust_joints
+from tracker.calibration.self_calibration.joint_adjustment import Gauge, UnknownLenses, adjust_joints
 from tracker.calibration.self_calibration.seen_joints import joints_of_people
 from tracker.geometry.camera_columns import FOCAL, POSE, SHIFT, moved_camera, n_columns
 
@@ -31,7 +31,7 @@ def test_one_camera_and_one_coordinate_stay_where_they_were():
     assert np.count_nonzero(sigmas[ends[0] : ends[1]]) == 0
     assert np.count_nonzero(sigmas[ends[1] : ends[2]][POSE]) == 6
     assert np.count_nonzero(sigmas[ends[2] : ends[3]][SHIFT]) == 2
-    assert found.focal_sigmas.tolist() == [0, 0, 0]
+    assert found.fit.focal_sigmas.tolist() == [0, 0, 0]
 
 
 @pytest.mark.slow
@@ -54,9 +54,8 @@ def test_cameras_that_see_no_joint_together_are_not_adjusted():
 
 def test_lenses_of_one_model_pull_each_other():
     means = blanks(CAMERAS)
-    prior = Prior(tuple(means), tuple(np.where(np.arange(n_columns(c)) == FOCAL, 0.5, 0.0) for c in means))
-    observations = Observations(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))
-    alike = AlikeLenses(PointProblem(observations, prior, 1, np.ones(3)), ((0, 1),))
+    prior = Prior(tuple(means), tuple(np.where(np.arange(n_columns(c)) == FOCAL, 0.5, 0.0) for c in means), ((0, 1),))
+    alike = PointProblem(Observations(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2))), prior, 1, np.ones(3))
 
     def cost(logs):
         moved = []

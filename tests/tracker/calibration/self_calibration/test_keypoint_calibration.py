@@ -32,12 +32,12 @@ def test_cameras_and_focal_lengths_are_found_from_nothing():
     assert np.median(errors) < 0.035  # 3 px are 24 mm at 4 m
     assert center_errors_m(found, cameras, points).max() < 0.15
     focal = np.array([c.K[0, 0] for c in found.cameras])
-    assert np.all(np.abs(np.log(focal / FOCAL_PX)) < 3 * found.adjusted.focal_sigmas)
+    assert np.all(np.abs(np.log(focal / FOCAL_PX)) < 3 * found.adjusted.fit.focal_sigmas)
     assert np.degrees(np.arccos(R[2, 2])) < 6
     assert found.world.joints_world[..., 2][np.isfinite(found.world.joints_world[..., 2])].min() > -0.25
     assert found.adjusted.sigma_px == pytest.approx(3.0, rel=0.15)
     assert 0.001 < found.volume.low_m < found.volume.expected_m < found.volume.high_m < 0.02
-    assert 2 < np.median(found.held_out_px) < 4
+    assert 2 < np.median(found.held_out.px) < 4
     assert any("one focal length for pictures of one size" in note for note in found.notes)
 
 

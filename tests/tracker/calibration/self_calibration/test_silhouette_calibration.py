@@ -33,7 +33,7 @@ def test_cameras_are_found_from_silhouettes_alone(has_lenses):
     assert np.linalg.norm(scale * a @ R.T + t - b, axis=1).max() < 0.1
     assert np.degrees(np.arccos(R[2, 2])) < 5
     assert scale == pytest.approx(1.0, abs=0.15)  # the head of spheres is low
-    assert np.median(found.held_out_px) < 1.5
+    assert np.median(found.held_out.px) < 1.5
     assert found.volume.expected_m < 0.02
     focal = np.array([c.K[0, 0] for c in found.cameras])
     assert np.all(np.abs(focal / FOCAL_PX - 1) < (1e-9 if has_lenses else 0.03))
