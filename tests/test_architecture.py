@@ -92,7 +92,7 @@ def test_the_page_imports_run_downwards():
     assert wrong == set()
 
 
-def test_what_rooms_offer_exists():
+def test_named_parts_of_rooms_exist():
     """The docstring of a room names `file.function`, or a room as `room.part`."""
     missing = {
         f"{room}: {file}.{name}"

@@ -82,6 +82,12 @@ def test_prose_keeps_to_plain_words():
     assert found == []
 
 
+def test_names_of_tests_have_a_subject():
+    """A reader of a report knows which thing failed."""
+    names = re.findall(r"def (test_\w+)", "".join(p.read_text("utf-8") for p in (ROOT / "tests").rglob("test_*.py")))
+    assert [n for n in names if re.match("test_(what|where|who|whose|those|nor)_", n) or len(n) > 100] == []
+
+
 def test_one_class_has_one_name():
     """No two classes of the program share a name; messages are named after what they carry."""
     declarations = "client pose search server base binary_headers"

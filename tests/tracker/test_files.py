@@ -62,7 +62,7 @@ def test_a_folder_that_cannot_be_read_is_named_or_passed_over(folder, monkeypatc
 
 
 @pytest.mark.parametrize("name", ["missing", "a/y.json", "a\0b"])
-def test_what_is_no_folder_is_refused(folder, name):
+def test_a_file_in_place_of_a_folder_is_refused(folder, name):
     with pytest.raises(FormatError, match="expected a folder that can be read"):
         paths_in(folder / name, FormatError)
 

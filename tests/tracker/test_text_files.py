@@ -64,7 +64,7 @@ def test_a_file_of_many_megabytes_is_refused_unread(tmp_path, read):
 
 @pytest.mark.parametrize("read", [read_text, read_toml, read_json, all_lines])
 @pytest.mark.parametrize("kind", ["pipe", "link to a pipe", "device", "socket"])
-def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path, monkeypatch, read, kind):
+def test_an_irregular_file_is_refused_without_waiting(tmp_path, monkeypatch, read, kind):
     path = tmp_path / "odd"
     if kind == "device":
         path.symlink_to("/dev/zero")

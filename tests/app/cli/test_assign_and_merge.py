@@ -193,7 +193,7 @@ def test_copies_of_a_session_that_nobody_had_opened_are_merged(run, session, tmp
     assert_refused(run("merge", anna, ben, "--into", tmp_path / "no"), ["without a common edit"])
 
 
-def test_what_is_no_copy_is_refused_and_nothing_is_written(run, session, tmp_path):
+def test_a_folder_that_is_no_copy_is_refused(run, session, tmp_path):
     annotate(session, 1.0, [0], "anna")
     copy, into = tmp_path / "copy", tmp_path / "into"
     shutil.copytree(session, copy)
@@ -262,6 +262,6 @@ def test_changes_that_the_history_does_not_know_are_refused(run, session, tmp_pa
     (["tasks", "--reject", " ", "--frame", "1"], ["expected the reason with --reject"]),
     (["tasks", "--comment", "x", "--frame", "1", "--limb", "tail"], ["expected --limb as one of"]),
 ])  # fmt: skip
-def test_what_cannot_be_planned_is_refused(run, session, words, expected):
+def test_an_impossible_plan_is_refused(run, session, words, expected):
     command, *options = words
     assert_refused(run(command, session, *options), expected)

@@ -119,7 +119,7 @@ def test_a_line_end_in_a_path_never_reaches_a_script(run, plan, where):
     assert [*plan.parent.parent.rglob("*.sh")] == []
 
 
-def test_what_has_ended_is_not_checked(run, ended):
+def test_ended_work_is_not_checked(run, ended):
     for name in ("a", "b"):
         (ended.with_name(name) / "session.toml").unlink()
     assert run("batch", ended, "--slurm")[0] == 0
@@ -141,7 +141,7 @@ def test_the_table_puts_failures_first_and_opens_at_the_worst_frame(run, ended):
     assert done["open"] in text
 
 
-def test_what_a_person_verified_counts_and_is_no_longer_doubted(run, ended):
+def test_a_verified_pose_counts_and_is_not_doubted(run, ended):
     folder = ended.with_name("a")
     store = AnnotationStore(folder / "annotations.sqlite")
     record = store.pose("ann", 1)

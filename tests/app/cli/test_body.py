@@ -40,6 +40,6 @@ def test_a_person_gets_feet_and_undo_takes_them_away(run, session, opened):
     (["--to", "gavrila99"], ["gavrila99", "expected one of"]),
     (["--to", "gavrila38", "--person", "bob"], ["expected --person to be one of person, found 'bob'"]),
 ])  # fmt: skip
-def test_what_is_refused(run, session, words, expected):
+def test_refused_requests(run, session, words, expected):
     assert_refused(run("body", session, *words), expected)
     assert load_session(session).people[0].model.name == "gavrila22"

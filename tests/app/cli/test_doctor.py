@@ -24,7 +24,7 @@ def test_the_report_names_no_person_and_no_path(run):
     assert getpass.getuser() not in out.split()
 
 
-def test_what_is_missing_is_named_with_its_command(run, monkeypatch):
+def test_missing_parts_are_named_with_their_command(run, monkeypatch):
     monkeypatch.setattr(doctor.importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
     monkeypatch.setattr(doctor.sys, "platform", "linux")

@@ -159,7 +159,7 @@ def test_wrong_input_is_refused_and_leaves_nothing(run, couple, tmp_path, words,
     assert [p.name for p in tmp_path.iterdir()] == ["s"]
 
 
-def test_what_cannot_be_written_leaves_nothing(run, couple, tmp_path, monkeypatch):
+def test_a_failed_write_leaves_nothing(run, couple, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -265,7 +265,7 @@ def test_a_drive_without_hard_links_has_exports_too(couple, tmp_path, monkeypatc
     assert (tmp_path / "n.trc").read_text() == "of another program"
 
 
-def test_what_a_killed_export_left_is_removed_by_the_next_one(couple, tmp_path):
+def test_files_of_a_killed_export_are_removed_by_the_next(couple, tmp_path):
     child = subprocess.Popen(["true"])
     child.wait()
     dead = msgspec.structs.replace(this_holder(), process=child.pid, started="1")

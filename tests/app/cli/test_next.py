@@ -57,7 +57,7 @@ def test_next_says_where_nothing_is_left_that_pays(run, session):
     assert run("next", session)[1].startswith("nothing is left that pays: expected error ")
 
 
-def test_what_next_and_between_keyframes_refuse(run, session):
+def test_refusals_of_next_and_between_keyframes(run, session):
     assert_refused(run("next", session), ["expected poses to improve, found none"])
     assert_refused(run("next", session, "--count", "0"), ["expected --count as a whole number from 1, found 0"])
     words = ("track", session, "--between-keyframes")

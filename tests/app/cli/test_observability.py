@@ -29,7 +29,7 @@ def test_one_frame_and_another_camera(run, placed):
     assert best["mean_after_deg"] < last["mean_after_deg"] < best["mean_before_deg"]
 
 
-def test_what_a_person_reads(run, placed):
+def test_the_sentence_for_a_person(run, placed):
     _, out, _ = run("observability", placed, "--another-camera")
     lines = out.splitlines()
     assert lines[0].startswith("person, frame 20: ")

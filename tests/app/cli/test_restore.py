@@ -53,7 +53,7 @@ def test_a_sound_store_stays_as_it_is_unless_a_backup_is_named(run, edited):
 
 
 @pytest.mark.slow
-def test_what_cannot_be_restored_is_refused(run, edited, tmp_path):
+def test_an_impossible_restore_is_refused(run, edited, tmp_path):
     assert_refused(run("restore", tmp_path), ["is not a session"])
     assert_refused(run("restore", edited, "--backup", "other.sqlite"), ["expected a backup", "other.sqlite", "no such"])
     with SessionLock(edited):

@@ -126,7 +126,7 @@ def confused(marks):
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_what_is_seen_together_differs_in_color_or_shape(place):
+def test_curves_seen_together_differ_in_color_or_shape(place):
     assert confused(PLACES[place]) == []
 
 

@@ -54,7 +54,7 @@ def test_the_end_of_a_drag_scores_once(placed, scorings, monkeypatch):
         LockDofs(frame=2, person=0, action="lock", dofs=[0, 999], locked=True),
     ],
 )
-def test_what_the_session_does_not_have_is_refused(placed, message):
+def test_absent_people_and_cameras_are_refused(placed, message):
     before = placed.state
     with pytest.raises(MessageError, match=r"^expected "):
         dispatch(placed, PAGE, message)

@@ -31,7 +31,7 @@ def allowed(role, message, has_place=True):
     return True
 
 
-def test_what_is_not_named_is_refused():
+def test_unnamed_parts_are_refused():
     class Fresh(Command, frozen=True, tag="fresh"):
         """A message of a later version."""
 
@@ -135,7 +135,7 @@ async def test_a_second_page_of_another_name_is_refused_by_turn(opened):
     people.close()
 
 
-async def test_who_sends_without_pause_is_read_no_further_and_then_closed(opened, monkeypatch):
+async def test_a_flooding_page_is_closed(opened, monkeypatch):
     host, gate = opened(), threading.Event()
     read, done = [], []
     real = socket.parse

@@ -112,7 +112,7 @@ async def go_on_slowly(tracker):
 
 
 @pytest.mark.slow
-async def test_what_cannot_be_tracked_is_a_notice(controller, caplog):
+async def test_an_impossible_run_is_a_notice(controller, caplog):
     async with visiting(controller) as page:
         await page.send("track", action="backward", until=40)
         notice = await page.hear("notice")
@@ -249,7 +249,7 @@ async def test_a_range_is_worked_on_and_told(controller):
         ("pose", {"action": "copy_person", "frame": 2, "person": 0}),
     ],
 )  # fmt: skip
-async def test_what_is_not_understood_is_refused_and_nothing_has_happened(controller, kind, fields):
+async def test_a_message_not_understood_changes_nothing(controller, kind, fields):
     before = controller.state
     async with visiting(controller) as page:
         await page.send(kind, **({"phase": "start"} if kind == "pin" else {}), **fields)
@@ -390,7 +390,7 @@ async def test_a_pose_changes_the_part_masks_alone(controller):
 
 
 @pytest.mark.slow
-async def test_what_a_page_sees_anew_is_sent_and_nothing_else(controller):
+async def test_only_news_is_sent_to_a_page(controller):
     async with visiting(controller) as page:
         await page.hear("image", lambda m: m["of"] == 4)
         await page.shows("image", reductions=(0, 1, 0, 0))

@@ -27,7 +27,7 @@ def test_each_has_a_frame_and_a_selection_of_their_own(pair):
     assert (anna.state.point, ben.state.point) == (None, "head")
 
 
-def test_who_joins_on_a_frame_with_evidence_sees_its_cost(pair):
+def test_a_newcomer_on_a_frame_with_evidence_sees_its_cost(pair):
     anna, ben = pair
     assert ben.state.cost_px == anna.state.cost_px is not None
 
@@ -210,7 +210,7 @@ def test_names_of_any_script_are_joined_by(people, name):
     "name",
     ["ben\ufe0f", "ben\U000e0100", "b\u034fen", "b\u200den", "\u3164", "\uffa0", "\u115f", "\u2800", "ben\u2800"],
 )
-def test_what_nobody_can_see_is_no_part_of_a_name(people, name):
+def test_invisible_characters_are_no_part_of_a_name(people, name):
     assert re.search(r"found U\+[0-9A-F]{4,5} in it", people.join("annotate", name).refusal)
 
 
@@ -246,7 +246,7 @@ def test_a_place_outlives_the_page_and_the_controller(opened):
     people.close()
 
 
-def test_who_stays_is_not_dropped(opened):
+def test_present_participants_are_not_dropped(opened):
     people = Participants(opened(), absent_s=0.05)
     first, second = people.join("annotate", "ben"), people.join("annotate", "ben")
     people.leave(first)

@@ -43,7 +43,7 @@ def test_the_oldest_go_where_bytes_run_out_and_the_newest_stays_however_large():
     assert recent.n_bytes == 5000
 
 
-def test_what_failed_is_tried_again():
+def test_failed_work_is_tried_again():
     tries = []
 
     def compute(key):

@@ -30,7 +30,7 @@ def test_lines_of_progress(capsys):
 
 
 @pytest.mark.parametrize("option", [(), ("--json",)])
-def test_what_commands_print(run, monkeypatch, option):
+def test_the_output_of_commands(run, monkeypatch, option):
     monkeypatch.setattr("app.cli.info.summarize", lambda *_: {"name": ODD, "cameras": []})
     monkeypatch.setattr("app.cli.info._format", lambda found: found["name"])
     status, out, _ = run("info", SAMPLE, "--no-check", *option)

@@ -13,7 +13,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
-def test_what_a_killed_program_left_is_removed(tmp_path):
+def test_files_of_a_killed_program_are_removed(tmp_path):
     foreign = tmp_path / "quadrille-of-somebody"
     foreign.mkdir()
     running = TemporaryFolder(str(tmp_path))

@@ -100,7 +100,7 @@ def test_a_turn_right_after_arriving_leaves_it_too(controller, page):
     wait_for(lambda: controller.state.snapped is None, 5)
 
 
-def test_what_a_slow_page_says_late_is_no_turn(controller, page):
+def test_late_reports_of_a_slow_page_are_no_turn(controller, page):
     snap(controller, page, 0)
     assert settled(controller, page, pose_of(controller, 0)) == 0
     snap(controller, page, None)
@@ -111,7 +111,7 @@ def test_what_a_slow_page_says_late_is_no_turn(controller, page):
     assert page.background is not None
 
 
-def test_nor_is_what_it_says_before_it_is_snapped_again(controller, page):
+def test_reports_before_a_second_snap_are_no_turn(controller, page):
     snap(controller, page, 0)
     assert settled(controller, page, pose_of(controller, 0)) == 0
     snap(controller, page, None)

@@ -77,7 +77,7 @@ def test_frames_that_go_by_are_passed_over_and_the_one_that_stays_is_drawn(contr
     assert n_drawn == 40 * 0.25 // 2.0
 
 
-def test_who_looks_through_a_camera_sees_bodies_and_image_together(controller, clock):
+def test_a_camera_view_shows_bodies_and_image_together(controller, clock):
     drawn = Throttle(controller)
     controller.state = replace(controller.state, pages_pausing_3d=SOFTWARE, frame=7, snapped=0)
     assert drawn.due(controller.state) is controller.state

@@ -112,7 +112,7 @@ def test_connections_that_say_nothing_hold_nobody_up(doorway):
         each.close()
 
 
-def test_who_comes_next_serves_the_same_port(doorway):
+def test_the_next_program_serves_the_same_port(doorway):
     doorway.close()
     with socket.create_connection(("127.0.0.1", doorway.port)) as waiting:
         accepted, _ = doorway.sockets[0].accept()

@@ -297,7 +297,7 @@ class TestToken:
             assert response.status == 403
         assert "another account" in caplog.text
 
-    async def test_who_types_the_address_is_told_which_one_to_open(self, client):
+    async def test_a_typed_address_names_the_one_to_open(self, client):
         async with client.get("/") as response:
             assert response.status == 403
             assert "open the address that quadrille open printed" in await response.text()

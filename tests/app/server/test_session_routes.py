@@ -46,7 +46,7 @@ async def test_the_last_batches_are_listed_and_a_recording_is_opened_at_a_frame(
     assert client.routes.chosen == (dance, 1, person)
 
 
-async def test_what_is_no_session_to_open_is_refused_in_a_sentence(folders, serve, tmp_path):
+async def test_a_folder_that_is_no_session_is_refused(folders, serve, tmp_path):
     walk, dance, _ = folders
     client = await serve()
     (tmp_path / "empty").mkdir()

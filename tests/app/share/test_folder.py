@@ -105,7 +105,7 @@ def test_names_cannot_end_the_script(couple, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_there_is_kept(run, couple, tmp_path):
+def test_existing_files_are_kept(run, couple, tmp_path):
     words = ("share", couple.folder, "--out")
     empty, full, shared, file = (tmp_path / name for name in ("empty", "full", "shared", "a.html"))
     empty.mkdir()

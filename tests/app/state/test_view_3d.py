@@ -36,7 +36,7 @@ def test_every_field_comes_back():
         {"character": "nobody"}, {"character": ["knossow54"]},
     ],
 )  # fmt: skip
-def test_what_makes_no_sense_is_as_usual(data):
+def test_senseless_values_fall_back_to_the_default(data):
     assert restored(data) == View3d()
 
 

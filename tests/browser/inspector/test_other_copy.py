@@ -67,7 +67,7 @@ async def test_decisions_and_the_tolerance_are_sent(page, endpoint, section):
     await section.get_by_text("1 differs by more than the tolerance").wait_for()
 
 
-async def test_where_the_other_copy_has_no_pose_there_is_nothing_to_decide(page, endpoint, section):
+async def test_a_frame_without_their_pose_needs_no_decision(page, endpoint, section):
     await opened(page, endpoint, COPY | {"posed": [False], "people": [[]]})
     for name in ("Keep mine", "Take theirs", "Mean"):
         assert await section.get_by_role("button", name=name, exact=True).is_disabled()

@@ -73,7 +73,7 @@ async def test_a_doubt_leads_to_its_reason_and_to_a_good_pose(live):
     await shows(live, "quadrille.state.state.status === 'lost'")
 
 
-async def test_where_nothing_was_searched_a_sentence_says_so(live):
+async def test_a_sentence_says_that_nothing_was_searched(live):
     await live.locator("#frame").fill("10")
     await live.keyboard.press("Enter")
     await shows(live, "quadrille.state.shown.frame === 10 && quadrille.state.reason.tried?.length === 0")

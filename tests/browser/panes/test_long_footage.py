@@ -69,7 +69,7 @@ async def test_no_hand_takes_anything_of_a_frame_that_stands_in(page, endpoint):
 
 
 @pytest.mark.slow
-async def test_where_the_frame_on_the_screen_is_the_nearest_it_stays_and_is_marked(page, endpoint):
+async def test_the_nearest_frame_on_the_screen_stays_and_is_marked(page, endpoint):
     await visit(page, 40)
     async with slow(page, endpoint, 44):
         await shows(page, "quadrille.state.placeholder")

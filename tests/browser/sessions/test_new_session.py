@@ -265,7 +265,7 @@ async def test_exchanged_cameras_may_stay(form):
 
 
 @pytest.mark.slow
-async def test_what_cannot_be_read_is_said_before_anything_is_made(form):
+async def test_unreadable_files_are_named_before_anything_is_made(form):
     page, program = form
     program.survey = SURVEY | {"cameras": [], "rig": None, "assigned": {}, "problems": ["no calibration of ours"]}
     program.outcomes = [[PASSED, {"failed": "no video for camera LEFT"}]] * 2

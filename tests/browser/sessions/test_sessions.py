@@ -71,7 +71,7 @@ async def test_a_session_is_opened_by_its_folder_or_from_the_list(fresh_page, en
     assert endpoint.received == []
 
 
-async def test_where_no_session_was_opened_before_a_new_one_is_offered(fresh_page):
+async def test_a_new_session_is_offered_at_the_first_start(fresh_page):
     page = fresh_page
     await page.route(re.compile(r"/sessions$"), lambda route: route.fulfill(json=RECENT | {"recent": []}))
     await page.route("**/sessions/models", lambda route: route.fulfill(json={"models": [], "default": "gavrila34"}))
@@ -82,7 +82,7 @@ async def test_where_no_session_was_opened_before_a_new_one_is_offered(fresh_pag
 
 
 @pytest.mark.slow
-async def test_where_no_session_can_be_made_the_page_says_why(fresh_page):
+async def test_the_page_says_why_no_session_can_be_made(fresh_page):
     page = fresh_page
     await page.route(
         re.compile(r"/sessions(/|$)"),

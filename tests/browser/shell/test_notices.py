@@ -50,7 +50,7 @@ async def test_notices_leave_panes_and_bars_free(page, endpoint):
 
 
 @pytest.mark.slow
-async def test_what_is_not_saved_says_why_is_tried_again_and_holds_the_page(fresh_page, endpoint):
+async def test_an_unsaved_edit_says_why_and_holds_the_page(fresh_page, endpoint):
     page = fresh_page
     assert not await page.locator("#unsaved").is_visible()
     endpoint.state |= {"saved": False, "save_error": "the disk is full; make room"}

@@ -62,7 +62,7 @@ async def test_it_says_why_not(page, endpoint):
 
 
 @pytest.mark.slow
-async def test_what_was_used_lately_comes_first_and_enter_alone_does_nothing(page, endpoint):
+async def test_recent_commands_come_first_and_enter_alone_does_nothing(page, endpoint):
     await open_palette(page)
     first = await found(page)
     assert await page.locator("#palette-list [aria-selected=true]").count() == 0
@@ -85,7 +85,7 @@ SUITING = "[...document.querySelectorAll('#palette-list li')].filter((li) => li.
 
 
 @pytest.mark.slow
-async def test_what_suits_the_state_comes_next(page, endpoint):
+async def test_the_next_step_suits_the_state(page, endpoint):
     async def suiting():
         await open_palette(page)
         rows = await page.evaluate(f"{SUITING}.map((li) => li.querySelector('span').textContent)")

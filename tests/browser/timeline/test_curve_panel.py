@@ -54,7 +54,7 @@ async def test_curves_are_sent_only_while_they_are_open(page, endpoint):
 
 
 @pytest.mark.slow
-async def test_what_is_open_is_remembered(curves, endpoint):
+async def test_open_sections_are_remembered(curves, endpoint):
     await curves.locator("#drawer-tabs").get_by_text("Torso", exact=True).click()
     await shows(curves, "quadrille.state.curves.group === 'torso'")
     await curves.reload()

@@ -161,7 +161,7 @@ async def test_the_wheel_zooms_where_the_pointer_is(page):
     await shows(page, "quadrille.state.visible === null")
 
 
-async def test_what_is_zoomed_is_moved_by_the_middle_button_and_by_the_overview(page):
+async def test_a_zoomed_view_is_moved_by_button_and_overview(page):
     for _ in range(4):
         await page.keyboard.press("z")
     await shows(page, "quadrille.state.visible?.end - quadrille.state.visible?.start < 20")

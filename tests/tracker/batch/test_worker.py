@@ -157,7 +157,7 @@ def test_the_lock_of_somebody_else_stays(tmp_path):
     assert (session / LOCK_FILE).exists()
 
 
-def test_who_lost_a_claim_writes_no_result(tmp_path):
+def test_a_worker_without_its_claim_writes_no_result(tmp_path):
     manifest = make_batch(tmp_path, 1)
     task, held = manifest.claim_next()
     held.path.write_bytes(msgspec.json.encode(this_holder()))

@@ -70,7 +70,7 @@ def test_twins(name, other):
         (PartDimensions(float("nan"), (0.05, 0.05)), "found nan"),
     ],
 )
-def test_what_no_body_has_is_refused(part, message):
+def test_sizes_that_no_body_has_are_refused(part, message):
     model = load_model("gavrila22")
     sizes = dimensions_of(model)
     with pytest.raises(TrackerError, match=message):

@@ -152,7 +152,7 @@ def test_the_key_changes_with_what_a_kernel_reaches(clone, name, old, new, chang
         ("return 2", "return return"),
     ],
 )
-def test_what_cannot_be_followed_has_no_key(clone, old, new):
+def test_kernels_that_cannot_be_followed_have_no_key(clone, old, new):
     clone.edit("caller", old, new)
     with pytest.raises(UnknownSourceError):
         clone.keys()

@@ -13,7 +13,7 @@ def test_quantiles_are_numpys(n):
     assert median(values[:, 0]).shape == ()
 
 
-def test_what_is_asked_stays_as_it_was():
+def test_arguments_stay_as_they_were():
     values = np.array([3.0, 1.0, 2.0])
     assert float(median(values)) == 2
     assert values.tolist() == [3, 1, 2]

@@ -114,7 +114,7 @@ def test_masks_come_first_and_may_be_numbered(camera, tmp_path):
     assert found(replace(masked, background=None), k=3).source == "none"  # not the recording's own background
 
 
-def test_what_a_mask_leaves_unknown_is_neither_a_person_nor_background(camera, tmp_path):
+def test_unknown_pixels_of_a_mask_are_neither_person_nor_background(camera, tmp_path):
     labels = np.zeros((H, W), np.uint8)
     labels[10:30, 10:30], labels[50:70, 50:70], labels[30:50, 30:50] = 1, ANYONE, UNKNOWN
     cv2.imwrite(str(tmp_path / "000004.png"), labels)

@@ -343,7 +343,7 @@ def same_evidence(views, others):
 
 
 @pytest.mark.parametrize("background", [True, False])
-def test_what_is_looked_at_ahead_is_what_would_be_found_later(sample, real_frame, monkeypatch, background):
+def test_evidence_read_ahead_equals_evidence_read_later(sample, real_frame, monkeypatch, background):
     session, recording = sample
     cameras = session.cameras if background else [replace(c, background=None) for c in session.cameras]
     observer, linked = Observer(cameras, recording), []
@@ -370,7 +370,7 @@ def test_what_is_looked_at_ahead_is_what_would_be_found_later(sample, real_frame
     assert len(linked) == 9 + 4 + 4
 
 
-def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():
+def test_a_fault_read_ahead_is_raised_when_asked_for():
     observer = Observer([source(camera_at("c", (4, 0, 0)))], FailingFrames(np.zeros((480, 640, 3), np.uint8)))
     observer.prefetch(5)
     with pytest.raises(RecordingError, match="found 5"):

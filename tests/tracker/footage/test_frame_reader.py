@@ -59,7 +59,7 @@ def test_a_group_that_does_not_fit_is_decoded_in_parts(tmp_path, decoded):
     assert decoded_backward(video, decoded) <= N + (N - third) + (N - 2 * third)
 
 
-def test_what_is_kept_is_bounded_for_all_cameras_together(tmp_path, decoded, monkeypatch):
+def test_the_cache_is_bounded_for_all_cameras_together(tmp_path, decoded, monkeypatch):
     monkeypatch.setattr(passed_frames, "MAX_BYTES", 20 * YUV_BYTES)
     path = encode(tmp_path / "a.mp4", gop=N)
     with Recording([CameraSource(CAMERA, path)] * 2, cache_bytes=0) as recording:

@@ -107,7 +107,7 @@ def test_damaged_images_are_none_and_never_raise(tmp_path, suffix):
         assert image is None or image.dtype == np.uint8
 
 
-def test_what_is_no_file_is_not_waited_for(tmp_path):
+def test_an_irregular_file_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "a.png")
     with pytest.raises(RecordingError, match="expected a file"):
         read_image_or_none(tmp_path / "a.png", "here")

@@ -57,7 +57,7 @@ def test_frames_listed_so_far_are_those_that_they_will_be(tmp_path, in_steps, b_
     video.close()
 
 
-def test_who_waits_for_a_frame_gets_it_or_hears_of_the_end(tmp_path, in_steps):
+def test_a_waiting_reader_gets_the_frame_or_the_end(tmp_path, in_steps):
     video = VideoFile(encode(tmp_path / "a.mp4", n=90, gop=12), "cam", in_background=True)
     found = []
 
@@ -78,7 +78,7 @@ def test_who_waits_for_a_frame_gets_it_or_hears_of_the_end(tmp_path, in_steps):
     in_steps()
 
 
-def test_what_is_wrong_with_a_file_comes_out_though_late(tmp_path):
+def test_a_faulty_file_is_named_though_late(tmp_path):
     path = encode(tmp_path / "a.mkv", n=90, gop=12)
     data = path.read_bytes()
     path.write_bytes(data[: len(data) * 2 // 3])

@@ -53,7 +53,7 @@ def test_stopped_it_is_consistent_and_goes_on(proxy, clip, tmp_path):
     assert [number(proxy.read(k)) for k in (19, 20, 59)] == [19, 20, 59]
 
 
-def test_what_a_dead_program_left_half_is_cut_off(proxy, clip, tmp_path):
+def test_half_a_row_of_a_dead_program_is_cut_off(proxy, clip, tmp_path):
     make(proxy, clip, 21)
     pictures, index = tmp_path / "proxies" / "cam.mjpeg", tmp_path / "proxies" / "cam.index"
     with pictures.open("ab") as file:

@@ -82,7 +82,7 @@ def test_rays_are_those_of_opencv(lens):
     st.floats(-5, 5),
     st.tuples(st.floats(-400, 400), st.floats(-300, 300)),
 )
-def test_what_is_projected_comes_back(focal, k1, k2, skew, offset_px):
+def test_projected_points_come_back(focal, k1, k2, skew, offset_px):
     K = np.array([[focal, skew, 320.0], [0.0, focal, 240.0], [0.0, 0.0, 1.0]])
     c = fisheye(K=K, distortion=np.array([k1, k2, 0.0, 0.0]))
     px = np.array([320.0, 240.0]) + offset_px

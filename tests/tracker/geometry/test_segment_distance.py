@@ -60,7 +60,7 @@ def test_filled_up_by_points_that_are_nowhere():
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10_000), st.integers(0, 70), st.integers(0, 12), st.sampled_from([1.0, 20.0, 500.0]))
-def test_those_within_reach_of_visible_pieces_stay_sorted(seed, n_points, n_pieces, reach):
+def test_segments_near_visible_pieces_stay_sorted(seed, n_points, n_pieces, reach):
     rng = np.random.default_rng(seed)
     size = np.array([WIDTH, HEIGHT])
     points = rng.uniform(0, size, (n_points, 2)).astype(np.float32)

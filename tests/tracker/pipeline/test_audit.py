@@ -143,7 +143,7 @@ def test_poses_of_an_earlier_body_are_compared_in_the_present_one(session, store
         np.testing.assert_array_equal(stay[k].pose.values, before[k].values)
 
 
-def test_what_is_locked_stays_and_other_people_are_held(session, store, estimate):
+def test_locked_dofs_stay_and_other_people_are_held(session, store, estimate):
     """They are taken where they are stored, in their neutral pose on other frames."""
     (person,) = session.people
     beside = replace(person, name="beside")

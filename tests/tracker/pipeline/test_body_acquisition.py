@@ -89,7 +89,7 @@ def test_known_joints_count_more_than_the_pose_fitted_to_them(session, store):
     np.testing.assert_allclose(placed.targets_world, [joints[n] for n in names])
 
 
-def test_where_points_were_seen_counts_more_than_the_pose(session, store):
+def test_seen_points_count_more_than_the_pose(session, store):
     """The ends of drags, and pins before them; in undistorted pixels, with a hand's accuracy."""
     name, camera = session.people[0].name, session.cameras[1].camera
     seen = {"left_wrist": {camera.name: [100.0, 200.0], "gone": [1.0, 2.0]}, "head": {camera.name: [50.0, 60.0]}}

@@ -96,7 +96,7 @@ def test_a_preset_body_takes_the_height_of_the_points(tmp_path):
 
 
 @pytest.mark.slow
-def test_who_has_no_key_points_is_named(tmp_path):
+def test_people_without_key_points_are_named(tmp_path):
     session, _ = imported(tmp_path)
     other = make_session(tmp_path / "other", N, people=("ann", "bob"))
     (tmp_path / "session" / "observations").rename(tmp_path / "other" / "observations")

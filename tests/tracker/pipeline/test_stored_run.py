@@ -285,7 +285,7 @@ def test_another_task_begins_at_its_first_frame(session, store, frames, settings
         assert not run.tracked
 
 
-def test_what_a_former_version_interrupted_goes_on_or_begins_again(session, store, blocks):
+def test_an_interrupted_run_of_a_former_version_goes_on_or_restarts(session, store, blocks):
     """Settings of the same values go on, also without their method; of other names they begin at the first frame."""
     with run_of(session, store) as run:
         track(run, 2)

@@ -109,7 +109,7 @@ def test_time_of_another_clock_places_no_row(start_s, number, rate):
     assert placed(file, rate, n_frames=60, first_frame=7).frames.tolist() == list(range(7, 37))
 
 
-def test_what_is_odd_about_the_file_is_said_too():
+def test_odd_parts_of_a_file_are_named():
     file = replace(line(5, 30), notes=("it is odd",))
     assert placed(file, 30, n_frames=5).notes == ("it is odd",)
 

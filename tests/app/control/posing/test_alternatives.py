@@ -89,7 +89,7 @@ def test_people_who_may_be_each_other_are_exchanged_together(tracked):
 
 
 @pytest.mark.slow
-def test_who_vouches_for_a_pose_has_chosen(tracked):
+def test_vouching_for_a_pose_is_a_choice(tracked):
     controller, *_ = tracked
     controller.navigation.seek(1)
     controller.navigation.select(BOB, None)

@@ -37,7 +37,7 @@ def test_a_drag_holds_the_point_it_placed_on_its_frame_until_it_is_released(open
     assert controller.state.held == frozenset()
 
 
-def test_what_did_not_move_is_not_held_and_a_spine_cannot_be(opened):
+def test_still_points_and_spines_are_not_held(opened):
     controller = opened()
     controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(pixel_of(controller, "left_wrist")))
     controller.dragging.end(PAGE)

@@ -127,7 +127,7 @@ def test_the_body_follows_a_live_pin_in_one_entry(opened, session):
 
 
 @pytest.mark.slow
-def test_where_a_live_pin_ends_decides_not_its_way(opened):
+def test_the_end_of_a_live_pin_decides(opened):
     controller = opened()
     drag(controller, "torso", (4.0, 0.0))
     start = pixel_of(controller, "right_wrist")

@@ -54,7 +54,7 @@ def test_a_leaf_lists_what_is_free():
         ({"leaf": {"person": 0, "name": "tail", "step_rad": 1}}, "found 'tail'"),
     ],
 )
-def test_what_no_search_can_work_with_is_refused(changes, why):
+def test_impossible_search_settings_are_refused(changes, why):
     with pytest.raises(TrackerError, match=why):
         changed(BEFORE, MODELS, changes)
 

@@ -135,7 +135,7 @@ def test_a_candidate_is_previewed_and_taken(opened):
         controller.replay.take(run.number, 99)
 
 
-def test_what_is_locked_stays_in_a_run_again_and_in_what_is_taken(opened):
+def test_locked_dofs_stay_in_a_second_run_and_in_taken_poses(opened):
     controller = opened()
     model = controller.models[0]
     dof = model.dof_names.index("left_shoulder.abduction")

@@ -57,7 +57,7 @@ def test_a_verified_pose_that_is_no_keyframe_is_reviewed_and_undo_takes_the_mark
     assert not controller.stored_poses.timeline()[0]["reviewed"]
 
 
-def test_what_cannot_be_planned_or_decided_is_refused(opened):
+def test_impossible_plans_and_decisions_are_refused(opened):
     controller = opened()
     annotating = planned(controller)
     with pytest.raises(TrackerError, match="all of them are planned already"):

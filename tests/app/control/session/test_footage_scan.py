@@ -48,7 +48,7 @@ def fresh(session, gate):
 
 
 @pytest.mark.slow
-def test_what_is_listed_is_shown_and_the_rest_follows(fresh, gate):
+def test_listed_frames_are_shown_and_the_rest_follows(fresh, gate):
     wait_for(lambda: fresh.state.cost_px is not None)
     assert 0 < fresh.state.footage.listed < 1
     assert fresh.frames.listed(0)
@@ -68,7 +68,7 @@ def test_what_is_listed_is_shown_and_the_rest_follows(fresh, gate):
 
 
 @pytest.mark.slow
-def test_what_is_wrong_with_a_file_is_said_when_it_comes_out(session, monkeypatch):
+def test_a_faulty_file_is_named_when_it_is_found(session, monkeypatch):
     def fail(container, where, report=None):
         raise RecordingError(f"{where} is truncated; copy it again")
 

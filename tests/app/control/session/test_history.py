@@ -62,7 +62,7 @@ def test_the_history_lives_on_after_a_restart(edited, opened):
 
 
 @pytest.mark.slow
-def test_what_a_full_disk_refuses_is_shown_waits_and_is_saved_by_hand(edited, opened):
+def test_an_edit_on_a_full_disk_is_shown_and_saved_by_hand(edited, opened):
     with full_disk():
         edited.navigation.seek(6)
         drag(edited, "torso", (30.0, 0.0))

@@ -104,7 +104,7 @@ def test_a_pose_that_changes_afterwards_is_compared_again_and_no_longer_decided(
     assert controller.state.other_copy.differences[0][1].distance_m != before
 
 
-def test_where_this_session_has_no_pose_only_theirs_can_be_taken(both):
+def test_a_frame_without_own_pose_can_only_take_theirs(both):
     controller, _ = compared(both)
     for decision in ("keep", "mean"):
         with pytest.raises(TrackerError, match="expected a pose of person on frame 2 in this session, found none"):

@@ -61,7 +61,7 @@ def tracked(controller, tracker, until):
     wait_for(lambda: controller.state.track.message)
 
 
-def test_what_is_of_an_earlier_calibration_is_tracked_again_and_no_more(placed, tracker):
+def test_poses_of_an_earlier_calibration_alone_are_tracked_again(placed, tracker):
     tracked(placed, tracker, 9)
     corrected(placed)
     wait_for(lambda: placed.state.calibration.outdated == {0: (2, 3, 4, 5, 6, 7, 8, 9)})

@@ -93,7 +93,7 @@ def test_all_poses_but_keyframes_are_estimated_as_one_entry(corrected, estimate)
     assert corrected._session_state.saver.record(0, CORRECTED).status == ""
 
 
-def test_what_is_done_is_shown_and_nothing_is_written_before_the_end(corrected, held):
+def test_progress_is_shown_and_nothing_written_before_the_end(corrected, held):
     corrected.navigation.seek(5)
     corrected.ranges.estimate(3, 11)
     wait_for(lambda: corrected.state.ranges.done == 2)  # of eight poses, after three of nine frames

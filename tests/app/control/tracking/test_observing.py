@@ -111,7 +111,7 @@ def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller,
     assert (whole.name, whole.n_frames) == ("detected", controller.session.n_frames)
 
 
-def test_what_is_detected_is_shown_as_it_comes_while_the_user_watches(controller, detector, monkeypatch):
+def test_detected_people_are_shown_while_the_user_watches(controller, detector, monkeypatch):
     monkeypatch.setattr(observing, "_SHOWN_EVERY_S", 0.0)
     frames, n_drawn = [], []
 

@@ -186,7 +186,7 @@ def test_a_frame_that_jumps_is_named_and_no_longer_once_it_is_mended(two_keys):
     wait_for(lambda: not two_keys.state.inconsistent_frames)
 
 
-def test_what_is_done_for_several_people_counts_frames_and_people(couple):
+def test_work_on_several_people_counts_frames_and_people(couple):
     for frame in (0, 6):
         couple.navigation.seek(frame)
         for person in (0, 1):

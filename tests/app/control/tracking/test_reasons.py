@@ -63,7 +63,7 @@ def test_the_run_is_learnt_once_and_again_when_its_poses_change(doubted, monkeyp
     assert len(learnt) == 2
 
 
-def test_what_other_cameras_have_shown_is_not_usual():
+def test_other_cameras_do_not_say_what_is_usual():
     """The same poses and people, but corrected cameras."""
     poses, observer = {0: (np.zeros(3),)}, object()
     learnt = reasons._Learnt(None, (0,), poses, observer)

@@ -317,7 +317,7 @@ def test_a_run_writes_no_more_often_than_it_should(placed, tracker, monkeypatch)
     assert len(written) <= 2 + (time.monotonic() - began) / 0.5
 
 
-def test_what_cannot_be_tracked_is_said(opened, tracker):
+def test_an_impossible_run_has_a_sentence(opened, tracker):
     controller = opened()
     with pytest.raises(TrackerError, match="pose the body"):
         controller.tracking.start(backward=False, until=None)
@@ -337,7 +337,7 @@ def test_a_tracker_that_fails_says_so_and_loses_nothing(placed, tracker):
 
 
 @pytest.mark.slow
-def test_what_a_full_disk_refused_is_written_later(placed, tracker, monkeypatch):
+def test_an_edit_refused_by_a_full_disk_is_written_later(placed, tracker, monkeypatch):
     real = AnnotationStore.commit
 
     def full(*_, **__):

@@ -124,7 +124,7 @@ def test_a_second_click_in_a_view_takes_the_place_of_the_first(opened):
     assert controller.state.floor.picking.picks[0].point_world == pytest.approx(corners()[0], abs=1e-6)
 
 
-def test_what_cannot_be_is_said(opened):
+def test_an_impossible_request_has_a_sentence(opened):
     controller = opened()
     do(controller, "begin")
     do(controller, "mark", camera=0, u=3.0, v=4.0)

@@ -40,7 +40,7 @@ def test_people_whom_nobody_has_placed_stand_beside_each_other(couple):
     assert pixel_of(couple, "torso", person=BOB)[0] > pixel_of(couple, "torso", person=ANN)[0] + 50
 
 
-def test_who_is_hidden_is_drawn_nowhere_and_stays_as_he_is(couple):
+def test_a_hidden_person_is_not_drawn_and_stays(couple):
     for person in (ANN, BOB):
         couple.pinning.begin(PAGE, 0, FRONT, person, "left_wrist", (100.0, 100.0), False)
         couple.pinning.end(PAGE)
@@ -54,7 +54,7 @@ def test_who_is_hidden_is_drawn_nowhere_and_stays_as_he_is(couple):
     assert drawn_people(couple) == [{ANN, BOB}] * 4
 
 
-def test_what_the_other_hides_is_dashed_even_while_he_is_hidden(couple):
+def test_parts_hidden_by_another_person_are_dashed(couple):
     drag(couple, "torso", pixel_of(couple, "torso", person=ANN) - pixel_of(couple, "torso", person=BOB), person=BOB)
 
     def visible_px():

@@ -96,7 +96,7 @@ def test_the_gradient_by_a_correction_is_the_slope_of_the_cost(column):
     assert problem.linearize(state).gradient[N_CORRECTIONS + column] == pytest.approx(slope, rel=0.15)
 
 
-def test_where_the_cost_is_not_low_enough_it_is_all_that_is_found():
+def test_a_sole_candidate_is_taken_at_any_cost():
     frames = viewed({}, [0])
     parameters = [SizeParameters(frames[0].bodies[0].model)]
     state = as_tracked(frames, parameters)

@@ -121,7 +121,7 @@ def test_frames_whose_errors_are_alike_count_as_fewer():
     assert height_sigma(4, 0.0) < height_sigma(4, 0.3) < alone
 
 
-def test_what_is_not_seen_stays_as_uncertain_as_before():
+def test_unseen_parts_stay_as_uncertain_as_before():
     model = load_model("gavrila22", 1.7)
     parameters = SizeParameters(model)
     nothing = [f._replace(views=()) for f in sighted(model, model, range(2))]

@@ -115,7 +115,7 @@ def test_a_limb_in_the_open(gavrila, couple):
 
 
 @pytest.mark.parametrize("way", [1, -1])
-def test_what_hides_a_limb_beside_the_image_is_known_too(way):
+def test_an_occluder_beside_the_image_is_known(way):
     """A ball behind a wall scores 0, also outside the image; beside the wall it scores slightly negative there."""
     ball, wall = solid((0.1, 0.1, 0.2)), solid((0.1, 0.4, 1.0))
     camera = camera_at("front", (4.0, 0.0, 0.0))

@@ -68,7 +68,7 @@ def test_other_clothes_score_worse(gavrila, stand, seen):
     np.testing.assert_allclose(np.delete(changed, swapped_parts), 0, atol=0.2)
 
 
-def test_where_all_is_of_one_colour_nothing_is_said(gavrila, stand):
+def test_one_colour_everywhere_gives_no_evidence(gavrila, stand):
     bodies = [PosedBody(gavrila, stand)]
     views = [replace(v, colors=np.full((480, 640, 3), 120, np.uint8)) for v in dressed(bodies, CAMERAS, GRAY)]
     colors = Colors(views, bodies)

@@ -26,7 +26,7 @@ def test_a_limb_without_its_usual_evidence_is_elsewhere(gavrila):
     assert of_limb(gavrila, nats, "right_calf").max() < 0
 
 
-def test_what_is_seldom_seen_or_looks_like_its_surroundings_says_little(gavrila):
+def test_rare_or_camouflaged_parts_weigh_little(gavrila):
     calf, forearm = (gavrila.part_index[n] for n in ("left_calf", "left_forearm"))
     twins = [gavrila.part_index[n] for n in ("right_calf", "right_forearm")]
     dull, hidden = evidence(gavrila), evidence(gavrila)

@@ -163,7 +163,7 @@ def test_best_places_apart(gavrila):
 
 
 @pytest.mark.slow
-def test_where_nothing_is_better_the_pose_is_kept(gavrila):
+def test_a_pose_without_better_ones_is_kept(gavrila):
     truth = posed(gavrila, 1)
     staged = Staged(gavrila, truth, truth)
     staged.here = staged.scorer.scored(gavrila, solve(gavrila, truth, staged.blocks, max_iterations=60, tolerance=1e-7))

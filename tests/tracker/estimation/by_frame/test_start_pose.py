@@ -93,7 +93,7 @@ def test_limbs_are_exchanged_in_space(gavrila):
 
 
 @pytest.mark.slow
-def test_who_was_tracked_before_or_may_not_be_searched_stays(gavrila, truth, views):
+def test_tracked_and_unsearchable_people_stay(gavrila, truth, views):
     start = beside(gavrila, truth, 0)
     assert settle(gavrila, start, views) is not None
     assert settle(gavrila, start, views, PersonMemory(gavrila, [truth, start])) is None
@@ -111,7 +111,7 @@ NOTHING, SUSPECT, MISSING = (
     (1, NOTHING, False), (1, SUSPECT, True), (1, MISSING, True),
     (2, NOTHING, False), (2, SUSPECT, False), (2, MISSING, True),
 ])  # fmt: skip
-def test_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, quality, searched):
+def test_people_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, quality, searched):
     bodies, asked = (PosedBody(gavrila, truth),) * n_people, []
     monkeypatch.setattr(start_pose, "estimate_at", lambda *_: SimpleNamespace(quality=quality))
     monkeypatch.setattr(start_pose, "search_start", lambda _, person, at, __: asked.append(person) or (at[person], ()))

@@ -194,7 +194,7 @@ def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
     assert found.alternatives == ((), ())
 
 
-def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
+def test_locked_limbs_are_neither_refined_nor_searched(gavrila, monkeypatch):
     """The arm that jumps is locked: it stays to the last bit, is not searched, and everything else is followed."""
     truth = dancing(gavrila, 4, jump_at=2)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
@@ -236,7 +236,7 @@ def test_a_keyframe_moves_what_is_locked_from_there_on(balls):
 
 
 @pytest.mark.slow
-def test_what_the_prediction_refused_is_looked_at_again(gavrila):
+def test_segments_refused_by_the_prediction_are_tried_again(gavrila):
     """The prediction accepts no edge of an arm that jumps: it is found among all edges."""
     truth = dancing(gavrila, 5, jump_at=3)
     found = list(

@@ -18,6 +18,6 @@ def test_rank_and_condition_count_what_may_move():
     assert of([0.0, 0.0, 0.0])[0] == 0
 
 
-def test_what_single_precision_cannot_tell_from_zero_has_no_rank():
+def test_zero_in_single_precision_has_no_rank():
     assert of([1.0, 1e-9, 1.0])[0] == 2
     assert of([1.0, 1e-5, 1.0])[0] == 3

@@ -279,7 +279,7 @@ def test_views_without_edges_have_no_say(gavrila):
     assert not nothing.hessian.any()
 
 
-def test_what_lies_outside_the_image_has_no_say():
+def test_points_outside_the_image_have_no_weight():
     """The ball is cut off by the right border: only the part inside the image counts."""
     # 0.3 m of 520 px at 4 m: the border is at y = 2.46 m.
     ball = at(BALL.model, 0, 2.46, 0)

@@ -231,7 +231,7 @@ class Rough:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_what_gains_too_little_ends_the_descent(seed):
+def test_a_small_gain_ends_the_descent(seed):
     """Near a rough minimum steps are refused repeatedly, each shorter than the last; a smallest decrease ends this."""
     near, rng = posed(GAVRILA, seed), np.random.default_rng(seed)
     start = shaken(GAVRILA, near, rng, 0.3, 0.1)

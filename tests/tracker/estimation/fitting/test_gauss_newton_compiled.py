@@ -166,7 +166,7 @@ def test_a_limb_alone(staged):
     np.testing.assert_array_equal(found.pose[~limb.dofs], staged.start[~limb.dofs])
 
 
-def test_what_nothing_holds(staged):
+def test_points_that_nothing_holds(staged):
     """Views without evidence: no step is worth taking, and no matrix is definite."""
     blank = [replace(v, points_px=v.points_px[:0], normals=v.normals[:0]) for v in staged.views]
     found, expected = both(staged, [ContourResiduals(blank, staged.bodies)])
@@ -195,7 +195,7 @@ def test_steps_are_those_of_the_readable_version(n):
         ("another block", "found PointTargets"), ("a ball joint", "found the ball joint 'left_shoulder'"),
     ],
 )  # fmt: skip
-def test_what_it_does_not_cover_is_refused_by_name(staged, strange, named):
+def test_uncovered_cases_are_refused_by_name(staged, strange, named):
     model, blocks = staged.model, staged.blocks()
     assert solver_of(model) is solve_compiled
     if strange == "two matches":

@@ -47,7 +47,7 @@ def test_a_point_of_the_silhouette_joins_the_edge_it_lies_on():
 @pytest.mark.parametrize(
     ("outline", "turned"), [([102.5, 50], 0.0), ([101, 50], 0.6), ([100, 57], 0.0)], ids=["beside", "aslant", "along"]
 )
-def test_what_lies_elsewhere_or_runs_another_way_stays_by_itself(outline, turned):
+def test_separate_or_crossing_tracks_stay_apart(outline, turned):
     first, second = found([[100, 50]], [outline], turned=turned)
     assert first == pytest.approx([100, 50, 1, 0, 1, 1])
     assert second == pytest.approx([*outline, np.cos(turned), np.sin(turned), 0.5, 1])

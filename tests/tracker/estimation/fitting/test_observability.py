@@ -93,7 +93,7 @@ def test_a_limb_that_no_view_shows():
     assert told == "extension of the left knee: not observable, because no view shows left calf"
 
 
-def test_what_only_the_spread_keeps_near_0_is_not_observable():
+def test_parameters_held_by_the_prior_alone_are_not_observable():
     body, cameras = standing(), [camera_at("front", (4.0, 0.0, 0.6))]
     found = observe_pose([body], cameras)
     dof = NAMES.index("spine.elevation")  # a forward bend is along the only line of sight

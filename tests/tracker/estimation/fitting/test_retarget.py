@@ -44,7 +44,7 @@ def test_the_same_body_keeps_the_pose_to_the_last_bit(bodies):
     assert retarget_pose(values, was, was) is values
 
 
-def test_what_is_locked_stays(bodies):
+def test_locked_dofs_stay(bodies):
     was, becomes = bodies
     values = posed(was, 1)
     free = np.array([not name.startswith("left_elbow") for name in was.dof_names])

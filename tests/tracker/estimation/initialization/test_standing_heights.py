@@ -61,7 +61,7 @@ def test_the_person_is_followed(around):
     assert around(two, n_people=2)[0] == 1.56
 
 
-def test_who_cannot_be_told_from_others_is_not_measured(around):
+def test_people_who_look_alike_are_not_measured(around):
     assert around(lambda k: [scene(0.0, 1.80)], n_people=2)[0] is None
     assert around(lambda k: [scene(0.6, 1.80)])[0] is None
 

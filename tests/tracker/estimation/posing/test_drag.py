@@ -55,7 +55,7 @@ def test_a_dragged_joint_stays_under_the_pointer(gavrila, pose, point, seed):
 
 @pytest.mark.parametrize("way", [(6, 0), (-6, 3), (-3, -5), (10, -10)])
 @pytest.mark.parametrize("point", ["left_wrist", "right_wrist", "left_ankle", "right_ankle"])
-def test_where_two_bones_allow_it_the_depth_is_kept(gavrila, pose, point, way):
+def test_two_bones_keep_the_depth(gavrila, pose, point, way):
     start = SIDE.project(place(gavrila, pose, point))
     hand = grab(gavrila, pose, SIDE, point, start)
     end = place(gavrila, drag(hand, start + way, pose), point)
@@ -63,7 +63,7 @@ def test_where_two_bones_allow_it_the_depth_is_kept(gavrila, pose, point, way):
     assert np.linalg.norm(SIDE.project(end) - start - way) < 0.5
 
 
-def test_where_one_bone_decides_the_depth_the_pointer_is_followed(gavrila, pose):
+def test_the_pointer_is_followed_if_one_bone_decides_the_depth(gavrila, pose):
     # The elbow moves on a sphere around the shoulder: at its old depth it would stay 4 px behind.
     start = SIDE.project(place(gavrila, pose, "left_elbow"))
     hand = grab(gavrila, pose, SIDE, "left_elbow", start)
@@ -238,7 +238,7 @@ def test_no_drag_of_a_limb_moves_another(name, seed):
                     )
 
 
-def test_what_a_hand_hardly_needs(gavrila):
+def test_points_that_a_hand_hardly_needs(gavrila):
     assert minor_points(gavrila) == ("neck",)  # rigid there
     bending = load_model("gavrila34")
     assert sorted(minor_points(bending)) == ["left_collarbone", "neck", "right_collarbone", "spine", "waist"]

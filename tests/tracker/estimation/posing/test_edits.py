@@ -74,7 +74,7 @@ def test_mirrored_twice_is_the_same_pose(model, seed):
     np.testing.assert_allclose(np.abs(model.difference(twice, values)).max(), 0, atol=1e-4)
 
 
-def test_what_is_taken_over_is_exact_and_the_rest_untouched(model):
+def test_taken_poses_are_exact_and_the_rest_untouched(model):
     a, b = any_pose(model, 1), any_pose(model, 2)
     dofs = np.isin(model.dof_joint, [0, len(model.joints) // 2])
     result = copy_dofs(model, a, b, dofs)

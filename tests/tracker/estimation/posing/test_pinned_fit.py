@@ -82,7 +82,7 @@ def test_two_people_are_fitted_together_each_to_own_pins(two_people):
         assert max(off_px(GAVRILA, found.poses[person], pins[person])) < 2
 
 
-def test_who_is_not_asked_for_stays(two_people):
+def test_other_people_stay(two_people):
     truth, views, start = two_people
     found = fit_frame([PosedBody(GAVRILA, p) for p in start], [[], []], CAMERAS, views, SETTINGS, [1])
     np.testing.assert_array_equal(found.poses[0], start[0])
@@ -152,7 +152,7 @@ def test_pins_of_the_trunk_leave_limbs_that_were_placed():
     assert moved_m({}) > 0.1
 
 
-def test_what_is_locked_stays_to_the_last_bit(two_people):
+def test_locked_dofs_stay_to_the_last_bit(two_people):
     truth, views, start = two_people
     rng = np.random.default_rng(0)
     free = rng.uniform(size=GAVRILA.n_dofs) < 0.5

@@ -52,7 +52,7 @@ def test_a_view_that_alone_holds_a_limb_does_not_hide_what_the_others_say(gavril
     assert found == pytest.approx(of_arm(gavrila, 0.25), abs=1e-6)
 
 
-def test_what_is_nearly_the_same_pose_is_not_elsewhere(gavrila, raised):
+def test_nearly_the_same_pose_is_not_elsewhere(gavrila, raised):
     here, other, near = raised
     (found,) = masses(gavrila, [frame(gavrila, [here, near], np.zeros((2, 3)))], [here])
     assert not found.any()

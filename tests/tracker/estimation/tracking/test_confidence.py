@@ -117,7 +117,7 @@ def test_a_limb_is_doubtful_where_it_may_be_off_and_lost_where_it_may_be_lost():
     assert seen == {"good", "doubtful", "lost"}
 
 
-def test_what_is_plain():
+def test_plain_data():
     undressed, vague = LimbFeatures("x", *ASTRAY), CLEAR._replace(name="y", free_spread_px=40.0)
     assert classify(PoseQuality(0.05, 3, 0.05, (CLEAR, CLEAR))) == "good"
     for limb in (undressed, vague):
@@ -146,7 +146,7 @@ def test_what_is_plain():
         (PoseQuality(0.0, 0, 0.05, ()), "no view shows the body"),
     ],
 )
-def test_what_is_said_against_a_pose(found, words):
+def test_contradictions_of_a_pose(found, words):
     assert reason(found) == words
 
 

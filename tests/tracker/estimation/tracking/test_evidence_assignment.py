@@ -118,7 +118,7 @@ def test_alone_one_has_everything():
 
 
 @pytest.mark.parametrize("person", [0, 1])
-def test_what_the_other_explains_is_the_others(person):
+def test_evidence_that_the_other_explains_is_the_others(person):
     bodies = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)]
     view = seen(bodies)
     own = EvidenceAssignment(EvidencePool([view]), bodies).own(person)[0]
@@ -132,7 +132,7 @@ def test_what_the_other_explains_is_the_others(person):
     assert view.distance[v, u].max() < 2
 
 
-def test_what_nobody_explains_is_everybodys():
+def test_unexplained_evidence_is_everybodys():
     """A third figure that nobody knows of: its edges stay with both."""
     bodies = [at(BALL, 0, -0.6, 0), at(BALL, 0, 0.6, 0)]
     stranger = at(BALL, 0, 0, 0)
@@ -153,7 +153,7 @@ def test_far_from_everybody_else_nothing_is_in_reach():
     )
 
 
-def test_what_both_explain_stays_with_both():
+def test_evidence_that_both_explain_stays_with_both():
     """Two contours that nearly coincide share their edges; the residuals give each point to the nearer one."""
     bodies = [at(BALL, 0, 0, 0), at(BALL, 0.4, 0.01, 0)]
     view = seen(bodies)

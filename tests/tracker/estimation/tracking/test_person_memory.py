@@ -40,7 +40,7 @@ def memory(gavrila):
     return PersonMemory(gavrila, gavrila.neutral(), free, alone=False)
 
 
-def test_what_is_locked_is_not_due(memory):
+def test_locked_limbs_are_not_due(memory):
     assert {x.name for x in memory.limbs} == {"right_forearm", "left_calf", "right_calf"}
     assert {x.name for x in memory.limbs_to_search(seen(memory, SUSPECT))} == {x.name for x in memory.limbs}
     assert memory.limbs_to_search(seen(memory)) == memory.search_candidates(seen(memory)) == []
@@ -96,7 +96,7 @@ def _with_spread(quality, name, spread_px):
     return quality._replace(limbs=limbs)
 
 
-def test_what_is_expected_two_frames_on_is_what_would_be_if_the_next_came_as_expected(gavrila):
+def test_predicting_two_frames_ahead_is_predicting_twice(gavrila):
     memory, settings = PersonMemory(gavrila, gavrila.neutral()), PredictSettings()
     step = np.zeros(gavrila.n_dofs)
     step[:3] = 0.02

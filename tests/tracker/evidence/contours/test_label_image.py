@@ -47,7 +47,7 @@ def test_a_fisheye_is_labelled_in_its_undistorted_picture():
     assert np.mean(labels != expected) < 0.002
 
 
-def test_what_is_out_of_the_image_or_behind_the_camera_is_left_out():
+def test_points_outside_the_image_or_behind_are_left_out():
     model = solid((RADIUS,) * 3)
     assert not part_labels([at(model, 8.0, 0.0, 0.0)], FRONT).any()
     assert not part_labels([at(model, 0.0, 90.0, 0.0)], FRONT).any()

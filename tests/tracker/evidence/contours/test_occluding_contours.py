@@ -131,7 +131,7 @@ def test_pieces_are_short_and_add_up_to_the_same(gavrila, piece_px):
     assert set(trace(body, camera).parts) == set(range(len(gavrila.parts)))
 
 
-def test_what_lies_behind_is_hidden():
+def test_parts_behind_are_hidden():
     large, small = solid((0.3, 0.3, 0.3), name="large"), ball()
     front, behind = at(large, 0, 0, 0), at(small, -1, 0.1, 0)
     found = trace([front, behind], FRONT)

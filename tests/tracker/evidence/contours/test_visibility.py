@@ -82,7 +82,7 @@ def test_the_margin_reaches_behind_the_point(name):
     assert blocked(model, before, eye, margin=0.03 / 3).tolist() == [True, False]
 
 
-def test_what_is_hidden_stays_hidden():
+def test_hidden_panels_stay_hidden():
     model = one_part(PARTS["limb"])
     surfaces = surfaces_of((model,))
     Q = np.column_stack([np.eye(3), np.zeros(3), (50.0, 0, 0)]).astype(np.float32)

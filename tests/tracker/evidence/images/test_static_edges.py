@@ -73,7 +73,7 @@ def test_a_segment_is_known_as_a_whole(model):
     assert knows(model, several(line(20, 10, 42), line(20, 22, 54))) == [True, False]
 
 
-def test_what_came_later_is_known_after_three_frames(model):
+def test_a_later_pixel_is_known_after_three_frames(model):
     for _ in range(10):
         learn(model, NOTHING)
     known = []
@@ -83,7 +83,7 @@ def test_what_came_later_is_known_after_three_frames(model):
     assert known == [False, False, True]
 
 
-def test_what_is_gone_is_forgotten_after_three_frames(model):
+def test_a_vanished_edge_is_forgotten_after_three_frames(model):
     for _ in range(10):
         learn(model, line(20))
     known = []

@@ -52,7 +52,7 @@ def test_a_shadow_on_the_floor_stays_one(whole):
         assert np.count_nonzero(own.mask & ~true.mask) < 0.02 * np.count_nonzero(true.mask)
 
 
-def test_what_no_other_view_shows_stays_a_shadow(whole):
+def test_a_change_in_one_view_stays_a_shadow(whole):
     """The sky has no floor behind it, and nothing contradicts what lies there."""
     above = np.zeros_like(whole[0].mask)
     above[2:20, 5:30] = True

@@ -126,7 +126,7 @@ def test_words_of_the_usual_lens(tmp_path, words):
     ],
     ids=str,
 )
-def test_what_is_not_understood_is_refused_by_name(tmp_path, words, named):
+def test_unknown_files_are_refused_by_name(tmp_path, words, named):
     with pytest.raises(CalibrationError) as caught:
         read_cameras(with_words(tmp_path, words))
     assert named in str(caught.value)
@@ -141,7 +141,7 @@ def test_what_is_not_understood_is_refused_by_name(tmp_path, words, named):
         lambda rows: {"metadata": {"projection": "equidistant"}, **rows},
     ],
 )
-def test_what_a_file_says_of_all_its_lenses(tmp_path, said):
+def test_all_lenses_of_a_file_are_read(tmp_path, said):
     path = with_words(tmp_path, {"size": [640, 480]})
     rows = {row["name"]: row for row in json.loads(path.read_text())}
     path.write_text(json.dumps(said(rows)))

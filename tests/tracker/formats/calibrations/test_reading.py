@@ -247,7 +247,7 @@ ENTITIES = '<!DOCTYPE x [<!ENTITY a "aaaa">' + "".join(
         (lambda folder: folder / "none.json", "none.json not found"),
     ],
 )
-def test_what_is_not_read_is_named(tmp_path, make, expected):
+def test_unread_files_are_named(tmp_path, make, expected):
     with pytest.raises(CalibrationError, match=f"(?s){expected}"):
         read_cameras(make(tmp_path))
 

@@ -29,7 +29,7 @@ def test_some_points_beside_the_person_change_nothing():
     np.testing.assert_array_equal(clothes_colors(dressed(), TORSO + shifted / 3, KNEES), [*lab(RED), *lab(BLUE)])
 
 
-def test_what_the_picture_does_not_show_has_no_color():
+def test_unseen_parts_have_no_color():
     found = clothes_colors(dressed()[:90], TORSO, KNEES)
     np.testing.assert_array_equal(found[:3], lab(RED))
     assert np.isnan(found[3:]).all()

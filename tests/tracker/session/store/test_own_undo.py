@@ -61,7 +61,7 @@ def test_many_steps_back_and_forth_over_one_pose(store):
     assert store.redo_own() is None
 
 
-def test_what_somebody_else_has_changed_since_stays(store):
+def test_later_changes_by_others_stay(store):
     put(store, "anna", 1, 10, (2, 11))
     put(store, "ben", 2, 20)
     assert store.undo_own().n_kept == 1

@@ -83,7 +83,7 @@ def test_the_nearest_triangle_wins_and_weights_are_perspective_correct(straight_
     assert np.allclose(1 / hits.inverse_depths[v, u], points[:, 2], rtol=1e-5)
 
 
-def test_what_stands_before_the_mesh_hides_it(straight_camera):
+def test_an_occluder_before_the_mesh_hides_it(straight_camera):
     triangle = np.array([(-0.2, -0.2, 2.0), (0.3, -0.2, 2.0), (-0.2, 0.3, 2.0)])
     wall = np.zeros((48, 64), dtype=np.float32)
     wall[:, :32] = 1.0  # a wall at 1 m
@@ -97,7 +97,7 @@ def test_normals_point_outward():
     assert np.allclose(vertex_normals(ball.vertices, ball.faces), ball.vertices, atol=0.02)
 
 
-def test_what_reaches_behind_the_camera_is_not_drawn(straight_camera):
+def test_parts_behind_the_camera_are_not_drawn(straight_camera):
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.5)
     behind = rigid.apply(rigid.transform(t=np.array([0, 0, -2.0])), ball.vertices)
     assert not (cast(straight_camera, behind, ball.faces).faces >= 0).any()
