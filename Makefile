@@ -15,6 +15,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
 # Set by `test` to what shows one line of a step.
 STEP =
+HIDE = $(if $(STEP),@)
 PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
 # Tests start hundreds of programs: each would compile the library again if none may keep its bytecode.
 unexport PYTHONDONTWRITEBYTECODE
@@ -44,19 +45,19 @@ test-quick: $(VENV)/.tested
 
 # Tests of rooms that need no kernels come first (tests/conftest.py), while the kernels are compiled.
 test-library: $(VENV)/.tested
-	$(STEP) nice -n 19 $(PYTEST) --no-loadscope-reorder -m "not slow" --ignore=tests/browser tests
+	$(HIDE)$(STEP) nice -n 19 $(PYTEST) --no-loadscope-reorder -m "not slow" --ignore=tests/browser tests
 
 # Starts at once: only the files of tests/browser/live and share, which come last, wait for the kernels. Three processes,
 # because these tests wait more than they compute.
 test-page: $(VENV)/.tested
-	$(STEP) nice -n 5 $(PYTEST) --numprocesses 3 --no-loadscope-reorder -m "not slow" tests/browser
+	$(HIDE)$(STEP) nice -n 5 $(PYTEST) --numprocesses 3 --no-loadscope-reorder -m "not slow" tests/browser
 
 test-slow: $(VENV)/.slow $(VENV)/.typescript kernels
 	$(PYTEST) -m slow
 
 # Once, not in each process of the tests at the same time.
 kernels: $(VENV)/.installed
-	$(STEP) $(BIN)/python -m app.bench.compile_kernels
+	$(HIDE)$(STEP) $(BIN)/python -m app.bench.compile_kernels
 
 # How fast it is here, beside what must hold and the ratios of the last release.
 bench: $(VENV)/.tested
@@ -66,15 +67,15 @@ bench: $(VENV)/.tested
 check: lint types page-types
 
 lint: $(VENV)/.tested
-	$(STEP) $(BIN)/ruff check $(PYTHON_FILES)
-	$(STEP) $(BIN)/ruff format --check $(PYTHON_FILES)
+	$(HIDE)$(STEP) $(BIN)/ruff check $(PYTHON_FILES)
+	$(HIDE)$(STEP) $(BIN)/ruff format --check $(PYTHON_FILES)
 
 types: $(VENV)/.tested
-	$(STEP) $(BIN)/pyrefly check --progress-bar no
+	$(HIDE)$(STEP) $(BIN)/pyrefly check --progress-bar no
 
 page-types: $(VENV)/.typescript $(VENV)/.installed
-	$(BIN)/python tests/recipes/protocol_docs.py static/model/protocol.d.ts
-	$(STEP) $(BIN)/node node_modules/typescript/bin/tsc
+	$(HIDE)$(BIN)/python tests/recipes/protocol_docs.py static/model/protocol.d.ts
+	$(HIDE)$(STEP) $(BIN)/node node_modules/typescript/bin/tsc
 
 format: $(VENV)/.tested
 	$(BIN)/ruff check --fix $(PYTHON_FILES)
