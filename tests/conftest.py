@@ -30,22 +30,9 @@ DATA = TESTS.parents[1] / "shared" / "data"
 GC_THRESHOLDS = 20_000, 20, 20
 
 WITHOUT_KERNELS = {
-    *(
-        f"tracker/{room}"
-        for room in [
-            "compute",
-            "geometry",
-            "body",
-            "body/motion",
-            "formats",
-            "session",
-            "session/store",
-            "interchange/observations",
-            "evaluation",
-            "evidence/images",
-        ]
-    ),
-    *(f"app/{room}" for room in ["runtime", "state", "drawing"]),
+    *(f"tracker/{room}" for room in ("compute", "geometry", "body", "body/motion", "formats", "session")),
+    *("tracker/session/store", "tracker/evidence/images", "tracker/interchange/observations", "tracker/evaluation"),
+    *("app/runtime", "app/state", "app/drawing"),
 }
 """Rooms whose tests call no compiled kernels, or few."""
 OF_SOURCES = {

@@ -8,10 +8,10 @@ import pytest
 from architecture import FILES, ROOT, nodes, trees
 from code_counts import code_lines, git, numbers, unexplained_rises
 
-MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 1108, 330, 0
+MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 1106, 330, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
-MAX_CODE_LINES = {"tracker": 49095, "app": 20788, "js": 14505, "css": 4472, "tests": 66568}
+MAX_CODE_LINES = {"tracker": 49095, "app": 20788, "js": 14505, "css": 4472, "tests": 66558}
 """Lines without blanks, comments and docstrings."""
 N_COMMITS = 20
 """Commits whose numbers are compared with those before."""

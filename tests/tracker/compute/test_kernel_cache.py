@@ -164,7 +164,7 @@ def test_a_kernel_depends_on_the_kernels_of_other_files(tmp_path):
     copy = Path(shutil.copytree(SOURCE, tmp_path / "tracker", ignore=shutil.ignore_patterns("__pycache__")))
     before = keys_of(KernelKeys(copy))
     assert before == keys_of(KernelKeys(SOURCE))
-    visibility = copy / "contours" / "visibility.py"
+    visibility = copy / "evidence" / "contours" / "visibility.py"
     text = visibility.read_text()
     assert text.count("far, near = shared[0, i], shared[1, i]\n") == 1
     visibility.write_text(text.replace("far, near = shared[0, i], shared[1, i]", "far, near = 1.0, 0.0"))
