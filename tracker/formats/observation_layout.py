@@ -63,3 +63,5 @@ class ObservationLayout(Generic[T]):
     recognizes: Callable[[Sample], bool]
     read: Callable[..., T]
     """Reads files; the arguments are those of its table."""
+    patch: Callable[..., bytes] | None = None
+    """Returns a file with points replaced, to be sent back; None for a layout that is read only."""

@@ -8,7 +8,7 @@ labels of a person. The Ensemble Kalman Smoother (EKS) adds coords of its own.
 import io
 import pickle
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
@@ -213,10 +213,10 @@ def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: 
     return PictureTable(tuple(names), numbers, points, notes=tuple(notes), tracks=tracks, is_by_hand=is_by_hand)
 
 
-def patch_deeplabcut_csv(path: Path, changes: Changes) -> bytes:
-    """Return a file, which has been read before, with points of some rows replaced; all other bytes stay."""
+def patch_deeplabcut_csv(path: Path, changes: Mapping[int, Changes]) -> bytes:
+    """Return a file, which has been read before, with points of rows of its only camera replaced; other bytes stay."""
     columns, n_index, _ = _read_head(_filled(path), str(path))
-    found = _new_cells(columns, changes).items()
+    found = _new_cells(columns, changes[0]).items()
     new = {row: {n_index + i: value for i, value in cells.items()} for row, cells in found}
     patch = TextPatch(path.read_bytes())
     patch.replace_cells(",", len(read_deeplabcut_csv(path).numbers), new, PIXEL_DECIMALS)

@@ -8,18 +8,23 @@ from typing import Any
 import numpy as np
 
 from tracker.formats.keypoints.coco_reading import read_dataset
-from tracker.formats.keypoints.point_changes import Changes, PersonChanges
+from tracker.formats.keypoints.point_changes import Changes
 from tracker.formats.text_patch import PIXEL_DECIMALS, Span, SpanList, TextPatch, number_like
 from tracker.geometry.arrays import Array
 
 
-def patch_openpose(data: bytes, changes: PersonChanges) -> bytes:
-    """Return the file of a picture with points of some people replaced; numbers are those among people with points."""
-    patch = TextPatch(data)
+def patch_openpose(path: Path, changes: Mapping[int, Changes]) -> bytes:
+    """Return the file of a picture with points of some people replaced; numbers are those among people with points.
+
+    Args:
+        path: the file, which has been read before.
+        changes: of its only camera and row.
+    """
+    patch = TextPatch(path.read_bytes())
     people = patch.json_spans()["people"]
     numbers = [p["pose_keypoints_2d"].items for p in people.items if "pose_keypoints_2d" in p]
     with_points = [some for some in numbers if some]
-    for person, values in changes:
+    for person, values in changes[0][0]:
         if person < 0:
             patch.append(people, f'{{"person_id": [-1], "pose_keypoints_2d": [{_triples(values, has_flags=False)}]}}')
         else:

@@ -11,17 +11,19 @@ import numpy as np
 from tracker.errors import FormatError
 from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
-from tracker.formats.c3d import read_c3d
+from tracker.formats.c3d import patch_c3d, read_c3d
 from tracker.formats.joint_tables.layouts import SCENES, Scenes, find_layout, read_joint_files
+from tracker.formats.joint_tables.patching import patch_table
 from tracker.formats.keypoints import detections, hand_labels
 from tracker.formats.keypoints.coco_reading import holds, is_alphapose, is_coco, read_coco
 from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, check_mask_size, read_segmentations
-from tracker.formats.keypoints.deeplabcut import is_deeplabcut, read_deeplabcut_csv
-from tracker.formats.keypoints.hdf5 import read_hdf5_apart
+from tracker.formats.keypoints.deeplabcut import is_deeplabcut, patch_deeplabcut_csv, read_deeplabcut_csv
+from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
+from tracker.formats.keypoints.json_patching import patch_coco, patch_openpose
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_files
 from tracker.formats.observation_layout import ObservationLayout, Sample
-from tracker.formats.trc import MarkerTable, read_trc
+from tracker.formats.trc import MarkerTable, patch_trc, read_trc
 from tracker.formats.unread import unread
 from tracker.interchange.observations.mask_files import MaskFiles
 from tracker.interchange.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
@@ -154,10 +156,12 @@ def _is_json(recognizes: Callable[[Any], bool]) -> Callable[[Sample], bool]:
     return lambda sample: sample.suffix == ".json" and recognizes(sample.data)
 
 
-def _in_space(name: str, read: Callable[..., Scenes]) -> ObservationLayout[Scenes]:
+def _in_space(
+    name: str, read: Callable[..., Scenes], patch: Callable[..., bytes] | None = None
+) -> ObservationLayout[Scenes]:
     """Return the row of a format that is known by the end of its files' names alone."""
     suffix = f".{name.lower()}"
-    return ObservationLayout(name, f"a `{suffix}` for each person", _END, _ends(suffix), read)
+    return ObservationLayout(name, f"a `{suffix}` for each person", _END, _ends(suffix), read, patch)
 
 
 def _is_scene(sample: Sample) -> bool:
@@ -170,7 +174,7 @@ _IN_SPACE = "see [Joints in space](#joints-in-space)"
 
 PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
     "openpose": ObservationLayout("OpenPose JSON", f"a `.json` {_PICTURE}; of Pose2Sim too", "`people`", _has("people"),
-        _by_picture(read_openpose)),
+        _by_picture(read_openpose), patch_openpose),
     "easymocap": ObservationLayout("EasyMocap", f"a `.json` {_PICTURE}", "`annots`", _has("annots"),
         _by_picture(detections.read_easymocap)),
     "mmpose": ObservationLayout("mmpose, of videos", f"a `.json` {_CAMERA}",
@@ -180,19 +184,19 @@ PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
         "a list of `keypoints` and `keypoint_scores`", _is_json(detections.is_mmpose_picture),
         _by_picture(detections.read_mmpose_picture)),
     "alphapose": ObservationLayout("AlphaPose", f"a `.json` {_CAMERA}", "a list of `image_id` in words",
-        _is_json(is_alphapose), _by_cameras(lambda path: read_coco(path, "AlphaPose"))),
+        _is_json(is_alphapose), _by_cameras(lambda path: read_coco(path, "AlphaPose")), patch_coco),
     "label studio": ObservationLayout("Label Studio", _ALL, "a list of `data` and `annotations`",
         _is_json(hand_labels.is_label_studio), _by_cameras(hand_labels.read_label_studio)),
     "coco": ObservationLayout("COCO", f"{_ALL}; of Roboflow too", "`images` and `annotations`, or a list of results",
         _is_json(lambda data: is_coco(data) and (holds(data, "keypoints") or not holds(data, "segmentation"))),
-        _by_cameras(read_coco)),
+        _by_cameras(read_coco), patch_coco),
     "deeplabcut": ObservationLayout("DeepLabCut, Lightning Pose, EKS",
         f"a `.csv` {_CAMERA}, of one animal or several, or of labels", "the row `scorer`, without `z`",
-        _is_text(".csv", is_deeplabcut), _by_file(read_deeplabcut_csv)),
+        _is_text(".csv", is_deeplabcut), _by_file(read_deeplabcut_csv), patch_deeplabcut_csv),
     "sleap csv": ObservationLayout("SLEAP's analysis in CSV", f"a `.csv` {_CAMERA}", "columns `track` and `frame_idx`",
         _is_text(".csv", detections.is_sleap_csv), _by_file(detections.read_sleap_csv)),
     "hdf5": ObservationLayout("SLEAP, NWB, DeepLabCut in HDF5", f"a `.slp`, `.nwb` or `.h5` {_CAMERA}",
-        f"{_END}, and the groups within", _ends(".slp", ".nwb", ".h5"), _read_hdf5),
+        f"{_END}, and the groups within", _ends(".slp", ".nwb", ".h5"), _read_hdf5, patch_hdf5_apart),
     "cvat": ObservationLayout("CVAT", f"a `.xml` {_CAMERA}, for images or for videos", "`<annotations>`",
         _is_text(".xml", hand_labels.is_cvat), _by_cameras(hand_labels.read_cvat)),
     "yolo": ObservationLayout("YOLO pose", f"a `.txt` {_PICTURE}",
@@ -201,12 +205,12 @@ PICTURE_FORMATS: Mapping[str, ObservationLayout[Groups]] = {
 }  # fmt: skip
 """Key points in pictures, by the name that is stored, in the order in which they are tried."""
 SPACE_FORMATS: Mapping[str, ObservationLayout[Scenes]] = {
-    "trc": _in_space("TRC", _each(lambda path, unit_m: read_trc(path))),
-    "c3d": _in_space("C3D", _each(read_c3d)),
+    "trc": _in_space("TRC", _each(lambda path, unit_m: read_trc(path)), lambda path, unit_m, new: patch_trc(path, new)),
+    "c3d": _in_space("C3D", _each(read_c3d), patch_c3d),
     "bvh": _in_space("BVH", _each(read_bvh)),
     "scenes": ObservationLayout("JSON of people in space", _IN_SPACE, "", _is_scene, read_joint_files),
     "arrays": ObservationLayout("NumPy", _IN_SPACE, "", _ends(".npy", ".npz"), read_joint_files),
-    "csv": ObservationLayout("CSV", _IN_SPACE, "", _ends(".csv", ".tsv"), read_joint_files),
+    "csv": ObservationLayout("CSV", _IN_SPACE, "", _ends(".csv", ".tsv"), read_joint_files, patch_table),
 }
 """Joints in space. Lengths without a unit in the file have the given one, metres, or are refused; rows without times
 have the given rate, 1/s. Each returns the points of each person with the file or folder that they are from."""

@@ -1,6 +1,6 @@
 """Replace points in imported files: key points in pictures and points in space."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,14 +10,8 @@ from tracker.body.model import PosedBody
 from tracker.body.motion.velocity import velocity
 from tracker.errors import FormatError, Remedy, SessionError
 from tracker.formats.bvh_patching import patch_bvh
-from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
-from tracker.formats.joint_tables.patching import patch_table
-from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
-from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
-from tracker.formats.keypoints.json_patching import patch_coco, patch_openpose
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.formats.trc import patch_trc
 from tracker.geometry.arrays import Array
 from tracker.interchange.exports.keypoints import project_through_lens
 from tracker.interchange.exports.like.mended_points import MendedPoints
@@ -101,26 +95,18 @@ def _exchanged(table: PictureTable, row: int, detection: int, pairs: Sequence[tu
 
 
 def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Changes]]) -> dict[Path, bytes]:
-    out: dict[Path, bytes] = {}
-    if format_name == "openpose":
-        for pictures, changes in found:
-            if len(pictures.files) > len(pictures.table.numbers):
-                raise _not_sent_back("files with one picture each, found several of one")
-            of_row = {pictures.files[row]: c for row, c in changes.items()}
-            out |= {path: patch_openpose(path.read_bytes(), c) for path, c in of_row.items()}
-        return out
-    patch = {"coco": patch_coco, "alphapose": patch_coco, "hdf5": patch_hdf5_apart}
-    if format_name != "deeplabcut" and format_name not in patch:
-        raise _not_sent_back(
-            f"files of a program to which points are sent back, found {PICTURE_FORMATS[format_name].program}"
-        )
-    for path in dict.fromkeys(pictures.files[0] for pictures, _ in found):  # a file may hold several cameras
-        of_file = {p.part: changes for p, changes in found if p.files[0] == path}
-        if format_name == "deeplabcut":
-            out[path] = patch_deeplabcut_csv(path, of_file[0])
-        else:
-            out[path] = patch[format_name](path, of_file)
-    return out
+    layout = PICTURE_FORMATS[format_name]
+    if layout.patch is None:
+        raise _not_sent_back(f"files of a program to which points are sent back, found {layout.program}")
+    of_file: dict[Path, dict[int, Changes]] = {}
+    for pictures, changes in found:
+        if len(pictures.files) > max(len(pictures.table.numbers), 1):
+            raise _not_sent_back("files with one picture each, found several of one")
+        for row, people in changes.items():
+            # A file has one picture of a camera, or all of one or several.
+            path, at = (pictures.files[row], 0) if len(pictures.files) > 1 else (pictures.files[0], row)
+            of_file.setdefault(path, {}).setdefault(pictures.part, {})[at] = people
+    return {path: layout.patch(path, changes) for path, changes in of_file.items()}
 
 
 def _not_sent_back(difference: str) -> FormatError:
@@ -148,14 +134,10 @@ def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Arra
 def mended_space(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> tuple[Files, float]:
     """Return the files of points in space that change, and how far a point is from its place at most, metres."""
     options = dict(observations.options)
+    layout = SPACE_FORMATS[observations.format]
     R_file = axes_matrix(options.get("axes", "x,y,z")).T
     unit_m = float(options["unit_m"]) if "unit_m" in options else None
     is_known = np.array([bool(points) for points in observations.counterparts.values()])
-    patch: Mapping[str, Callable[[Path, Mapping[int, Array]], bytes]] = {
-        "trc": patch_trc,
-        "csv": lambda path, changes: patch_table(path, unit_m, changes),
-        "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
-    }
     out, farthest_m = Files(), 0.0
     if len(observations.row_frames) != len(mended):
         raise SessionError(
@@ -165,21 +147,21 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
         f"expected one file for each person in TRC, C3D, BVH or a table with a row for each frame, into which points "
         f"are written back, found other files of {observations.name}; export the poses as TRC or CSV"
     )
-    if len(observations.sources) != len(mended) or observations.format not in {*patch, "bvh"}:
+    if len(observations.sources) != len(mended) or (layout.patch is None and observations.format != "bvh"):
         raise other
     for source, person, row_frames in zip(observations.sources, mended, observations.row_frames, strict=True):
         changes = _rows(row_frames, person)
         if changes:
             in_file = {row: points @ R_file.T for row, points in changes.items()}
             path = source_path(session, observations.name, source)
-            read = SPACE_FORMATS[observations.format].read([path], unit_m, session.fps)
+            read = layout.read([path], unit_m, session.fps)
             if {len(table.names) for _, table in read} != {len(is_known)} or len(read) > 1:
                 raise other
-            if observations.format == "bvh":
+            if layout.patch is None:
                 out[source.path], distance_m = patch_bvh(path, unit_m, in_file, is_known)
                 farthest_m = max(farthest_m, distance_m)
             else:
-                out[source.path] = patch[observations.format](path, in_file)
+                out[source.path] = layout.patch(path, unit_m, in_file)
     return out, farthest_m
 
 
