@@ -12,10 +12,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from tracker.estimation.initialization.first_pose import VOXEL_M
 from tracker.evidence.images.background_subtraction import SHADOWS, SHADOWS_AND_HIGHLIGHTS, Shading
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.voxels.shadows import recover_from_shadows
+from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.footage.recording import Recording, background_frames
 from tracker.geometry.ground_plane import floor_plane
 from tracker.session.session import load_session

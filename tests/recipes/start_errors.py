@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tracker.errors import TrackerError
-from tracker.estimation.initialization.first_pose import VOXEL_M, find_first_poses
+from tracker.estimation.initialization.first_pose import find_first_poses
 from tracker.estimation.initialization.generators.body_axis import find_body_axes
 from tracker.estimation.initialization.generators.head_template import find_head
 from tracker.estimation.initialization.generators.silhouette_axis import major_axis
@@ -21,6 +21,7 @@ from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.voxels.paths import neighbor_graph
 from tracker.evidence.voxels.shadows import recover_from_shadows
 from tracker.evidence.voxels.visual_hull import carve_people
+from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.ground_plane import floor_plane

@@ -10,7 +10,6 @@ from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
 from tracker.estimation.initialization.first_pose import (
     ENOUGH_FRAMES,
-    VOXEL_M,
     FirstPose,
     FirstPoses,
     Show,
@@ -19,6 +18,7 @@ from tracker.estimation.initialization.first_pose import (
 )
 from tracker.estimation.initialization.known_start import fit_to_contours
 from tracker.evidence.observer import Observer
+from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.formats.model_toml import format_model
 from tracker.interchange.observations.stored import list_observations
 from tracker.pipeline.body_acquisition import MEASURED, SIZES_EDITS, with_sizes_changed

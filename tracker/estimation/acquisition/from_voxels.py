@@ -31,6 +31,7 @@ from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.estimation.voxel.state import FilterState
 from tracker.evidence.contours.body_silhouette import body_silhouette
 from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.geometry.arrays import TINY, Array, Mask, intersection_over_union
 
 _KINDS = ("height", "build", "length", "girth", "free_end")
@@ -43,7 +44,7 @@ _TIP_SHARE = 0.99
 class VoxelSizeSettings:
     """Settings of the fit."""
 
-    voxels: VoxelSettings = field(default_factory=lambda: VoxelSettings(voxel_m=0.025))
+    voxels: VoxelSettings = field(default_factory=lambda: VoxelSettings(voxel_m=VOXEL_M))
     """Size of the voxels, how they are labelled, and the noise of their measurements."""
     rounds: int = 3
     """Number of times that voxels are labelled and sizes are updated."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from tracker.body.dimensions import main_axis, mirror_part
 from tracker.body.model import BodyModel
+from tracker.estimation.fitting.gauss_newton import JOINT_SHARE
 from tracker.geometry.arrays import Array
 
 _COUNTS = {"length": 1, "girths": 2, "center": 3, "half": 3, "taper": 2, "exponents": 2, "joint": 3}
@@ -57,13 +58,13 @@ class SizePriors:
     """Of the logarithm of a part's length."""
     girth: float = 0.12
     """Of the logarithm of a part's girth, front to back or side to side."""
-    joint: float = 0.012
+    joint: float = JOINT_SHARE
     """Of the place of a joint on its parent along each axis, fraction of height."""
-    limb_joint: float = 0.012
+    limb_joint: float = JOINT_SHARE
     """Of the place of a joint of a limb on its parent along each axis, fraction of height."""
-    side: float = 0.012
+    side: float = JOINT_SHARE
     """Of the flesh across a part, fraction of height."""
-    limb_side: float = 0.012
+    limb_side: float = JOINT_SHARE
     """Of the flesh across a part of a limb, fraction of height."""
     end: float = 0.015
     """Of an end of the flesh along a part, fraction of height."""

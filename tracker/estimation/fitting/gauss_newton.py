@@ -38,6 +38,9 @@ AT_LIMIT = 1e-9
 """Distance from a limit that counts as at the limit, rad or metres."""
 UNKNOWN = 1.0
 """Standard deviation of a degree of freedom that nothing shows, such as the twist of a straight arm, rad or m."""
+JOINT_SHARE = 0.012
+"""Standard deviation of a joint's place in the flesh along each axis, and of the flesh across a part, as a fraction of
+height (`tests/benchmarks/acquisition.py`)."""
 JOINT_M = 0.005
 """Standard deviation of a known joint of the same body, metres: markers and rigs repeat a joint to some
 millimetres."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody, parts_of
-from tracker.estimation.fitting.gauss_newton import UNKNOWN
+from tracker.estimation.fitting.gauss_newton import JOINT_SHARE, UNKNOWN
 from tracker.estimation.fitting.twists import twists_to_dofs
 from tracker.evidence.contours import occluding_contours
 from tracker.geometry.arrays import TINY, Array, IntArray
@@ -35,7 +35,7 @@ class ContourNoise:
     length_px: float = 120.0
     """Length of contour along which the error is the same, working px: edges of clothes and wrong shapes are. It is
     calibrated on five simulated people, and checked on five others (docs/measurements.md)."""
-    joint_share: float = 0.012
+    joint_share: float = JOINT_SHARE
     """Standard deviation of the place of a joint on its parent along each axis, fraction of the body height, as in
     `acquisition.size_parameters.SizePriors`; of the root, in its own part. 0 if the body is exactly that of the
     person."""

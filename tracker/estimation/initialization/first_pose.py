@@ -31,13 +31,12 @@ from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.evidence.voxels.figure_masks import figure_masks
 from tracker.evidence.voxels.shadows import recover_from_shadows
 from tracker.evidence.voxels.visual_hull import VisualHull, carve_people
+from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.formats.model_toml import has_preset_sizes
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.session.session import Session
 
-VOXEL_M = 0.025
-"""Edge of a voxel, metres."""
 ENOUGH_FRAMES = 2
 """Number of frames with good starts whose heights agree that end the trial of `auto`."""
 _PICTURES = 16

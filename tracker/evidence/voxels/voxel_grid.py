@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, IntArray
 
+VOXEL_M = 0.025
+"""Edge of a voxel in which a person is found and measured, metres."""
 MAX_VOXELS = 400_000_000
 """Largest number of voxels of a grid: 400 MB."""
 
