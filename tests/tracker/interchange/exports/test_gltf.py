@@ -17,7 +17,7 @@ from tracker.interchange.exports import writers
 from tracker.interchange.exports.motion import read_motion
 from tracker.interchange.exports.options import ExportOptions, file_from_world
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 VALIDATOR = ROOT / "node_modules" / "gltf-validator"
 VALIDATE = """
 const validator = require(process.argv[1]);
