@@ -163,7 +163,7 @@ for n in range(1, 100_000):
 @pytest.mark.parametrize("when", ["while it commits", "while it upgrades an older store"])
 def test_a_killed_session_is_read_as_commands_read_it(tmp_path, cases, report, when):
     """A store is read after each kill without being opened for writing, and holds one edit on all frames."""
-    script = (ROOT / "tests" / "tracker" / "store" / "store_version_3.sql").read_text("utf-8")
+    script = (ROOT / "tests" / "tracker" / "session" / "store" / "store_version_3.sql").read_text("utf-8")
     rng, n, path, hot, odd = random.Random(SEED), cases(200), tmp_path / "annotations.sqlite", 0, []
     for case in range(n):
         if case == 0 or "upgrades" in when:
