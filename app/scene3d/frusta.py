@@ -41,6 +41,7 @@ class Frusta:
         self._labels = [server.scene.add_label(f"/cameras/{c.name}/name", c.name) for c in self._cameras]
         latest = LatestWinsWorker(self._show_images, "frusta")
         controller.subscribe(latest.offer, "frame", "view_3d", "calibration", "footage", "drag", "track", "search")
+        latest.offer(controller.state)
 
     def show(self, state: State) -> None:
         """Show or hide the cameras. Looking through a camera hides them, because they would cover its image."""
