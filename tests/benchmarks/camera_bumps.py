@@ -8,19 +8,22 @@ that no other benchmark has. `--work DIR` keeps scenes, sessions and results, so
 
 import argparse
 import json
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
+
 from acquisition import N_FRAMES, Recording, quadrille, recorded
 from calibration_repair import off
 from doc_tables import Conditions, add_write_option, check_places, show, table
+from known_faults import fit_fault
 
-from tracker.calibration.check.diagnosis import Diagnosis, diagnosis_of
-from tracker.calibration.check.fault_search import Fault, FaultSearch, FoundFault, Selection, prior_sigmas
-from tracker.calibration.check.viewed_frames import ViewedFrame
+from tracker.calibration.check.fault_search import Fault
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
@@ -181,16 +184,6 @@ def judged(at: Path, recording: str, body: str, bump: Bump | None, right: Sequen
         recording, body, bump.kind if bump else "", right[bump.camera].name if bump else "",
         bump.shift_px if bump else 0.0, [*check.named], by, error.tolist(), sigma.tolist(),
     )  # fmt: skip
-
-
-def fit_fault(
-    frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], fps: float, fault: Fault
-) -> Diagnosis:
-    """Fit one fault that is known to be there, however little it is worth; the arguments are those of `diagnose`."""
-    search = FaultSearch(frames, parameters, prior_sigmas(fps))
-    before = search.fitted(search.begun().state, ())
-    first = search.refitted(before, (fault,))
-    return diagnosis_of(search.settled(Selection((FoundFault(fault, before.cost - first.cost, {}),), first)))
 
 
 def _rotation(camera: Camera) -> Array:

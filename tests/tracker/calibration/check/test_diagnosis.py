@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from known_faults import fit_fault
 from rig_scenes import FPS, NAMES, nothing_seen, person_of, turned, viewed
 
 from tracker.body.motion.pose_path import PosePath
@@ -32,6 +33,20 @@ def test_a_turned_camera_is_named_and_mended():
     assert np.degrees(np.abs(left)).max() < 0.1
     assert cameras[2].misfit_px > 3
     assert "camera cam2 is turned" in sentence(cameras[2])
+
+
+@pytest.mark.slow
+def test_a_known_fault_is_fitted_however_small_it_is():
+    off = turned(yaw_deg=0.02)
+    frames = viewed({2: off}, range(3))
+    sizes = [SizeParameters(frames[0].bodies[0].model)]
+    assert not diagnose(frames, sizes, FPS).kept
+    found = fit_fault(frames, sizes, FPS, Fault(2, "rotation"))
+    assert [k.fault for k in found.kept] == [Fault(2, "rotation")]
+    assert not np.delete(found.corrections, 2, axis=0).any()
+    left, sigma = with_step(-off, found.corrections[2])[ROTATION], found.sigmas(2)[ROTATION]
+    assert np.all(sigma > 0)
+    assert np.all(np.abs(left) < 4 * sigma)
 
 
 @pytest.mark.slow
