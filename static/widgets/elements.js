@@ -3,7 +3,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 
 /**
- * What an element is made with: properties by their names, attributes by names with a dash, styles by names that begin
+ * Values that an element is made with: properties by their names, attributes by names with a dash, styles by names that begin
  * with two dashes.
  *
  * @template {keyof HTMLElementTagNameMap} Tag

@@ -1,4 +1,4 @@
-/** What the browser keeps for the page. */
+/** Values that the browser keeps for the page. */
 
 /**
  * @param {string} key

@@ -79,6 +79,6 @@ def _rise(parent, commit):
 
 
 def git(*words):
-    """What a command of git prints; None if it fails."""
+    """The output of a command of git; None if it fails."""
     done = subprocess.run(["git", "-C", ROOT, *words], capture_output=True, text=True)
     return None if done.returncode else done.stdout

@@ -38,7 +38,7 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
 def shared_record(
     rows: Sequence[dict[str, Any]], fit: "RigFit", held_out: "HeldOut", volume: "VolumeError", points_world: np.ndarray
 ) -> dict[str, Any]:  # fmt: skip
-    """Return what boards and people tell alike of cameras, each with a row of its own.
+    """Return the entries that calibrations by boards and by people share.
 
     Args:
         rows: further entries of each camera.

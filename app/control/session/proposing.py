@@ -32,9 +32,8 @@ class Proposing:
         self._session_state = session_state
         self._followed: int | None = None  # version of the timeline of the last result; None before the first
         self._latest: LatestWinsWorker[str] = LatestWinsWorker(self._work, "next best click", _REST_S)
-        session_state.subscribe(
-            self._changed, "timeline_version", "drag", "is_pin_held", "track", "search", "annotation"
-        )
+        fields = ("timeline_version", "drag", "is_pin_held", "track", "search", "annotation")
+        session_state.subscribe(self._changed, *fields)
 
     def close(self) -> None:
         """End the thread."""

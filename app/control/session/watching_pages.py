@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 class WatchingPages(Generic[T]):
-    """The pages that look, by number, with what each looks at. While there are some, a view follows the state."""
+    """The pages that look, by number, with the wish of each. While there are some, a view follows the state."""
 
     def __init__(self, session_state: SessionState, changed: Callable[[State], None]) -> None:
         """Begin without pages.
@@ -33,12 +33,12 @@ class WatchingPages(Generic[T]):
 
     @property
     def newest(self) -> T | None:
-        """What the page looks at that came last; None without pages."""
+        """The wish of the page that came last; None without pages."""
         with self._lock:
             return next(reversed(self._wishes.values()), None)
 
     def enter(self, page: int, wish: T) -> None:
-        """Note that a page looks at something, in place of what it looked at before."""
+        """Note the wish of a page, in place of its former one."""
         with self._lock:
             self._wishes.pop(page, None)
             self._wishes[page] = wish

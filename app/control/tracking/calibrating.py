@@ -44,9 +44,8 @@ class Calibrating:
         self._tried: tuple[int, int] | None = None  # the check and the frame of the last preview
         self._previews = LatestWinsWorker(self._refit, "calibration preview")
         self._outdated = LatestWinsWorker(self._find_outdated, "earlier calibration")
-        self._unsubscribe = session_state.subscribe(
-            self._follow_state, "calibration", "frame", "timeline_version", "track"
-        )
+        fields = ("calibration", "frame", "timeline_version", "track")
+        self._unsubscribe = session_state.subscribe(self._follow_state, *fields)
         self._outdated.offer(session_state.state)
 
     def start(self) -> None:

@@ -35,7 +35,7 @@ class BoardCalibration:
     lenses: tuple[LensFit, ...]
     """Lens of each camera as fitted to its own views."""
     held_out: HeldOut
-    """Corners on frames that were held out of a first adjustment."""
+    """Errors of corners on frames that a first adjustment left out."""
     first_cameras: tuple[Camera, ...]
     """Cameras of the first adjustment."""
     held_out_corners: SeenCorners
