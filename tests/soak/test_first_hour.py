@@ -18,6 +18,7 @@ from first_hour import DONE, WORK_S, Hour, known_lengths
 from page_driver import shows, state_of
 from playwright.async_api import async_playwright
 from program import READY, WITHOUT_3D, Program
+from scripted_user import ORDER
 from stranger import Errors, Stranger, table
 
 from tracker.evaluation.metrics import evaluate_joints
@@ -33,15 +34,6 @@ RECORDINGS = {
 """The people of each recording, and their references."""
 SIMULATED = {"portrait": {"size": (480, 640)}, "fisheye": {"fisheyes": ("FRONT",)}}
 """Recordings that are made: upright pictures, and one camera of four with a fisheye lens of 120 degrees."""
-LIMBS = [
-    f"{side}_{joint}"
-    for limb in (("knee", "ankle"), ("elbow", "wrist"))
-    for side in ("left", "right")
-    for joint in limb
-    for _ in range(2)
-]
-ORDER = ["torso", "torso", "left_shoulder", "right_shoulder", *LIMBS]
-"""What is dragged to place a person, from the trunk outwards, each in the next view."""
 MOST_DRAGS = 20
 MOST_MM = {
     "balance_real": (60, 40, 45), "two_people": (90, 60, 80), "portrait": (60, 40, 45), "fisheye": (60, 40, 45)

@@ -34,6 +34,14 @@ async def shows(page, expression, timeout_s=20.0):
         raise AssertionError(f"after {timeout_s} s the page still does not show: {expression}")
 
 
+async def go_to(page, frame):
+    """Type the number of a frame, and wait until it is shown."""
+    await page.locator("#frame").fill(str(frame))
+    await page.keyboard.press("Enter")
+    await page.locator("#frame").blur()
+    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 30)
+
+
 async def until(condition, timeout_s=20.0):
     """Wait until a condition of the fake endpoint holds.
 

@@ -11,6 +11,14 @@ NOISE_PX = 3.0
 LIMBS = [
     f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right")
 ]
+ORDER = ["torso", "torso", "left_shoulder", "right_shoulder"] + [
+    f"{side}_{joint}"
+    for limb in (("knee", "ankle"), ("elbow", "wrist"))
+    for side in ("left", "right")
+    for joint in limb
+    for _ in range(2)
+]
+"""Points that are dragged to place a person, from the trunk outwards, each in the next view."""
 TRUNK = [name for name in LIMBS if name.endswith(("shoulder", "hip"))]
 
 

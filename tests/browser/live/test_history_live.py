@@ -5,7 +5,7 @@ import resource
 
 import pytest
 import pytest_asyncio
-from page_driver import dragging, handle_of, state_of, to_client
+from page_driver import dragging, go_to, handle_of, state_of, to_client
 from page_driver import shows as shows_within
 from program import WITHOUT_3D
 
@@ -27,13 +27,6 @@ async def tabs(browser, program):
 
 async def shows(page, expression, timeout_s=30.0):
     await shows_within(page, expression, timeout_s)
-
-
-async def go_to(page, frame):
-    await page.locator("#frame").fill(str(frame))
-    await page.keyboard.press("Enter")
-    await page.locator("#frame").blur()
-    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}")
 
 
 async def lift(page, point, px):

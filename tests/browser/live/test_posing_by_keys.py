@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 import pytest_asyncio
-from page_driver import handle_of, state_of
+from page_driver import go_to, handle_of, state_of
 from page_driver import shows as shows_within
 from program import visit_again
 
@@ -20,13 +20,6 @@ async def live(tab, program):
 
 async def shows(page, expression, timeout_s=30.0):
     await shows_within(page, expression, timeout_s)
-
-
-async def go_to(page, frame):
-    await page.locator("#frame").fill(str(frame))
-    await page.keyboard.press("Enter")
-    await page.locator("#frame").blur()
-    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}")
 
 
 async def select(page, joint):

@@ -5,7 +5,7 @@ from contextlib import asynccontextmanager, closing
 
 import pytest
 import pytest_asyncio
-from page_driver import OPENED, dragging, shows
+from page_driver import OPENED, dragging, go_to, shows
 from program import ROOT, WITHOUT_3D, started
 
 from tracker.session.session import load_session
@@ -51,13 +51,6 @@ async def join(page, name):
     await shows(page, f"quadrille.state.presence?.name.toLowerCase() === '{name.lower()}' && quadrille.state.connected")
     await page.keyboard.press("Escape")
     await shows(page, OPENED)
-
-
-async def go_to(page, frame):
-    await page.locator("#frame").fill(str(frame))
-    await page.keyboard.press("Enter")
-    await page.evaluate("document.activeElement.blur()")
-    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}")
 
 
 async def test_two_pages_work_on_one_session(browser, program, folder):

@@ -1,6 +1,5 @@
 """A body acquired in a session: which frames count, what is stored, and that keyframes follow."""
 
-import shutil
 from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,13 +28,6 @@ from tracker.pipeline.body_acquisition import (
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PinChange, PoseChange, PoseRecord
-
-
-@pytest.fixture
-def session(tmp_path, sample_folder):
-    session = load_session(shutil.copytree(sample_folder, tmp_path / "session"))
-    session.annotations_path.unlink(missing_ok=True)
-    return session
 
 
 @pytest.fixture

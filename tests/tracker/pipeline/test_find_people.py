@@ -1,6 +1,5 @@
 """People found with nobody's help: which frames are tried, what is said where nobody can be found, what is stored."""
 
-import shutil
 import threading
 import time
 from contextlib import closing
@@ -42,13 +41,6 @@ from tracker.session.store.annotation_store import AnnotationStore
 NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 CAMERAS = [replace(c, name=n) for c, n in zip(cameras_about_a_figure(), NAMES, strict=True)]
 HALF = np.array([0.17, 0.17, 0.6])
-
-
-@pytest.fixture
-def session(tmp_path, sample_folder):
-    session = load_session(shutil.copytree(sample_folder, tmp_path / "session"))
-    session.annotations_path.unlink(missing_ok=True)
-    return session
 
 
 @pytest.fixture

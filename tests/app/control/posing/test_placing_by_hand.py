@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gestures import PAGE, pixel_of, wait_for
 from program import ROOT
-from scripted_user import ScriptedUser
+from scripted_user import ORDER, ScriptedUser
 
 from app.control.controller import Controller
 from app.session.frame_cache import FrameCache
@@ -24,14 +24,6 @@ from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 
 TANGO = ROOT / "sample_sessions" / "tango"
-LIMBS = [
-    f"{side}_{joint}"
-    for limb in (("knee", "ankle"), ("elbow", "wrist"))
-    for side in ("left", "right")
-    for joint in limb
-    for _ in range(2)
-]
-ORDER = ["torso", "torso", "left_shoulder", "right_shoulder", *LIMBS]
 NEAR_ENOUGH_PX = 4
 """Whatever looks nearer than this, nobody drags."""
 SEEDS = range(3)
