@@ -143,6 +143,15 @@ class Hands:
         raise AssertionError("the action changed nothing")
 
 
+async def fitted(live, hands, user):
+    """Error after one Fit, mm."""
+    before = hands.values
+    await live.keyboard.press("g")
+    await shows(live, "/fit/i.test(quadrille.state.state.undo ?? '')", 60)
+    await hands.settled(before)
+    return user.error_mm(hands.values)
+
+
 async def test_a_body_is_placed_by_drags(live, folder, record_property):
     session = load_session(folder)
     user, hands = user_of(session, BY_DRAGS), Hands(live, folder, BY_DRAGS)
@@ -159,11 +168,7 @@ async def test_a_body_is_placed_by_drags(live, folder, record_property):
             for camera in (FRONT, RIGHT):
                 await hands.drag(camera, f"{side}_{joint}", user.aim_px(f"{side}_{joint}", camera))
     by_hand_mm = user.error_mm(hands.values)
-    before = hands.values
-    await live.keyboard.press("g")
-    await shows(live, "/fit/i.test(quadrille.state.state.undo ?? '')", 60)
-    await hands.settled(before)
-    fitted_mm = user.error_mm(hands.values)
+    fitted_mm = await fitted(live, hands, user)
     record_property("drags", f"{hands.actions} actions, {by_hand_mm:.0f} mm; after one Fit {fitted_mm:.0f} mm")
     assert hands.actions <= MOST_ACTIONS
     assert by_hand_mm < 70
@@ -216,11 +221,7 @@ async def test_a_body_is_placed_by_torso_drags_and_sliders(live, folder, record_
             break
         await hands.slide(joint, name, by)
     by_hand_mm = user.error_mm(hands.values)
-    before = hands.values
-    await live.keyboard.press("g")
-    await shows(live, "/fit/i.test(quadrille.state.state.undo ?? '')", 60)
-    await hands.settled(before)
-    fitted_mm = user.error_mm(hands.values)
+    fitted_mm = await fitted(live, hands, user)
     record_property("sliders", f"{hands.actions} actions, {by_hand_mm:.0f} mm; after one Fit {fitted_mm:.0f} mm")
     assert by_hand_mm < 70
     assert fitted_mm < 45

@@ -1,6 +1,6 @@
 import random
 import struct
-import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import av
 import cv2
@@ -202,11 +202,8 @@ def test_many_threads_get_the_right_frames(tmp_path):
             if number(video.read(k)) != k:
                 wrong.append(k)
 
-    threads = [threading.Thread(target=work, args=(s,)) for s in range(4)]
-    for t in threads:
-        t.start()
-    for t in threads:
-        t.join()
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(work, range(4)))
     assert wrong == []
 
 
