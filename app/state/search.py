@@ -46,12 +46,12 @@ class ReplayState:
     """Name of the current stage; None at the start."""
     candidate_px: float | None
     """Cost of the candidate, px."""
-    best_px: float | None
-    """Cost of the best poses, px."""
-    best_view_costs_px: tuple[float | None, ...]
-    """Cost of the best poses in each view, px; empty where unknown."""
     evaluations: int
     """Poses scored so far."""
+    cost_px: float | None
+    """Cost of the best poses, px."""
+    view_costs_px: tuple[float | None, ...]
+    """The same in each view, px; empty where unknown."""
     fitted_from: tuple[Array, ...] | None = None
     """Of a fit of contours the pose of each person at its start; None for a search."""
 

@@ -187,7 +187,7 @@ class State:
         if replayed is not None:
             people = tuple(ShownPose(best, "searched") for best in replayed.best)
             search = replace(self.search, candidate=replayed.candidate)
-            costs = Costs(cost_px=replayed.best_px, view_costs_px=replayed.best_view_costs_px)
+            costs = Costs(cost_px=replayed.cost_px, view_costs_px=replayed.view_costs_px)
             return replace(self, people=people, search=search, drag=None, **costs)
         compared = self.compared
         if compared is not None and compared.is_before_shown:

@@ -80,9 +80,10 @@ def _cell(row: FrameRow) -> dict:
 
 
 def _summary(rows: Mapping[str, FrameRow]) -> dict:
-    """Summarize a frame: the worst status and cost of the people, and the source nearest to a person's own work.
+    """Summarize a frame: the worst status of the people, and the source nearest to a person's own work.
 
-    The limbs of several people are named in their own lanes.
+    The cost is that of the last change, which concerns all people as they are now. The limbs of several people are
+    named in their own lanes.
     """
     first, *others = rows.values()
     cell = _cell(first)
@@ -93,11 +94,10 @@ def _summary(rows: Mapping[str, FrameRow]) -> dict:
             cell["source"] = row.source
         if _STATUS_RANKS[row.status] < _STATUS_RANKS[cell["status"]]:
             cell["status"] = row.status
-        if row.cost_px is not None:
-            cell["cost_px"] = max(round(row.cost_px, 3), cell["cost_px"] or 0.0)
         cell["keyframe"] |= row.keyframe
         cell["reviewed"] &= row.reviewed
         cell["ambiguous"] |= row.ambiguous
+    cell["cost_px"] = _cell(max(rows.values(), key=lambda row: row.change))["cost_px"]
     cell["remark"] = "; ".join(f"{name}: {row.remark}" for name, row in rows.items() if row.remark)
     cell["limbs_lost"] = ()
     return cell

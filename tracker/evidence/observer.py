@@ -60,6 +60,7 @@ class Observer:
     def __init__(
         self, cameras: Sequence[CameraSource], recording: Recording, in_recording: Sequence[int] | None = None,
         views: Sequence[Foreground] | None = None, keypoints: KeypointEvidence | None = None, in_time: bool = False,
+        origin: "Observer | None" = None,
     ) -> None:  # fmt: skip
         """Read the backgrounds.
 
@@ -70,6 +71,7 @@ class Observer:
             views: the foreground of each view, if another observer has read the backgrounds.
             keypoints: of all people in these views, if they are evidence, too.
             in_time: see `in_time`.
+            origin: the observer that this one is made of; None if it is the first.
 
         Raises:
             RecordingError: a background is missing, unreadable or of the wrong size.
@@ -77,6 +79,8 @@ class Observer:
         self.cameras = tuple(cameras)
         self.recording = recording
         """Footage of the views."""
+        self.origin = origin or self
+        """The observer of all cameras that this one was made of. Its pictures are those of the frames themselves."""
         self._in_recording, self.keypoints, self._is_in_time = in_recording, keypoints, in_time
         # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
@@ -90,12 +94,11 @@ class Observer:
 
     def with_cameras(self, chosen: Sequence[int]) -> "Observer":
         """Return an observer of some of the views, by their indices, of the same footage."""
-        return Observer(*self._of(chosen))
+        return self._with(chosen, self.keypoints, self._is_in_time)
 
     def with_keypoints(self, keypoints: KeypointEvidence | None) -> "Observer":
         """Return an observer of the same views to which key points are evidence, too; None: to which they are not."""
-        cameras, recording, in_recording, views, _, in_time = self._of(range(len(self.cameras)))
-        return Observer(cameras, recording, in_recording, views, keypoints, in_time)
+        return self._with(range(len(self.cameras)), keypoints, self._is_in_time)
 
     def in_time(self) -> "Observer":
         """Return an observer of the same views that takes the picture of each that is nearest in time to the frame.
@@ -104,18 +107,14 @@ class Observer:
         """
         if self._is_in_time or all(c.clock.is_in_step(self.recording.n_frames) for c in self.cameras):
             return self
-        cameras, recording, in_recording, views, keypoints, _ = self._of(range(len(self.cameras)))
-        return Observer(cameras, recording, in_recording, views, keypoints, in_time=True)
+        return self._with(range(len(self.cameras)), self.keypoints, in_time=True)
 
-    def _of(
-        self, chosen: Sequence[int]
-    ) -> tuple[list[CameraSource], Recording, list[int], list[Foreground], KeypointEvidence | None, bool]:
-        """Return the arguments of an observer of some of the views."""
-        known = self.in_recording
-        cameras = [self.cameras[i] for i in chosen]
-        keypoints = None if self.keypoints is None else self.keypoints.of_views(chosen)
-        in_recording, views = [known[i] for i in chosen], [self._views[i] for i in chosen]
-        return cameras, self.recording, in_recording, views, keypoints, self._is_in_time
+    def _with(self, chosen: Sequence[int], keypoints: KeypointEvidence | None, in_time: bool) -> "Observer":
+        """Return an observer of some of the views, with key points of all of them."""
+        keypoints = None if keypoints is None else keypoints.of_views(chosen)
+        cameras, in_recording = [self.cameras[i] for i in chosen], [self.in_recording[i] for i in chosen]
+        views = [self._views[i] for i in chosen]
+        return Observer(cameras, self.recording, in_recording, views, keypoints, in_time, self.origin)
 
     @property
     def in_recording(self) -> Sequence[int]:

@@ -16,11 +16,12 @@ from tracker.estimation.tracking.pose_errors import (
     unshown_odds,
 )
 from tracker.estimation.tracking.remarks import may_be_elsewhere, uncertain, without_uncertainty
+from tracker.pipeline.tracked_changes import number
 from tracker.session.store.records import PoseRecord
 
 
 def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseRecord:
-    """Return a pose with the errors of its points, and the status that follows from them and from what else it may be.
+    """Return a pose with its cost, the errors of its points, and the status that follows from what else it may be.
 
     Args:
         model: the body.
@@ -49,4 +50,7 @@ def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseR
     if status != "good" and (reasons[worst] or not remarks):
         remarks = [uncertain(limbs(model)[worst].name, reasons[worst]), *remarks]
     lost = tuple(map(float, probabilities(odds[:, 1])))
-    return replace(pose, errors=errors, status=status, limbs_lost=lost, remark=", ".join(remarks))
+    return replace(
+        pose, errors=errors, status=status, limbs_lost=lost, remark=", ".join(remarks), cost_px=number(found.cost_px),
+        view_costs_px=tuple(map(number, found.view_costs_px)),
+    )  # fmt: skip

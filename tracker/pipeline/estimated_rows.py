@@ -31,8 +31,6 @@ def estimated_row(
         before,
         values=found.pose,
         model_revision=revision,
-        cost_px=number(found.cost_px),
-        view_costs_px=tuple(map(number, found.view_costs_px)),
         part_costs_px=tuple(number(c) for c in found.part_costs_px),
         trace=(*(x for x in before.trace or () if x.kind != "path"), *searches),
     )

@@ -130,7 +130,7 @@ def stored_run(
         make_tracker(plan.settings),
         legs,
         [StoredPerson(p.name, store.add_model_revision(p.name, format_model(p.model))) for p in people],
-        StoreWriter(store, _views(session, plan)),
+        StoreWriter(store),
         f"track frames {min(plan.frames)}:{max(plan.frames) + 1}",
         _SAVE_FRAMES,
         _records_before(session, store, done, subjects),
@@ -149,12 +149,6 @@ def _history(session: Session, store: AnnotationStore, frames: Sequence[int]) ->
     """Return the stored poses of all people on the two frames before some frames, as far as all have one."""
     step = frames[1] - frames[0] if len(frames) > 1 else 1
     return poses_beside(frames[0], -step, lambda k: [_pose_on(store, person, k) for person in session.people])
-
-
-def _views(session: Session, plan: TrackPlan) -> list[int | None]:
-    """Return for each camera of the session its index among those that are tracked with; None for the others."""
-    used = [c.camera.name for c in plan.sources(session)]
-    return [used.index(c.camera.name) if c.camera.name in used else None for c in session.cameras]
 
 
 def _frames_done(session: Session, store: AnnotationStore, plan: TrackPlan) -> list[int]:

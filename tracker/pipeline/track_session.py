@@ -5,10 +5,14 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
+from tracker.body.motion.velocity import moving_bodies
 from tracker.compute.progress import mapped
 from tracker.estimation.runs.frame_hypotheses import Proposal
 from tracker.estimation.runs.path_assessment import RunPose
 from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
+from tracker.estimation.search.chamfer_cost import frame_cost
 from tracker.estimation.tracking.confidence import Status, status_named
 from tracker.estimation.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
 from tracker.estimation.tracking.person_memory import HISTORY_FRAMES
@@ -179,7 +183,16 @@ class TrackSession:
         for leg in self.legs:
             for own in leg.left:
                 run = self._run_of(leg, own)
-                yield from (found for found in self.tracker.estimates(run) if found.frame != leg.start)
+                yield from (self._scored(found) for found in self.tracker.estimates(run) if found.frame != leg.start)
+
+    def _scored(self, found: PoseEstimate) -> PoseEstimate:
+        """Return an estimate with the cost of its poses; without one if the estimate of all frames is to move them."""
+        if self.tracker.settings.whole_run:
+            return found._replace(cost_px=np.nan, view_costs_px=np.empty(0))
+        poses = {k: own.poses for k, own in self.tracked.items()} | {found.frame: found.poses}
+        bodies = moving_bodies(self.subjects.models, poses, found.frame)
+        cost = frame_cost(self.observer.origin.evidence(found.frame), bodies)
+        return found._replace(cost_px=cost.total_px, view_costs_px=cost.view_costs_px)
 
     def _run_of(self, leg: Leg, own: slice) -> TrackingRun:
         """Return the run of a block of a leg, which begins at the poses before it."""

@@ -1,7 +1,7 @@
 """Convert pose estimates to rows of the store, write them, and read stored keyframes as input of a tracker."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -42,15 +42,9 @@ class PoseWriter(Protocol):
 class StoreWriter:
     """Writes the poses of a run to a store at once."""
 
-    def __init__(self, store: AnnotationStore, views: Sequence[int | None] = ()) -> None:
-        """Write to a store that is open.
-
-        Args:
-            store: annotations of the session.
-            views: for each camera of the session its index among those that are tracked with; empty for all.
-        """
-        self._store, self._views = store, views
-        self._n_used = sum(v is not None for v in views)
+    def __init__(self, store: AnnotationStore) -> None:
+        """Write to a store of annotations that is open."""
+        self._store = store
 
     def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int:
         """See `PoseWriter.write`.
@@ -58,22 +52,10 @@ class StoreWriter:
         Raises:
             SessionError: the store cannot be written.
         """
-        if self._n_used < len(self._views):
-            changes = [self._with_all_views(change) for change in changes]
         if edit is None:
             return self._store.commit(label, changes, by_program=True).edit
         self._store.amend(edit, changes, by_program=True)
         return edit
-
-    def _with_all_views(self, change: RunChange) -> RunChange:
-        """Return a row whose costs by view are those of all cameras; a row that was read from the store has them."""
-        if isinstance(change, AssessmentChange):
-            return change
-        pose = change.pose
-        if pose is None or len(pose.view_costs_px) != self._n_used:
-            return change
-        costs = tuple(None if v is None else pose.view_costs_px[v] for v in self._views)
-        return replace(change, pose=replace(pose, view_costs_px=costs))
 
 
 class StoredPerson(NamedTuple):

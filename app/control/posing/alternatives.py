@@ -6,6 +6,7 @@ import numpy as np
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from app.state.state import Costs
 from tracker.errors import TrackerError
 from tracker.session.store.records import Alternative, PoseChange, PoseRecord
 
@@ -52,7 +53,9 @@ class Alternatives:
                     "go to a frame that the timeline marks as ambiguous"
                 )
             first = person if person in found else min(found)
-            changes = [self._change(i, found[i], k) for i, k in _together(found, first, at).items()]
+            taken = _together(found, first, at)
+            costs = self._costs({i: found[i][k] for i, k in taken.items()})
+            changes = [self._change(i, found[i], k, costs) for i, k in taken.items()]
             names = " and ".join(c.person for c in changes)
             whose = f" of {names}" if len(session_state.session.people) > 1 else ""
             label = f"take alternative pose{whose}, frame {session_state.state.frame}"
@@ -89,14 +92,22 @@ class Alternatives:
         stored = {i: self._session_state.saver.alternatives(i, frame) for i in range(len(self._session_state.models))}
         return {i: poses for i, poses in stored.items() if poses}
 
-    def _change(self, person: int, stored: tuple[Alternative, ...], at: int) -> PoseChange:
+    def _costs(self, taken: Mapping[int, Alternative]) -> Costs:
+        """Return the costs of the frame with alternatives of some people."""
+        session_state, state = self._session_state, self._session_state.state
+        poses = tuple(taken[i].values if i in taken else pose for i, pose in enumerate(state.poses))
+        bodies = session_state.saver.revisions
+        models = tuple(bodies.body(taken[i].model_revision) if i in taken else m for i, m in enumerate(state.models))
+        return session_state.costs(poses, state.frame, models)
+
+    def _change(self, person: int, stored: tuple[Alternative, ...], at: int, costs: Costs) -> PoseChange:
         """Return the change that stores one of the alternatives and appends the former pose to them."""
         session_state, frame = self._session_state, self._session_state.state.frame
         former, taken = session_state.saver.record(person, frame), stored[at]
         others = (*stored[:at], *stored[at + 1 :])
         assert former is not None  # alternatives are stored with a pose
         sources = ("manual",) * len(taken.values)
-        record = PoseRecord(taken.values, sources, taken.model_revision, True, cost_px=taken.cost_px, reviewed=True)
+        record = PoseRecord(taken.values, sources, taken.model_revision, True, reviewed=True, **costs)
         back = Alternative(former.values, former.model_revision, former.cost_px)
         return PoseChange(session_state.session.people[person].name, frame, record, (*others, back))
 

@@ -159,6 +159,7 @@ class Dragging:
         if grab is None or drag is None:
             return
         self._scores_moves = False
+        session_state.set(**session_state.costs(session_state.state.poses))
         has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
             self._save(drag, grab)
@@ -166,7 +167,7 @@ class Dragging:
         elif not session_state.is_shown_stored(session_state.state):
             session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source
         self._gesture_grab = self._mode_grab = session_state.open_edit_owner = None
-        session_state.set(drag=None, **session_state.costs(session_state.state.poses))
+        session_state.set(drag=None)
         if has_moved:
             note_unseen_depth(session_state, drag.person, drag.point)
 

@@ -48,22 +48,17 @@ class Replay:
             run = self._run(number)
             if self._session_state.state.search.running:
                 raise TrackerError("expected no running search during a replay, found one; stop it first (Esc)")
-            at, fitted_from = min(max(-1, step), len(run.steps) - 1), run.start if run.is_contour_fit else None
-            if at < 0:
-                costs: tuple[float | None, ...] = ()
-                shown = ReplayState(
-                    number, -1, len(run.steps), None, run.start, None, finite_or_none(run.start_px),
-                    finite_or_none(run.start_px), costs, 0, fitted_from,
-                )  # fmt: skip
-            else:
+            at, candidate, best, stage = min(max(-1, step), len(run.steps) - 1), None, run.start, None
+            px, evaluations, fitted_from = finite_or_none(run.start_px), 0, run.start if run.is_contour_fit else None
+            if at >= 0:
                 recorded = run.steps[at]
                 candidate = None if run.is_contour_fit else run.poses_of(recorded.candidate)
-                shown = ReplayState(
-                    number, at, len(run.steps), candidate, run.poses_of(recorded.best),
-                    run.stages[recorded.stage].name, recorded.candidate_px, recorded.best_px,
-                    tuple(finite_or_none(float(c)) for c in recorded.best_view_costs_px), recorded.evaluations,
-                    fitted_from,
-                )  # fmt: skip
+                best, stage = run.poses_of(recorded.best), run.stages[recorded.stage].name
+                px, evaluations = recorded.candidate_px, recorded.evaluations
+            costs = self._session_state.costs(best)
+            shown = ReplayState(
+                number, at, len(run.steps), candidate, best, stage, px, evaluations, **costs, fitted_from=fitted_from
+            )
             leave_before(self._session_state)
             self._set_view(replace(self._view, replay=shown, preview=None))
 

@@ -34,8 +34,6 @@ class RecordedStep(NamedTuple):
     """Cost of the best pose of this expansion, px."""
     best_px: float
     """Lowest cost so far, px."""
-    best_view_costs_px: FloatArray
-    """That cost in each view, (V,), px; NaN for views without edges."""
     candidate: FloatArray
     """Values of all people, concatenated, for the best pose of this expansion."""
     best: FloatArray
@@ -98,6 +96,8 @@ class SearchRun:
         self.counts = [StageCount(0, 0, 0.0, False) for _ in self.stages]
         self.steps: list[RecordedStep] = []
         self.best, self.best_px = start, start_px
+        self.end_px = start_px
+        """Cost of the best poses, px. A running search compares poses by the edges near its start: then it is that."""
         self.start_px, self.evaluations, self.seconds = start_px, 0, 0.0
         self.over = False
         """Whether the run has ended."""
@@ -137,15 +137,19 @@ class SearchRun:
             self.start_px = step.best_px
         self.steps.append(
             RecordedStep(
-                self._at, step.evaluations, step.candidate_px, step.best_px, step.best_view_costs_px.astype(np.float32),
+                self._at, step.evaluations, step.candidate_px, step.best_px,
                 np.concatenate(step.candidate).astype(np.float32), self._best_row, better or step.stage_done,
             )
         )  # fmt: skip
-        self.best, self.best_px = step.best, step.best_px
+        self.best, self.best_px, self.end_px = step.best, step.best_px, step.best_px
         self.evaluations, self.seconds, self.version = step.evaluations, seconds, self.version + 1
         self._list(step.candidate_px, step.candidate)
         if len(self.steps) > MAX_STEPS:
             self._thin()
+
+    def rest(self, cost_px: float | None) -> None:
+        """Note the cost of the best poses, px, where the search pauses or ends; None if it is not known."""
+        self.end_px, self.version = self.best_px if cost_px is None else cost_px, self.version + 1
 
     def poses_of(self, row: FloatArray) -> tuple[Array, ...]:
         """Return the pose of each person from the values of a recorded step."""

@@ -15,7 +15,7 @@ from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.search import SearchState, SearchView
-from app.state.state import Costs, finite_or_none
+from app.state.state import Costs
 from tracker.errors import TrackerError
 from tracker.estimation.chamfer.settings import TrackSettings, search_frame
 from tracker.estimation.contour.fit_steps import FitPlan, contour_steps
@@ -59,7 +59,6 @@ class SearchRunner:
         with self._session_state.lock:
             self.forget()
             self._session_state.set(settings=settings)
-            self._session_state.set(**self._session_state.costs(self._session_state.state.poses))
 
     def step(self, person: int | None = None) -> None:
         """Do one expansion of the search, and begin a search if none of the same people is paused.
@@ -233,27 +232,22 @@ class SearchRunner:
                 else ShownPose(best, self._source_of(p, job), sources=self._sources[i])
                 for i, (p, best) in enumerate(zip(session_state.state.people, step.best, strict=True))
             )  # fmt: skip
+            costs = session_state.costs(tuple(p.values for p in people))
             shown = replace(
                 session_state.state.search, running=job.running, kind="search", stage=step.stage.name,
                 evaluations=step.evaluations, per_second=step.evaluations / max(1e-6, seconds),
-                best_px=step.best_px, candidate=step.candidate, message="",
+                best_px=costs["cost_px"], candidate=step.candidate, message="",
             )  # fmt: skip
             changed = any(a is not b for a, b in zip(people, session_state.state.people, strict=True))
-            view_costs_px = tuple(finite_or_none(c) for c in step.best_view_costs_px)
-            session_state.set(
-                people=people, search=shown, search_view=self._compared_with(self._run),
-                cost_px=step.best_px, view_costs_px=view_costs_px,
-            )  # fmt: skip
+            session_state.set(people=people, search=shown, search_view=self._compared_with(self._run), **costs)
             if changed and time.monotonic() - session_state.last_save > _SAVE_S:
                 session_state.save("search", "searched", job)
 
     def _paused(self, job: Job[SearchStep]) -> None:
         with self._session_state.lock:
-            if job is self._job:
-                state = self._session_state.state
-                self._session_state.set(
-                    search=replace(state.search, running=False), **self._session_state.costs(state.poses)
-                )
+            if job is self._job and self._run is not None:
+                self._session_state.set(search=replace(self._session_state.state.search, running=False))
+                self._run.rest(self._session_state.state.cost_px)
                 self._compare()
                 self._save(job)
 
@@ -270,7 +264,8 @@ class SearchRunner:
             ended = replace(
                 session_state.state.search, running=False, kind=None, stage=None, candidate=None, message=message
             )
-            session_state.set(search=ended, **session_state.costs(session_state.state.poses))
+            session_state.set(search=ended)
+            self._run.rest(session_state.state.cost_px)
             if error is None:
                 self._compare()
             self._save(job)
@@ -280,7 +275,7 @@ class SearchRunner:
         session_state = self._session_state
         message = f"stopped: {session_state.state.search.evaluations} poses scored"
         self.forget()
-        session_state.set(search=SearchState(message=message), **session_state.costs(session_state.state.poses))
+        session_state.set(search=SearchState(message=message))
 
     def _compared_with(self, run: SearchRun) -> SearchView:
         """Return the search view; where a continued run is drawn for comparison, with its new result."""

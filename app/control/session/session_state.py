@@ -21,10 +21,10 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.interpretation import interpreted
 from tracker.compute.kernel_cache import STAGES
 from tracker.errors import SessionError, TrackerError
-from tracker.estimation.by_frame.settings import chamfer_cost
 from tracker.estimation.fitting.gauss_newton import value_mask, with_locked_dofs
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.posing.grab import Constraints
+from tracker.estimation.search.chamfer_cost import frame_cost
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
 from tracker.pipeline.seen_points import seen_points
@@ -319,7 +319,7 @@ class SessionState:
         velocities: Sequence[Array | None],
     ) -> Costs:  # fmt: skip
         bodies = map(PosedBody, models, poses, velocities or [None] * len(poses))
-        cost = chamfer_cost(views, [*bodies], self.state.settings).at_prediction()
+        cost = frame_cost(views, [*bodies])
         return {
             "cost_px": finite_or_none(cost.total_px),
             "view_costs_px": tuple(finite_or_none(c) for c in cost.view_costs_px),

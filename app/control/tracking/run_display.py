@@ -78,8 +78,6 @@ class RunDisplay:
         """Return the fields of the state that show a tracked frame."""
         session_state, subjects = self._session_state, self._session.subjects
         keyframes, tracked = subjects.keyframes_at(found.frame), subjects.tracked
-        names = [c.camera.name for c in self._session.observer.cameras]
-        view_costs_px = dict(zip(names, map(finite_or_none, found.view_costs_px), strict=True))
         people = []
         for i, shown in enumerate(session_state.state.people):
             stored = session_state.saver.pose(i, found.frame) if i in keyframes or i not in tracked else None
@@ -99,7 +97,7 @@ class RunDisplay:
             "models": models,
             "revisions": revisions,
             "cost_px": finite_or_none(found.cost_px),
-            "view_costs_px": tuple(map(view_costs_px.get, session_state.session.camera_names)),
+            "view_costs_px": tuple(map(finite_or_none, found.view_costs_px)),
         }
 
     def _with_doubts(self, track: TrackState) -> TrackState:

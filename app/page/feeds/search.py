@@ -160,7 +160,7 @@ def _run(run: SearchRun, differs: dict[str, str], state: State) -> wire.SearchRu
         number=run.number,
         state="over" if not is_current else "running" if state.search.running else "paused",
         start_px=finite_or_none(run.start_px),
-        best_px=finite_or_none(run.best_px),
+        best_px=finite_or_none(run.end_px),
         evaluations=run.evaluations,
         seconds=run.seconds,
         steps=len(run.steps),
@@ -178,7 +178,7 @@ def _replay(replay: ReplayState | None) -> wire.Replay | None:
         step=replay.step,
         stage=replay.stage,
         candidate_px=replay.candidate_px,
-        best_px=replay.best_px,
+        best_px=replay.cost_px,
         evaluations=replay.evaluations,
     )
 

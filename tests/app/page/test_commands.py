@@ -22,9 +22,9 @@ def drag_to(u, phase, seq):
 @pytest.fixture
 def scorings(placed, monkeypatch):
     """The poses scored from now on."""
-    scored, score = [], session_state.chamfer_cost
+    scored, score = [], session_state.frame_cost
     monkeypatch.setattr(
-        session_state, "chamfer_cost", lambda *args: scored.append([b.values for b in args[1]]) or score(*args)
+        session_state, "frame_cost", lambda *args: scored.append([b.values for b in args[1]]) or score(*args)
     )
     return scored
 

@@ -1,10 +1,10 @@
 """Velocities of poses, by which a body is shown to cameras whose pictures were taken between frames."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.shortest_step import shortest_step
 from tracker.geometry.arrays import Array
 
@@ -27,3 +27,18 @@ def velocity(model: BodyModel, poses: Mapping[int, Array], frame: int) -> Array 
     if 0 not in known or before == after:
         return None
     return shortest_step(model, known[after], known[before]) / (after - before)
+
+
+def moving_bodies(
+    models: Sequence[BodyModel], poses: Mapping[int, Sequence[Array]], frame: int
+) -> tuple[PosedBody, ...]:
+    """Return all people on a frame, with their velocities by the frames around.
+
+    Args:
+        models: the body of each person.
+        poses: of all people by frame, (n_values,) each.
+        frame: a frame with poses.
+    """
+    near = {k: poses[k] for k in range(frame - 2, frame + 3) if k in poses}
+    speeds = [velocity(m, {k: own[i] for k, own in near.items()}, frame) for i, m in enumerate(models)]
+    return tuple(map(PosedBody, models, poses[frame], speeds))

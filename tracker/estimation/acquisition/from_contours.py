@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.velocity import velocity
+from tracker.body.motion.velocity import moving_bodies
 from tracker.compute.progress import Report, stages, unreported
 from tracker.compute.sampling import spread_indices
 from tracker.errors import TrackerError
@@ -28,11 +28,11 @@ from tracker.estimation.acquisition.size_parameters import SizeParameters, SizeP
 from tracker.estimation.acquisition.typical_body import typical_body
 from tracker.estimation.by_frame.forward_pass import update_static_edges
 from tracker.estimation.by_frame.frame_problem import FrameProblem, PersonPrior
-from tracker.estimation.by_frame.settings import chamfer_cost
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.gauss_newton import PointTargets
 from tracker.estimation.fitting.pins import PinBlock
 from tracker.estimation.fitting.retarget import retarget_pose
+from tracker.estimation.search.chamfer_cost import ChamferCost
 from tracker.estimation.tracking.pose_errors import acquired_sigma_m
 from tracker.estimation.tracking.view_regions import read_views, visible_pieces_px
 from tracker.evidence.contours import occluding_contours
@@ -138,7 +138,7 @@ def acquire_from_contours(
     for i, k in enumerate(frames):
         views = read_views(observer, k, bodies[k], static_edges)
         observed.append(views)
-        before.append(cost_px(views, bodies[k]))
+        before.append(ChamferCost(views, bodies[k]).at_prediction().total_px)
         sighted.append(
             SightedPerson(k, own_views(views, bodies[k], person), typical[k], person, placed.get(k), seen.get(k))
         )
@@ -155,7 +155,7 @@ def acquire_from_contours(
         )
     found = fit_sizes_to_contours(parameters, sighted, fit, by_voxels.start if by_voxels else None, fitting)
     after = [
-        cost_px(views, s.moved(found.body, p).bodies)
+        ChamferCost(views, s.moved(found.body, p).bodies).at_prediction().total_px
         for views, s, p in zip(observed, sighted, found.poses, strict=True)
     ]
     report("done", 1.0)
@@ -171,12 +171,8 @@ def moving(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> M
     """Return the people with their velocities, by their poses on the frames around, where pictures need them."""
     if not any(any(observer.ahead_frames(k)) for k in bodies):
         return bodies
-    people = range(len(next(iter(bodies.values()))))
-    poses = [{k: own[i].values for k, own in bodies.items()} for i in people]
-    return {
-        k: tuple(replace(b, velocity=velocity(b.model, poses[i], k)) for i, b in enumerate(own))
-        for k, own in bodies.items()
-    }
+    poses = {k: [b.values for b in own] for k, own in bodies.items()}
+    return {k: moving_bodies([b.model for b in own], poses, k) for k, own in bodies.items()}
 
 
 def _with_body(bodies: tuple[PosedBody, ...], person: int, body: BodyModel) -> tuple[PosedBody, ...]:
@@ -197,11 +193,6 @@ def _fit_to_voxels(
     finally:
         finder.close()
     return fit_sizes_to_voxels(parameters, seen, settings, report)
-
-
-def cost_px(views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> float:
-    """Return the cost of all people on a frame, px."""
-    return chamfer_cost(views, bodies, TrackSettings()).at_prediction().total_px
 
 
 def _spread(frames: Sequence[int], n: int, keep: Sequence[int]) -> list[int]:

@@ -16,9 +16,10 @@ from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.chamfer_search import ChamferSearchSettings, search_shapes
-from tracker.estimation.acquisition.from_contours import Acquisition, cost_px, learn_static_edges, moving, own_views
+from tracker.estimation.acquisition.from_contours import Acquisition, learn_static_edges, moving, own_views
 from tracker.estimation.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.estimation.acquisition.size_parameters import SizeParameters, SizePriors
+from tracker.estimation.search.chamfer_cost import ChamferCost
 from tracker.estimation.tracking.view_regions import read_views
 from tracker.evidence.observer import Observer
 from tracker.geometry.cameras import Camera
@@ -97,7 +98,8 @@ def acquire_from_two_views(
             "place it where the person is"
         )
     body = parameters.body(found.sizes)
-    before, after = (cost_px(views, b) for b in (bodies[frame], sighted.moved(body, sighted.pose).bodies))
+    posed = bodies[frame], sighted.moved(body, sighted.pose).bodies
+    before, after = (ChamferCost(views, b).at_prediction().total_px for b in posed)
     report("done", 1.0)
     n = len(found.sizes)
     fit = SizeFit(found.sizes, body, (sighted.pose,), found.chamfer_after_m, np.full((n, n), np.nan))

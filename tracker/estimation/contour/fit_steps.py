@@ -79,7 +79,8 @@ def contour_steps(views: Sequence[ViewEvidence], poses: Sequence[Array], plan: F
                     continue
                 first, done = first or i, done + (not is_start)
                 now = (*now[:person], i.pose, *now[person + 1 :])
-                yield _step(stage, now, _relative(i, first), done, is_last, len(views))
+                px = _relative_px(i, first)
+                yield SearchStep(stage, now, px, now, px, done, is_last)
 
 
 def _with_last(iterations: Iterator[FitIteration]) -> Iterator[tuple[FitIteration, bool]]:
@@ -91,16 +92,9 @@ def _with_last(iterations: Iterator[FitIteration]) -> Iterator[tuple[FitIteratio
     yield now, True
 
 
-def _relative(now: FitIteration, first: FitIteration) -> FitIteration:
-    """Return an iteration with the RMS distance over the length of the contours at the start."""
-    return now._replace(rms_px=first.rms_px * float(np.sqrt(now.cost / first.cost)) if first.cost > 0 else now.rms_px)
-
-
-def _step(
-    stage: Stage, poses: tuple[Array, ...], found: FitIteration, done: int, last: bool, n_views: int
-) -> SearchStep:
-    at = (*poses[: stage.person], found.pose, *poses[stage.person + 1 :])
-    return SearchStep(stage, at, found.rms_px, at, found.rms_px, np.full(n_views, np.nan), done, last)
+def _relative_px(now: FitIteration, first: FitIteration) -> float:
+    """Return the RMS distance of an iteration over the length of the contours at the start, px."""
+    return first.rms_px * float(np.sqrt(now.cost / first.cost)) if first.cost > 0 else now.rms_px
 
 
 def residual_segments(bodies: Sequence[PosedBody], view: ViewEvidence) -> FloatArray:

@@ -14,18 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.velocity import velocity
+from tracker.body.motion.velocity import moving_bodies
 from tracker.compute.progress import mapped
 from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions, learning_frames
 from tracker.estimation.appearance.region_model import RegionModel
 from tracker.estimation.by_frame.frame_problem import Bodies, with_body
 from tracker.estimation.by_frame.pose_score import common_evidence
 from tracker.estimation.by_frame.region_scorer import FrameEvidence
-from tracker.estimation.by_frame.settings import EstimationSettings, chamfer_cost
+from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.runs.frame_hypotheses import FrameHypotheses, Proposal
 from tracker.estimation.runs.path_assessment import RunPose, assessed_path
 from tracker.estimation.runs.path_search import ROUNDS, PathSearch
 from tracker.estimation.runs.proposals import other_sides
+from tracker.estimation.search.chamfer_cost import frame_cost
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.trajectory.solve import PosedPath, even_blocks, solve_path
 from tracker.evidence.observer import Observer
@@ -144,7 +145,7 @@ class _RunEstimate:
             done += n
         for t, k in enumerate(used):
             if k in own and k in self._run.poses:
-                cost = chamfer_cost(self._views[k], self._bodies(k), self._run.settings).at_prediction()
+                cost = frame_cost(self._run.observer.origin.evidence(k), self._bodies(k))
                 known = {"cost_px": cost.total_px, "view_costs_px": tuple(map(float, cost.view_costs_px))}
                 for i in people:
                     self._found[i][k] = assessed[i][t]._replace(**known)
@@ -174,14 +175,10 @@ class _RunEstimate:
 
     def _bodies(self, frame: int) -> Bodies:
         """Return all people on a frame, with their velocities where a view needs them."""
-        models, poses = self._run.subjects.models, self._poses[frame]
-        if not any(self._run.observer.ahead_frames(frame)):
-            return tuple(map(PosedBody, models, poses))
-        place = self._places[frame]
-        near = self._frames[max(0, place - 2) : place + 3]
-        known = [{k: self._poses[k][i] for k in near} for i in range(len(models))]
-        speeds = [velocity(m, own, frame) for m, own in zip(models, known, strict=True)]
-        return tuple(map(PosedBody, models, poses, speeds))
+        models, observer = self._run.subjects.models, self._run.observer
+        if not any((*observer.ahead_frames(frame), *observer.origin.ahead_frames(frame))):
+            return tuple(map(PosedBody, models, self._poses[frame]))
+        return moving_bodies(models, self._poses, frame)
 
     def _observe(self, frame: int, proposals: Sequence[tuple[int, Array]] = ()) -> tuple[ViewEvidence, ...]:
         """Return the evidence of a frame around all people, and around proposals, (n_values,) each, of some of them."""

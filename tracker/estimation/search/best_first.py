@@ -117,8 +117,6 @@ class SearchStep:
     """Cheapest poses so far, (n_values,) each."""
     best_px: float
     """Their cost, px."""
-    best_view_costs_px: Array
-    """Their cost in each view, (V,), px; NaN for views without edges."""
     evaluations: int
     """Poses scored since the search began."""
     stage_done: bool
@@ -132,8 +130,6 @@ class _Progress(NamedTuple):
     """Cheapest poses so far, (n_values,) each."""
     best_px: float
     """Their cost, px."""
-    best_view_costs_px: Array
-    """Their cost in each view, (V,), px."""
     evaluations: int
     """Poses scored so far."""
 
@@ -213,12 +209,11 @@ def search(
     """
     settings = settings or SearchSettings()
     predicted = [np.array(p, dtype=np.float64) for p in poses]
-    first = cost(predicted)
-    progress = _Progress(tuple(predicted), first.total_px, first.view_costs_px, 1)
+    progress = _Progress(tuple(predicted), cost(predicted).total_px, 1)
     for stage in stages(cost.models, settings, people, active_dofs):
         for step in _search_stage(cost, stage, settings, predicted[stage.person], progress):
             yield step
-            progress = _Progress(step.best, step.best_px, step.best_view_costs_px, step.evaluations)
+            progress = _Progress(step.best, step.best_px, step.evaluations)
 
 
 def _search_stage(
@@ -230,7 +225,7 @@ def _search_stage(
 ) -> Iterator[SearchStep]:
     """Search one stage best-first around the best pose so far, within the bounds around the prediction."""
     model, person = cost.models[stage.person], stage.person
-    best, best_px, view_costs_px, evaluations = progress
+    best, best_px, evaluations = progress
     dofs = [model.dof_names.index(d) for d in stage.group.dofs]
     bounds, steps = settings.lattice(model, dofs)
     steps = steps * stage.factor
@@ -262,7 +257,7 @@ def _search_stage(
         candidate, candidate_px = best[person], best_px
         if neighbours:
             candidates = poses_at(neighbours)
-            totals, views = cost.of_person(person, candidates, best)
+            totals, _ = cost.of_person(person, candidates, best)
             evaluations += len(neighbours)
             for total, neighbour in zip(totals, neighbours, strict=True):
                 heapq.heappush(queue, (float(total), neighbour))
@@ -270,9 +265,9 @@ def _search_stage(
             candidate, candidate_px = candidates[cheapest], float(totals[cheapest])
             if candidate_px < best_px:
                 best = (*best[:person], candidate, *best[person + 1 :])
-                best_px, view_costs_px, idle = candidate_px, views[cheapest], 0
+                best_px, idle = candidate_px, 0
         done = not queue or idle >= settings.patience or expansions >= settings.max_expansions
         shown = tuple(candidate if i == person else p for i, p in enumerate(best))
-        yield SearchStep(stage, shown, candidate_px, best, best_px, view_costs_px, evaluations, done)
+        yield SearchStep(stage, shown, candidate_px, best, best_px, evaluations, done)
         if done:
             return

@@ -224,6 +224,19 @@ class ChamferCost:
         return view_costs_px[..., self._seen].mean(axis=-1)
 
 
+def frame_cost(views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> Cost:
+    """Return the cost of all people on a frame, which is shown and stored with their poses.
+
+    It has one definition, whatever found the poses and by which settings: all edges of the whole pictures count, with
+    the usual outlier distances.
+
+    Args:
+        views: evidence of the frame, `Observer.evidence` of `Observer.origin` without regions.
+        bodies: all people, with their velocities where a view needs them.
+    """
+    return ChamferCost(views, bodies).at_prediction()
+
+
 def score_buffers(surfaces: Surfaces, room: int, n_dofs: int) -> ScoreBuffers:
     """Return scratch for pieces and for edge points of one view, both at most `room`, and for a person's dofs."""
     return ScoreBuffers(

@@ -78,7 +78,8 @@ def _set_assessment(db: sqlite3.Connection, edit: int, change: AssessmentChange)
     same = rows.UNASSESSED_COLUMNS
     inserted = db.execute(
         f"INSERT INTO pose_changes (edit, previous, person, frame, made_in, {rows.ASSESSED_COLUMNS}, {same}) "
-        f"SELECT ?1, id, person, frame, coalesce(made_in, edit), ?5, ?6, ?7, ?8, {same} FROM pose_changes "
+        "SELECT ?1, id, person, frame, coalesce(made_in, edit), ?5, ?6, ?7, ?8, coalesce(?9, cost_px), "
+        f"coalesce(?10, views_px), {same} FROM pose_changes "
         "WHERE id = (SELECT change FROM poses WHERE (person, frame) = (?2, ?3)) AND numbers = ?4",
         (edit, change.person, change.frame, rows.values_to_blob(change.values), *rows.assessment_to_row(change)),
     )

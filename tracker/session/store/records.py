@@ -119,11 +119,18 @@ class AssessmentChange(NamedTuple):
     """See `PoseRecord.limbs_lost`."""
     errors: Array | None
     """See `PoseRecord.errors`."""
+    cost_px: float | None = None
+    """See `PoseRecord.cost_px`; None leaves both costs as they are."""
+    view_costs_px: tuple[float | None, ...] = ()
+    """See `PoseRecord.view_costs_px`."""
 
     @classmethod
     def of(cls, person: str, frame: int, pose: PoseRecord) -> "AssessmentChange":
         """Return what a record says about its pose."""
-        return cls(person, frame, pose.values, pose.status, pose.remark, pose.limbs_lost, pose.errors)
+        return cls(
+            person, frame, pose.values, pose.status, pose.remark, pose.limbs_lost, pose.errors, pose.cost_px,
+            pose.view_costs_px,
+        )  # fmt: skip
 
 
 class PinChange(NamedTuple):
@@ -180,6 +187,8 @@ class FrameRow(NamedTuple):
     """Probability that each limb is lost, in the order of `tracker.body.limbs.limbs`; empty where not assessed."""
     assessed_since: bool = False
     """Whether it was assessed after it was set or marked; see `AssessmentChange`."""
+    change: int = 0
+    """Number of the change that wrote it; later ones are greater."""
 
 
 class FramePose(NamedTuple):

@@ -58,6 +58,7 @@ class _Summary(msgspec.Struct):
     others: _Flag
     limbs: bytes | None
     assessed_since: _Flag
+    change: _Id
 
 
 class _Pose(msgspec.Struct):
@@ -130,7 +131,7 @@ RECORD_COLUMNS = (
 """Columns that `row_to_record` reads; `e` and `t` are those of `ORIGIN`."""
 FRAME_ROW_COLUMNS = (
     "c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark, c.reviewed, "
-    "EXISTS (SELECT 1 FROM alternatives a WHERE a.change = c.id), c.limbs, c.made_in IS NOT NULL"
+    "EXISTS (SELECT 1 FROM alternatives a WHERE a.change = c.id), c.limbs, c.made_in IS NOT NULL, c.id"
 )
 """Columns that `row_to_frame_row` reads."""
 FRAME_POSE_COLUMNS = "c.frame, c.numbers, c.cost_px, c.views_px, c.model_revision"
@@ -142,8 +143,8 @@ WRITTEN_COLUMNS = (
 """Columns that `record_to_row` fills, and `program_settings`, the id of the row of the settings."""
 ALTERNATIVE_COLUMNS = "a.numbers, a.model_revision, a.cost_px"
 """Columns that `row_to_alternative` reads; `a` is the alternative."""
-_POSE_COLUMNS = "numbers, sources, cost_px, model_revision, views_px, parts_px, trace, program_settings, settings"
-ASSESSED_COLUMNS = "status, remark, limbs, errors"
+_POSE_COLUMNS = "numbers, sources, model_revision, parts_px, trace, program_settings, settings"
+ASSESSED_COLUMNS = "status, remark, limbs, errors, cost_px, views_px"
 """Columns that an assessment of a pose fills; see `assessment_to_row`."""
 UNMARKED_COLUMNS = f"{_POSE_COLUMNS}, {ASSESSED_COLUMNS}"
 """Columns that marking a pose copies unchanged."""
@@ -194,7 +195,7 @@ def row_to_frame_row(row: Sequence[Any], where: object) -> FrameRow:
         found.frame, SOURCES[min(_known(found.sources, where))], found.status, found.cost_px,
         bool(found.keyframe), _costs(found.view_costs_px, where), found.remark or "",
         bool(found.keyframe or found.reviewed), bool(found.others and not found.keyframe),
-        _numbers(found.limbs, where), bool(found.assessed_since),
+        _numbers(found.limbs, where), bool(found.assessed_since), found.change,
     )  # fmt: skip
 
 
@@ -299,7 +300,8 @@ def record_to_row(pose: PoseRecord) -> tuple[Any, ...]:
 def assessment_to_row(assessed: AssessmentChange) -> tuple[Any, ...]:
     """Convert an assessment to values of `ASSESSED_COLUMNS`."""
     assert assessed.status in STATUSES, assessed.status
-    return assessed.status, assessed.remark, _blob(assessed.limbs_lost), _triangles(assessed.errors)
+    costs = assessed.cost_px, None if assessed.cost_px is None else _blob(assessed.view_costs_px)
+    return assessed.status, assessed.remark, _blob(assessed.limbs_lost), _triangles(assessed.errors), *costs
 
 
 def values_to_blob(values: Array) -> bytes:

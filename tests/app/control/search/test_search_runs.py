@@ -16,7 +16,7 @@ START = MODEL.neutral()
 def step_of(run, stage, px, best_px, evaluations, done=False, shift_m=0.0):
     pose = START.copy()
     pose[0] += shift_m
-    return SearchStep(run.stages[stage], (pose,), px, (pose,), best_px, np.array([best_px]), evaluations, done)
+    return SearchStep(run.stages[stage], (pose,), px, (pose,), best_px, evaluations, done)
 
 
 def begun():

