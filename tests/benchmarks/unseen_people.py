@@ -89,10 +89,10 @@ CONDITIONS = Conditions(
     command="python tests/benchmarks/unseen_people.py --write docs/accuracy.md",
 )
 SPARSE_CONDITIONS = CONDITIONS._replace(
-    footage=CONDITIONS.footage.replace("25 or 15 frames/s", f"{SPARSE_FPS:.0f} frames/s"),
+    footage=CONDITIONS.footage.replace("25 or 15 frames/s", f"{SPARSE_FPS:.0f} frames/s")
 )
 FEW_CONDITIONS = CONDITIONS._replace(
-    footage=CONDITIONS.footage.replace(" at 25 or 15 frames/s, four cameras", ", rates and cameras as stated,"),
+    footage=CONDITIONS.footage.replace(" at 25 or 15 frames/s, four cameras", ", rates and cameras as stated,")
 )
 
 

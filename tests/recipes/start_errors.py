@@ -73,10 +73,7 @@ def _row(found, references, frame):
     best = min(errors)
     listed = " ".join(found.notes)
     print(f"{frame:4d} off {best[0]:4.0f} mm, left {'right' if best[1] else 'WRONG'}", end=" ")
-    print(
-        f"{found.start.source} {'sure' if found.is_facing_sure else 'unsure'}",
-        end=" ",
-    )
+    print(f"{found.start.source} {'sure' if found.is_facing_sure else 'unsure'}", end=" ")
     print(f"{found.model.height_m:.2f} m {found.status} {found.cost_px:.2f} px {listed[:150]}")
     return best
 

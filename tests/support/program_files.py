@@ -95,11 +95,7 @@ def write_label_studio(folder, cameras, names, points):
                     "original_width": SIZE[0],
                     "original_height": SIZE[1],
                     "parentID": f"box{i}",
-                    "value": {
-                        "x": (x + 0.5) / SIZE[0] * 100,
-                        "y": (y + 0.5) / SIZE[1] * 100,
-                        "keypointlabels": [name],
-                    },
+                    "value": {"x": (x + 0.5) / SIZE[0] * 100, "y": (y + 0.5) / SIZE[1] * 100, "keypointlabels": [name]},
                 }
                 for i, p in enumerate(people)
                 for name, (x, y, _) in zip(names, p.tolist(), strict=True)

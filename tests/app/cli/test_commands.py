@@ -351,8 +351,7 @@ def test_simulate(run, tmp_path):
 def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
     asked, samples, browsed = [], [], []
     monkeypatch.setattr(
-        "app.server.workbench.open_session",
-        lambda found, doorway, *_: asked.append((found.folder, doorway.serving)),
+        "app.server.workbench.open_session", lambda found, doorway, *_: asked.append((found.folder, doorway.serving))
     )
     monkeypatch.setattr("app.session.samples.sample_copy", lambda *words: samples.append(words) or session)
     monkeypatch.setattr("app.server.doorway.listen", lambda host, _: address.listen(host, 0))

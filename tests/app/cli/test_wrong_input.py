@@ -131,10 +131,7 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
         (["--height", "17.5"], ["0.6 to 2.3 metres", "--any-size"]),
         (["--height", "nan"], ["0.6 to 2.3 metres", "found nan"]),
         (["--height", "nan", "--any-size"], ["0.3 to 3 metres", "nan"]),
-        (
-            ["--offset", "left=" + "9" * 30],
-            ["'left'", "an offset below its 6 frames", "check the footage"],
-        ),
+        (["--offset", "left=" + "9" * 30], ["'left'", "an offset below its 6 frames", "check the footage"]),
         (["--fps", "0"], ["a frame rate above 0"]),
         (["--fps", "nan"], ["a frame rate above 0"]),
         (["--model", "ROOM/latin.toml"], ["body model", "latin.toml", "expected UTF-8 text"]),

@@ -86,10 +86,6 @@ def test_costs_are_the_mean_and_the_views(gavrila):
     plots = plots_of(gavrila, CAMERAS, "cost")
     assert plots == [Plot("Cost", "px", ("mean", "front", "left"), ())]
     zero = np.zeros(22)
-    rows = [
-        FramePose(1, zero, 2.0, (1.5, None)),
-        FramePose(2, zero, 3.0, ()),
-        FramePose(4, zero, None, (1, 1)),
-    ]
+    rows = [FramePose(1, zero, 2.0, (1.5, None)), FramePose(2, zero, 3.0, ()), FramePose(4, zero, None, (1, 1))]
     found = samples(gavrila, plots, [1, 2, 4], rows)
     np.testing.assert_array_equal(found, [[2, 3, np.nan], [1.5, np.nan, 1], [np.nan, np.nan, 1]])

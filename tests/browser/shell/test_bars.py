@@ -273,11 +273,7 @@ async def test_work_that_waits_for_kernels_says_so(page, endpoint):
 @pytest.mark.slow
 async def test_the_stages_of_a_run_are_told_apart(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "lost": 2}
-    texts = {
-        "tracking": "Tracked 4 of 9",
-        "back": "Tracking backward",
-        "solve": "Estimating all frames together",
-    }
+    texts = {"tracking": "Tracked 4 of 9", "back": "Tracking backward", "solve": "Estimating all frames together"}
     for stage, text in texts.items():
         endpoint.state["track"] = track | {"stage": stage, "done": 4, "total": 9}
         await endpoint.broadcast(endpoint.state)

@@ -4,14 +4,7 @@ import pytest
 from page_driver import shows, until
 from playwright.async_api import expect
 
-ANNOTATING = (
-    "#joint-bar",
-    "#undo",
-    "#toggle-keyframe",
-    "#track-forward",
-    "#search-frame",
-    "#show-export",
-)
+ANNOTATING = ("#joint-bar", "#undo", "#toggle-keyframe", "#track-forward", "#search-frame", "#show-export")
 
 
 async def join(page, endpoint, role):

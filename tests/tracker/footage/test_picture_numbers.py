@@ -100,10 +100,7 @@ def test_one_file():
     assert picture_numbers(["000012_keypoints"]).numbers == (12,)
 
 
-@given(
-    st.lists(st.text("0129_-. aFé²١", max_size=12), min_size=1, max_size=8, unique=True),
-    st.booleans(),
-)
+@given(st.lists(st.text("0129_-. aFé²١", max_size=12), min_size=1, max_size=8, unique=True), st.booleans())
 def test_any_names(names, may_repeat):
     found = picture_numbers(names, may_repeat)
     assert (found.numbers is None) == bool(found.reason)

@@ -39,11 +39,7 @@ def test_reads_what_opencv_projects(write):
     points = np.array([[0.1, 0.2, 0.3], [-0.4, 0.3, 1.0], [1.0, 0.5, -0.5]])
     s = section()
     expected, _ = cv2.projectPoints(
-        points,
-        np.array(s["rotation"]),
-        np.array(s["translation"]),
-        np.array(s["matrix"]),
-        np.array(s["distortions"]),
+        points, np.array(s["rotation"]), np.array(s["translation"]), np.array(s["matrix"]), np.array(s["distortions"])
     )
     np.testing.assert_allclose(camera.project(points), expected[:, 0], atol=1e-9)
     assert camera.name == "front"

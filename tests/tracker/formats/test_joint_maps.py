@@ -28,8 +28,7 @@ def test_our_names_are_the_models(preset):
 
 
 @pytest.mark.parametrize(
-    ("file", "name"),
-    [("walk/ground_truth.trc", "CMU"), ("balance_real/reference_joints.trc", "BODY_25")],
+    ("file", "name"), [("walk/ground_truth.trc", "CMU"), ("balance_real/reference_joints.trc", "BODY_25")]
 )
 def test_conventions_of_the_footage_at_hand(data_folder, file, name):
     folder, trc = file.split("/")

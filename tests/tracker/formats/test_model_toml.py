@@ -137,23 +137,14 @@ half_axes = [1, 1, 1]
         (SMALL.replace('name = "small"', ""), "expected the key 'name', found none"),
         (SMALL.replace('child = "arm"', ""), r"expected the key 'child' in 'joints\[hinge\]', found none"),
         (SMALL.replace('part = "arm"', 'part = "leg"'), "landmark 'tip' is on a missing part 'leg'"),
-        (
-            SMALL.replace("[0, 2, 0]", "[0, 0, 0]"),
-            r"direction other than 0 .* in 'joints\[hinge\].axes\[bend\]'",
-        ),
+        (SMALL.replace("[0, 2, 0]", "[0, 0, 0]"), r"direction other than 0 .* in 'joints\[hinge\].axes\[bend\]'"),
         (SMALL.replace("[0, 90]", "[10, 90]"), r"a lower limit up to 0 and an upper one from 0 as .*found \[10, 90\]"),
-        (
-            SMALL.replace("[0, 90]", "[0, 90], spread_deg = 0"),
-            r"above 0 as .*axes\[bend\].spread_deg', found 0",
-        ),
+        (SMALL.replace("[0, 90]", "[0, 90], spread_deg = 0"), r"above 0 as .*axes\[bend\].spread_deg', found 0"),
         (SMALL.replace("[0, 90]", "[0, 90], spread_deg = nan"), "a number above 0 as .*spread_deg', found nan"),
         (SMALL.replace("[0, 0, -0.1]", "[0, 0]"), r"expected 3 finite numbers.* as 'landmarks\[tip\].position'"),
         (SMALL.replace("[0, 0, -0.1]", "[0, 0, nan]"), r"expected 3 finite numbers.* as 'landmarks\[tip\].position'"),
         (SMALL.replace("[0.1, 0.1, 0.1]", "[0.1, 0.1, -0.1]"), r"3 half-axes above 0.* as 'parts\[arm\].half_axes'"),
-        (
-            SMALL.replace("free = true", 'kind = "slide"'),
-            r"'ball', 'revolute' as 'joints\[root\].kind', found 'slide'",
-        ),
+        (SMALL.replace("free = true", 'kind = "slide"'), r"'ball', 'revolute' as 'joints\[root\].kind', found 'slide'"),
         (SMALL.replace('["root.*", "hinge.bend"]', "3"), r"1 to 256 names as 'search\[all\].dofs', found 3"),
         (SMALL.replace('"hinge.bend"', "7"), r"a name .* as 'search\[all\].dofs\[1\]', found 7"),
         (SMALL.replace('"hinge.bend"', '"root.x"'), "search group 'all' names 'root.x' twice"),
@@ -208,10 +199,7 @@ def test_shapes_of_parts():
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (
-            KINDS.replace('"cone"', '"cube"'),
-            r"'superquadric' as 'parts\[arm\].shape', found 'cube'",
-        ),
+        (KINDS.replace('"cone"', '"cube"'), r"'superquadric' as 'parts\[arm\].shape', found 'cube'"),
         (KINDS.replace("taper", "exponents = [1, 1]\ntaper"), "no exponents of the shape cone.*; leave them out"),
         (KINDS.replace('"cone"', '"ellipsoid"'), "taper of part 'arm': expected no taper of an ellipsoid, found 0.3"),
         (KINDS.replace("taper = 0.3", "taper = 0.95"), "a taper within 0.9, found 0.95"),

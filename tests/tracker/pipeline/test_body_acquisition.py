@@ -17,14 +17,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, has_preset_sizes, load_model
 from tracker.geometry.triangulation import sigma_px
 from tracker.pipeline import body_acquisition
-from tracker.pipeline.body_acquisition import (
-    MEASURED,
-    PLACED_M,
-    SIZES_EDITS,
-    acquire_body,
-    posed_frames,
-    store_body,
-)
+from tracker.pipeline.body_acquisition import MEASURED, PLACED_M, SIZES_EDITS, acquire_body, posed_frames, store_body
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PinChange, PoseChange, PoseRecord

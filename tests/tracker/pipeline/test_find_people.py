@@ -27,14 +27,7 @@ from tracker.estimation.initialization.start_fit import StartTrack
 from tracker.evidence.voxels.visual_hull import VisualHull
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
-from tracker.pipeline.find_people import (
-    AXES,
-    FindSettings,
-    expected_steps,
-    find_people,
-    frames_to_try,
-    store_found,
-)
+from tracker.pipeline.find_people import AXES, FindSettings, expected_steps, find_people, frames_to_try, store_found
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 

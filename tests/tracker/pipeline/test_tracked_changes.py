@@ -5,12 +5,7 @@ import numpy as np
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.estimate import AlternativePose, PoseEstimate
 from tracker.pipeline.methods import METHODS, make_tracker
-from tracker.pipeline.tracked_changes import (
-    StoredPerson,
-    recorded_method,
-    settings_record,
-    tracked_changes,
-)
+from tracker.pipeline.tracked_changes import StoredPerson, recorded_method, settings_record, tracked_changes
 from tracker.session.store.annotation_store import AnnotationStore
 
 

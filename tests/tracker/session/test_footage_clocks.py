@@ -159,11 +159,7 @@ def test_time_codes_across_midnight(room):
 @pytest.mark.parametrize(
     ("values", "more", "expected"),
     [
-        (
-            {"front": "10:00:00:00", "left": "10:00:02:00"},
-            {},
-            ["not taken: by it the cameras have no frame in"],
-        ),
+        ({"front": "10:00:00:00", "left": "10:00:02:00"}, {}, ["not taken: by it the cameras have no frame in"]),
         ({"front": "10:00:00:00", "left": "10:00:00:00"}, {}, []),
         ({"front": "10:00:00:00", "left": "later"}, {}, []),
         (

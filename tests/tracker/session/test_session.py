@@ -263,11 +263,7 @@ def edit(folder, old, new):
         ("version = 1", "version = 0x" + "f" * 9999, "has version a number of thousands of digits"),
         ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 0, 0], offset_m = 1}", "three numbers"),
         ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 1], offset_m = 1}", "3 finite numbers as 'floor.normal'"),
-        (
-            "n_frames = 9",
-            "n_frames = 9\nfloor = {normal = [0, 0, 1], offset_m = nan}",
-            "floor.offset_m', found nan",
-        ),
+        ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 0, 1], offset_m = nan}", "floor.offset_m', found nan"),
         ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 0, 1]}", "offset_m"),
         ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 0, 1], offset_m = 1, tilt = 3}", "tilt"),
         ("n_frames = 9", "n_frames = 9\nfloor = 3", "a group of keys.* as 'floor', found 3"),

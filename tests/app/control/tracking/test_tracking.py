@@ -363,10 +363,7 @@ def test_a_run_survives_a_restart(placed, tracker, opened):
     wait_for(lambda: placed.state.track.message)
     controller = opened()
     controller.navigation.seek(4)
-    assert (controller.state.people[0].status, controller.state.people[0].remark) == (
-        "doubtful",
-        "left arm relocated",
-    )
+    assert (controller.state.people[0].status, controller.state.people[0].remark) == ("doubtful", "left arm relocated")
     controller.history.undo()
     assert set(controller.stored_poses.timeline()) == {2}
 

@@ -5,11 +5,7 @@ import pytest
 from rig_oracle import motions_of_points
 from staging import posed
 
-from tracker.estimation.acquisition.part_motions import (
-    motions_by_pose,
-    motions_by_sizes,
-    points_by_sizes,
-)
+from tracker.estimation.acquisition.part_motions import motions_by_pose, motions_by_sizes, points_by_sizes
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.formats.model_toml import PRESETS, load_model
 

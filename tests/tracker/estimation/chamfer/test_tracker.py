@@ -388,11 +388,7 @@ def test_contours_are_traced_once_per_pose(gavrila, monkeypatch, segments):
     truth = dancing(gavrila, 3)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
     predicted, found, scored = [], [], []
-    trace, trace_views, score = (
-        occluding_contours.trace,
-        chamfer_cost.ChamferCost._traced,
-        chamfer_cost.score_traced,
-    )
+    trace, trace_views, score = (occluding_contours.trace, chamfer_cost.ChamferCost._traced, chamfer_cost.score_traced)
     monkeypatch.setattr(occluding_contours, "trace", lambda *a: predicted.append(a) or trace(*a))
     monkeypatch.setattr(chamfer_cost.ChamferCost, "_traced", lambda *a: found.append(a) or trace_views(*a))
     monkeypatch.setattr(chamfer_cost, "score_traced", lambda *a: scored.append(a) or score(*a))

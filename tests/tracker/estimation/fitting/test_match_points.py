@@ -81,6 +81,5 @@ def test_joined_points_weigh_what_they_did_apart():
     joined = points_to_match(replace(view, silhouette=silhouette), None, np.inf, EDGES, SILHOUETTE)
     assert joined.shape == (len(view.points_px), N_COLUMNS)  # all found their edges
     np.testing.assert_allclose(
-        joined[:, 4:].sum(axis=0),
-        [len(view.points_px) + 0.5 * len(points), len(view.points_px) + len(points)],
+        joined[:, 4:].sum(axis=0), [len(view.points_px) + 0.5 * len(points), len(view.points_px) + len(points)]
     )

@@ -134,14 +134,8 @@ def test_plain_data():
     ("found", "words"),
     [
         (PoseQuality(0.05, 3, 0.05, (CLEAR, CLEAR)), ""),
-        (
-            PoseQuality(0.15, 3, 0.05, (CLEAR, LimbFeatures("left_forearm", *ASTRAY))),
-            "left arm uncertain",
-        ),
-        (
-            PoseQuality(0.15, 3, 0.05, (LimbFeatures("right_calf", *ASTRAY), CLEAR)),
-            "right leg uncertain",
-        ),
+        (PoseQuality(0.15, 3, 0.05, (CLEAR, LimbFeatures("left_forearm", *ASTRAY))), "left arm uncertain"),
+        (PoseQuality(0.15, 3, 0.05, (LimbFeatures("right_calf", *ASTRAY), CLEAR)), "right leg uncertain"),
         (PoseQuality(1.0, 3, 0.05, (CLEAR, CLEAR)), "no edges near the body"),
         (PoseQuality(0.0, 0, 0.05, ()), "no view shows the body"),
     ],

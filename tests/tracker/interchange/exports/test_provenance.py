@@ -72,11 +72,7 @@ def test_each_pose_has_its_maker_its_state_and_the_sources_of_its_joints(tmp_pat
     assert lost["torso"] is None
     assert [poses[f]["reviewed"] for f in (0, 1, 2, 4)] == [False, True, False, True]
     assert poses[0]["covariances_m2"] is None
-    assert (found["calibration_revision"], pose["calibration_revision"], pose["earlier_calibration"]) == (
-        1,
-        1,
-        False,
-    )
+    assert (found["calibration_revision"], pose["calibration_revision"], pose["earlier_calibration"]) == (1, 1, False)
 
 
 @pytest.mark.parametrize("axes", ["calibration", "y-up"])

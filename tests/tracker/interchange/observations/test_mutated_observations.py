@@ -15,13 +15,7 @@ import numpy as np
 import pytest
 from mask_files import SIZE, person_masks, write_coco_masks, write_masks
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
-from observed_files import (
-    write_c3d,
-    write_coco_images,
-    write_deeplabcut,
-    write_points_csv,
-    write_sleap,
-)
+from observed_files import write_c3d, write_coco_images, write_deeplabcut, write_points_csv, write_sleap
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 from program_files import WRITERS
 

@@ -7,15 +7,7 @@ import numpy as np
 import pytest
 from mask_files import SIZE, image_of, person_masks
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
-from program_files import (
-    BY_HAND,
-    FORMATS,
-    WRITERS,
-    write_cvat_points,
-    write_eks,
-    write_hand_labels,
-    write_sleap_csv,
-)
+from program_files import BY_HAND, FORMATS, WRITERS, write_cvat_points, write_eks, write_hand_labels, write_sleap_csv
 from program_tables import observation_table
 
 from tracker.errors import FormatError
@@ -261,11 +253,7 @@ def test_messages_name_the_program_that_wrote_the_file(tmp_path, name, text, exp
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [
-        (
-            "a.json",
-            '{"version": 0.7, "bodies": [{"joints": []}]}',
-            "of AlphaPose's formats of OpenPose, which is not",
-        ),
+        ("a.json", '{"version": 0.7, "bodies": [{"joints": []}]}', "of AlphaPose's formats of OpenPose, which is not"),
         ("a.json", '{"shapes": [], "imagePath": "a.png"}', "is of LabelMe, which is not read; export COCO"),
         ("a.mat", "MATLAB", "is of a MATLAB file, which is not read; export a CSV"),
         ("a.json", '{"a": 1, "b": 2}', "found JSON with the keys 'a, b'; export it in one of its formats"),

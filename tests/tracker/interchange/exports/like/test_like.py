@@ -6,13 +6,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 from joint_files import write_joints
-from observed_files import (
-    write_c3d,
-    write_coco_images,
-    write_deeplabcut,
-    write_points_csv,
-    write_sleap,
-)
+from observed_files import write_c3d, write_coco_images, write_deeplabcut, write_points_csv, write_sleap
 from observed_people import BODY_25, make_session, seen, write_openpose
 from program_files import write_alphapose, write_eks, write_sleap_csv
 
