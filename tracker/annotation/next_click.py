@@ -30,8 +30,8 @@ class HandSettings:
     """Expectations of a person who corrects a limb."""
 
     sigma_px: float = 3.0
-    """Standard deviation of a placed joint along each axis of a view, px of the footage: that of the scripted user with
-    which `tests/benchmarks/actions_per_keyframe.py` counts actions."""
+    """Standard deviation of a placed joint along each axis of a view, px of the footage: that of the scripted user of
+    `tests/support`."""
     reach_m: float = 1.0
     """Standard deviation of a joint that is placed in no view, metres: any pose of the limb."""
     carried: float = 0.01

@@ -41,7 +41,7 @@ ENOUGH_FRAMES = 2
 """Number of frames with good starts whose heights agree that end the trial of `auto`."""
 _PICTURES = 16
 """Pictures in which `auto` looks for voxels of one person, or otherwise for several: some 20 s of processor time on six
-views of 960x540 (`tests/benchmarks/find_people.py`)."""
+views of 960x540, measured with simulated people."""
 HEIGHT_SIGMA = 0.02
 """Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
 _HEIGHTS_AGREE = 3 * HEIGHT_SIGMA
