@@ -74,6 +74,12 @@ def test_the_tracker_knows_no_screen():
     assert {m: found & OF_THE_SCREEN for m, found in roots.items() if found & OF_THE_SCREEN} == {}
 
 
+def test_statistics_are_loaded_where_they_are_used():
+    """They take 0.8 s, for which each start of the program would wait."""
+    at_top = {name: [n for n in tree.body if isinstance(n, ast.ImportFrom)] for name, tree in trees().items()}
+    assert [name for name, first in at_top.items() if any(n.module == "scipy.stats" for n in first)] == []
+
+
 def test_measuring_is_of_no_use_to_the_product():
     """Simulated recordings, experiments and benchmarks are started by commands alone."""
     users = {(m, wing_of(n)) for m, needs in own_imports().items() for n in needs if n.startswith(MEASURING)}

@@ -18,12 +18,16 @@ from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
+from tracker.interchange.plausibility import examine
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.annotator import VARIABLE
 
 _fits = {}
 """Poses that have been fitted to joints in this process."""
+
+_films = {}
+"""People whom frames of the sample have shown in this process."""
 
 
 def fitted_once(model, targets_world, near=None, centers=False):
@@ -33,6 +37,20 @@ def fitted_once(model, targets_world, near=None, centers=False):
     if asked not in _fits:
         _fits[asked] = fit_to_points(model, targets_world, centers=centers)
     return _fits[asked]
+
+
+@pytest.fixture
+def film_once(monkeypatch):
+    """Look at the sample's footage for what imported points are compared with, but at the same frames only once."""
+    film = examine.film_people
+
+    def filmed(session, frames):
+        asked = session.name, frames.tobytes()
+        if asked not in _films:
+            _films[asked] = film(session, frames)
+        return _films[asked]
+
+    monkeypatch.setattr(examine, "film_people", filmed)
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ FRAMES, EXCHANGED = range(10, 22), (14, 15)
 
 
 @pytest.fixture
-def imported(run, session, tmp_path, monkeypatch):
+def imported(run, session, tmp_path, monkeypatch, film_once):
     """The sample with imported true joints, whose legs are exchanged on two frames."""
     loaded = load_session(session)
     truth, model = read_joints(SAMPLE / "truth.trc", loaded.fps), loaded.people[0].model

@@ -32,7 +32,7 @@ class Nobody:
 
 
 @pytest.fixture
-def controller(opened):
+def controller(opened, film_once):
     return opened()
 
 

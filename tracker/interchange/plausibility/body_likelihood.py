@@ -5,10 +5,10 @@ grossly wrong (`PeoplePriors.gross`), so that no single one decides.
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
 
 from tracker.estimation.acquisition.segment_lengths import SEGMENTS
 from tracker.estimation.acquisition.size_parameters import SizePriors
@@ -100,19 +100,28 @@ def bones(places: Places) -> Bones:
     logs = np.log(np.maximum([*known.values()], TINY))
     stature = usual = np.ones(1)
     for _ in range(2):  # a child has other proportions
-        body = typical_body(load_model(_BODY, float(np.clip(stature, *_PERSON).item())))
-        own = body.named_points_world(body.neutral())
-        lengths = {n: np.linalg.norm(_middle(own, a) - _middle(own, b)) for n, ((a, b), *_) in _SEGMENTS.items()}
-        usual = np.log([lengths[name] / body.height_m for name, _ in known])[:, None]
+        lengths = _usual_lengths(round(float(np.clip(stature, *_PERSON).item()), 2))
+        usual = np.log([lengths[name] for name, _ in known])[:, None]
         stature = np.exp(np.nanmedian(logs - usual))
     priors = SizePriors()
     of_joints = np.sqrt(2) * np.hypot(priors.joint, PRIORS.error) / np.exp(usual)
-    ratios = PRIORS.log_range * norm.pdf(logs, usual + np.log(stature), np.hypot(priors.length, of_joints))
+    ratios = PRIORS.log_range * _density(logs - usual - np.log(stature), np.hypot(priors.length, of_joints))
     nats = np.nanmean(np.log((1 - PRIORS.gross) * ratios + PRIORS.gross), axis=1)
     oddest = int(nats.argmin())
     low, high = np.nanquantile(np.exp(logs[oddest]), (0.1, 0.9))
     is_of_person = bool(nats[oddest] > 0.5 * np.log(PRIORS.gross))
     return Bones(float(nats.sum()), float(stature), [*known][oddest][0], (float(low), float(high)), is_of_person)
+
+
+@cache
+def _usual_lengths(stature_m: float) -> dict[str, float]:
+    """Return the lengths of segments of a body of typical proportions, in shares of its height."""
+    body = typical_body(load_model(_BODY, stature_m))
+    places = body.named_points_world(body.neutral())
+    return {
+        n: float(np.linalg.norm(_middle(places, a) - _middle(places, b)) / body.height_m)
+        for n, ((a, b), *_) in _SEGMENTS.items()
+    }
 
 
 def stature_nats(stature_m: float, expected_m: float) -> float:
@@ -124,7 +133,7 @@ def stature_nats(stature_m: float, expected_m: float) -> float:
     """
     if np.isnan(stature_m):
         return 0.0
-    near = norm.pdf(np.log(stature_m), np.log(expected_m), SizePriors().height)
+    near = _density(np.log(np.array(stature_m / expected_m)), SizePriors().height)
     anyone = _PERSON.has(stature_m) / np.log(_PERSON.high / _PERSON.low)
     density = (1 - PRIORS.gross) * near + PRIORS.gross * anyone
     return float(np.log(max(PRIORS.log_range * density, np.exp(PRIORS.impossible))))
@@ -150,6 +159,8 @@ def upright_nats(places: Places, up: Array) -> float:
 
 def bend_nats(places: Places) -> float:
     """Return the log likelihood ratio of knees, elbows and feet that point the right way; they do not if mirrored."""
+    from scipy.special import ndtr  # imported lazily: loading takes 0.1 s
+
     if not (_has(places, "shoulder") and _has(places, "hip")):
         return 0.0
     up = _middle(places, _both("shoulder")) - _middle(places, _both("hip"))
@@ -171,8 +182,13 @@ def bend_nats(places: Places) -> float:
             # The trunk is 30% of the height.
             ahead = np.sum((b - foot) * forward, axis=-1) / (PRIORS.error * height / 0.3)
             wrong = PRIORS.gross if is_sure else 3 * PRIORS.gross
-            total += _mean(np.log(2 * (1 - wrong) * norm.cdf(ahead if is_ahead else -ahead) + wrong))
+            total += _mean(np.log(2 * (1 - wrong) * ndtr(ahead if is_ahead else -ahead) + wrong))
     return total
+
+
+def _density(deviations: Array, sigma: Array | float) -> Array:
+    """Return the normal density of deviations; scipy.stats has it, but takes 0.8 s to load."""
+    return np.exp(-((deviations / sigma) ** 2) / 2) / (np.sqrt(2 * np.pi) * sigma)
 
 
 def _has(places: Places, joint: str) -> bool:

@@ -24,7 +24,7 @@ VIEW = View(frozenset(("imported",)), (1, 1, 1, 1))
 
 
 @pytest.fixture
-def controller(opened):
+def controller(opened, film_once):
     return opened()
 
 
