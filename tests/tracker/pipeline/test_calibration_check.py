@@ -70,7 +70,9 @@ def test_two_cameras_contradict_each_other_without_a_name():
     assert not check.corrections.any()
 
 
-@pytest.mark.parametrize(("n", "words"), [(1, "lost 1 frame"), (-2, "doubled 2 frames")])
+@pytest.mark.parametrize(
+    ("n", "words"), [(1, "lost 1 frame"), pytest.param(-2, "doubled 2 frames", marks=pytest.mark.slow)]
+)
 def test_a_clock_that_changes_within_the_recording_has_lost_whole_frames(n, words):
     late = np.zeros(N_CORRECTIONS)
     late[TIME] = n / FPS

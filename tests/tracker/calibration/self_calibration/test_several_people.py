@@ -96,7 +96,12 @@ def test_a_person_whom_one_camera_shows_is_nobody():
 
 
 @pytest.mark.parametrize(
-    ("third", "renamed"), [(("ann", "bob"), ()), (("bob", "ann"), ("cam2",)), (("7", "4"), ("cam2",))]
+    ("third", "renamed"),
+    [
+        pytest.param(("ann", "bob"), (), marks=pytest.mark.slow),
+        (("bob", "ann"), ("cam2",)),
+        pytest.param(("7", "4"), ("cam2",), marks=pytest.mark.slow),
+    ],
 )
 def test_names_of_a_camera_are_compared_with_those_of_others(third, renamed):
     observations = detected(CAMERAS, JOINTS, tracks=[ANN_BOB[0], ANN_BOB[0], third, ANN_BOB[0]])

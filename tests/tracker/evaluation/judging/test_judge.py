@@ -82,7 +82,7 @@ def test_joints_that_are_read_as_others_are_a_sentence(joints, tracked, turned, 
     assert any(sentence in own for own in judged(turned(joints), tracked).sentences)
 
 
-@pytest.mark.parametrize("lag", [-3, 2, 5])
+@pytest.mark.parametrize("lag", [pytest.param(-3, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow), 5])
 def test_joints_that_lag_throughout_are_a_sentence(lag):
     """A person whose limbs swing: a slow motion lags by less than its errors."""
     model, n = MODEL, 60

@@ -410,7 +410,9 @@ CHILD = textwrap.dedent("""
 """)
 
 
-@pytest.mark.parametrize("acknowledged", [1, 2, 20])
+@pytest.mark.parametrize(
+    "acknowledged", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow), 20]
+)
 def test_killed_program_loses_nothing_acknowledged(path, acknowledged):
     child = subprocess.Popen([sys.executable, "-c", CHILD, str(path)], stdout=subprocess.PIPE, text=True)
     for _ in range(acknowledged):
