@@ -1,4 +1,4 @@
-"""Counts that may only fall: lines of code, numbers that somebody chose, sentences that hide their subject."""
+"""Counts that may only fall: lines, numbers that somebody chose, private names in tests, sentences without subject."""
 
 import ast
 import re
@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 from architecture import FILES, ROOT, nodes, trees
-from code_counts import code_lines, git, numbers, unexplained_rises
+from code_counts import code_lines, git, numbers, private_names, unexplained_rises
 
 MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 1101, 324, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
@@ -14,6 +14,8 @@ its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names t
 MAX_CODE_LINES = {"tracker": 49083, "app": 20786, "js": 14505, "css": 4472, "tests": 66489}
 """Lines without blanks, comments and docstrings."""
 MAX_HIDDEN_SUBJECTS = 25
+MAX_PRIVATE = 207
+"""Uses of private names in tests: a test goes through the public surface where that shows the same."""
 HIDDEN_SUBJECT = re.compile(r"(?:^|(?<=[.!?:])\s+)(?:What|Where|Who|Whose|Those|Nor)\b")
 COMMENT = re.compile(r"(?:^|[ \t])#.*", re.MULTILINE)
 """A comment, or what looks like one within a string: the tokenizer takes as long as all other checks together."""
@@ -85,6 +87,19 @@ def test_the_count_sees_numbers(text, found):
     assert numbers(ast.parse(text)) == found
 
 
+@pytest.mark.parametrize(
+    ("text", "n"),
+    [
+        ("a._b.c\na.b._c", 2),
+        ("self._a\nrow._replace(b=1)\na.__dict__", 0),
+        ("from a import _b, c\nfrom a import (\n    _d,\n    e,\n)", 2),
+        ("p.setattr(a, '_b', 1)\np.setattr('a.b._C', 1)\np.setattr(a, 'b', '_c')", 2),
+    ],
+)
+def test_the_count_sees_private_names(text, n):
+    assert len(private_names(text)) == n
+
+
 def test_the_count_sees_lines_of_code():
     text = (
         '"""Doc."""\n\nA = 1\n"""Of A."""\n# Why.\n@f\ndef g(\n    a,\n):\n    """Doc."""\n    return h("""a\nb""")\n'
@@ -118,6 +133,11 @@ def test_code_does_not_grow():
         is_python = ending == "py"
         lines[top if is_python else ending] += code_lines(text, "#" if is_python else "//")
     assert {k: n for k, n in lines.items() if n > MAX_CODE_LINES.get(k, 150)} == {}
+
+
+def test_tests_use_what_is_public():
+    names = {p: private_names((ROOT / p).read_text("utf-8")) for p in git("ls-files", "tests/*.py").split()}
+    assert sum(map(len, names.values())) <= MAX_PRIVATE, {p: n for p, n in names.items() if n}
 
 
 def test_sentences_begin_with_their_subject():

@@ -85,7 +85,8 @@ class Controller:
         if host is not None:
             compiled = host.state.compiled
         lock = None if host is None else host.lock
-        self._session_state = session_state = SessionState(session, saver, frames, compiled, lock)
+        self.session_state = session_state = SessionState(session, saver, frames, compiled, lock)
+        """State of the session, and its stores: all parts share it."""
         runs, turns = SearchRuns(), saver.shared.turns
         turns.add(saver.moves, lambda: saver.author or "the host", lambda: session_state.state)
         self.activities = activities = Activities(session_state.lock, session_state.show_again, turns, saver.moves)
@@ -164,7 +165,7 @@ class Controller:
         self._taking_over = TakingOver(session_state, self.search.forget_paused)
         self._following: FollowingHost | None = None
         if host is not None:
-            self._following = FollowingHost(session_state, host._session_state, activities.finish_gestures)
+            self._following = FollowingHost(session_state, host.session_state, activities.finish_gestures)
             return
         self._footage_scan = FootageScan(session_state)
         self._save_retry = SaveRetry(session_state)
@@ -177,7 +178,7 @@ class Controller:
             author: their name, by which they undo their own edits.
             writes: whether they may change what is stored.
         """
-        own = self._session_state
+        own = self.session_state
         with own.lock:
             if writes:
                 own.saver.shared.note_several()
@@ -186,27 +187,27 @@ class Controller:
     @property
     def author(self) -> str:
         """Name of the one who works with this controller."""
-        return self._session_state.saver.author
+        return self.session_state.saver.author
 
     @property
     def state(self) -> State:
         """The present state."""
-        return self._session_state.state
+        return self.session_state.state
 
     @property
     def session(self) -> Session:
         """The open session, with the present body of each person."""
-        return self._session_state.session
+        return self.session_state.session
 
     @property
     def models(self) -> tuple[BodyModel, ...]:
         """The bodies in which people are shown now."""
-        return self._session_state.models
+        return self.session_state.models
 
     @property
     def lock(self) -> threading.RLock:
         """The lock under which the state and the stored poses change. Hold it only briefly."""
-        return self._session_state.lock
+        return self.session_state.lock
 
     def session_of(self, state: State) -> Session:
         """Return the session with each person in the body that a state shows, for drawing."""
@@ -215,11 +216,11 @@ class Controller:
 
     def active_dofs(self) -> list[NDArray[np.bool_]]:
         """Return for each person which degrees of freedom are not locked, (n_dofs,)."""
-        return [self._session_state.active_dofs(person) for person in range(len(self.models))]
+        return [self.session_state.active_dofs(person) for person in range(len(self.models))]
 
     def subscribe(self, view: Callable[[State], None], *fields: str) -> Callable[[], None]:
         """See `SessionState.subscribe`."""
-        return self._session_state.subscribe(view, *fields)
+        return self.session_state.subscribe(view, *fields)
 
     def close(self) -> None:
         """Stop all work and save; the controller must not be used afterwards. The host's is closed last."""
@@ -234,13 +235,13 @@ class Controller:
         self._taking_over.close()
         if self._following is not None:
             self._following.close()
-        self._session_state.saver.shared.turns.remove(self._session_state.saver.moves)
+        self.session_state.saver.shared.turns.remove(self.session_state.saver.moves)
         for part in (
             self.dragging, self.annotating, self.proposing, self.comparing_runs, self.other_copies,
             self.cost_landscape, self.cost_map, self.reasons, self._pose_checks,
         ):  # fmt: skip
             part.close()
-        self.frames.forget(self._session_state)
+        self.frames.forget(self.session_state)
         if self._is_host:
             self._close_session()
 

@@ -1,4 +1,4 @@
-"""Counts of code that may only fall: lines of code, and numbers that somebody chose."""
+"""Counts of code that may only fall: lines of code, numbers that somebody chose, private names in tests."""
 
 import ast
 import re
@@ -12,6 +12,12 @@ EXACT, HALF = {0, 1, 2}, 0.5
 OF_MEASURING = "tracker/simulate"
 ALONE = re.compile(r'^[ \t]*"""(?:[^"]|"(?!""))*"""[ \t]*$|/\*.*?\*/', re.MULTILINE | re.DOTALL)
 """A docstring, or a comment of several lines."""
+PRIVATE = re.compile(
+    r"""(?<!\bself)\._(?!_|replace\b|asdict\b|make\b|fields\b|exit\b)\w+|attr\([\w.]+, ["']_(?!_)\w+|"""
+    r"""^(?:from .* import .*|    )\b_(?!_)\w+(?:,|$)""",
+    re.MULTILINE,
+)
+"""An attribute, a patched name and an import. Named tuples and `os` have public names that begin with an underscore."""
 REASON = re.compile(r"^Numbers: \S", re.MULTILINE)
 """Line in the body of a commit: the principle or the measurement that its numbers come from."""
 
@@ -46,6 +52,11 @@ def _places(tree):
         elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield from (("defaults", d) for d in [*node.args.defaults, *node.args.kw_defaults] if d)
     yield "bodies", tree
+
+
+def private_names(text):
+    """Private names of others that a test uses."""
+    return PRIVATE.findall(text)
 
 
 def unexplained_rises(n_commits):

@@ -50,7 +50,7 @@ def test_a_hand_that_holds_still_sees_what_the_pose_costs(opened):
         controller.dragging.move(PAGE, (start[0] + way, start[1]), seq)
     shown = controller.state.poses
     wait_for(lambda: controller.state.cost_px != before)
-    wait_for(lambda: controller.state.cost_px == controller._session_state.costs(shown)["cost_px"])
+    wait_for(lambda: controller.state.cost_px == controller.session_state.costs(shown)["cost_px"])
     assert controller.state.drag is not None
     controller.dragging.cancel(PAGE)
     assert controller.state.cost_px == before
@@ -59,7 +59,7 @@ def test_a_hand_that_holds_still_sees_what_the_pose_costs(opened):
 def test_the_cost_of_what_has_been_let_go_is_not_touched(opened):
     controller = opened()
     drag(controller, "torso", (120.0, 0.0))
-    controller._session_state.set(cost_px=1.4)  # as a tracker knows it
+    controller.session_state.set(cost_px=1.4)  # as a tracker knows it
     time.sleep(0.1)
     assert controller.state.cost_px == 1.4
 

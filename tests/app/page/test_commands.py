@@ -31,8 +31,8 @@ def scorings(placed, monkeypatch):
 
 def test_the_end_of_a_drag_scores_once(placed, scorings, monkeypatch):
     monkeypatch.setattr(dragging, "_HEAD_START_S", 0.0)
-    save = placed._session_state.saver.save
-    monkeypatch.setattr(placed._session_state.saver, "save", lambda *args: time.sleep(0.5) or save(*args))
+    save = placed.session_state.saver.save
+    monkeypatch.setattr(placed.session_state.saver, "save", lambda *args: time.sleep(0.5) or save(*args))
     dispatch(placed, PAGE, drag_to(320.0, "start", 1))
     for seq in range(2, 6):
         dispatch(placed, PAGE, drag_to(320.0 + seq, "move", seq))

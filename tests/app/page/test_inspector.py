@@ -110,7 +110,7 @@ def test_stride_and_cameras_are_kept_and_only_known_cameras_taken(page, opened):
     ],
 )  # fmt: skip
 def test_kept_settings_that_cannot_be_used_are_passed_over(opened, kept):
-    opened()._session_state.saver.store_setting("track_settings", kept)
+    opened().session_state.saver.store_setting("track_settings", kept)
     settings = Page(opened()).updates()["settings"]
     assert settings.track == settings.track_default
 
@@ -118,7 +118,7 @@ def test_kept_settings_that_cannot_be_used_are_passed_over(opened, kept):
 @pytest.mark.parametrize("switched_off", ["backward_pass", "audit", "smooth"])
 def test_settings_of_former_versions_are_read(opened, switched_off):
     kept = {"method": "contour", "order": 2, "past_poses": 5, "estimate": "search", switched_off: False}
-    opened()._session_state.saver.store_setting("track_settings", kept)
+    opened().session_state.saver.store_setting("track_settings", kept)
     state = opened().state
     assert (state.settings.estimate, state.settings.predict.order, state.settings.predict.window) == ("search", 2, 5)
     run = track_settings.of_run(state.settings, state.run_choices)
@@ -207,7 +207,7 @@ def test_a_person_moves_to_another_body_and_back(page):
     body = model.named_points_world(controller.state.people[0].values)
     assert np.linalg.norm(body["left_wrist"] - wrist) < 0.03
     assert [model.dof_names[i] for i in controller.state.locked[0]] == ["right_elbow.extension"]
-    record = controller._session_state.saver.record(0, frame)
+    record = controller.session_state.saver.record(0, frame)
     assert (record.keyframe, len(record.values)) == (True, len(model.value_names))
     page.send("select", person=0, point="left_toe")
     controller.history.undo()
@@ -237,7 +237,7 @@ def test_wrong_sizes_are_refused_in_a_sentence_and_limits_are_those_that_are_che
 def test_the_searches_on_a_frame_are_shown_from_the_store(page):
     """In words; of a pose of an earlier version they are not known."""
     controller = page.controller
-    state, saver = controller.state, controller._session_state.saver
+    state, saver = controller.state, controller.session_state.saver
     values = np.array(state.people[0].values)
     record = PoseRecord(values, ("tracked",) * len(values), saver.revisions.current(0))
     trace = (
@@ -252,7 +252,7 @@ def test_the_searches_on_a_frame_are_shown_from_the_store(page):
     saver.write("track", [PoseChange("person", state.frame + 2, record)], None, by_program=True)
     found = []
     for frame in range(state.frame, state.frame + 3):
-        controller._session_state.show_frame(frame)
+        controller.session_state.show_frame(frame)
         found.append(page.updates()["reason"].tried)
     assert [(x.what, x.before_nats, x.after_nats, x.taken) for x in found[0]] == [
         ("left arm and right leg", 41.0, 12.0, True),

@@ -9,7 +9,7 @@ from app.participants.participants import Participants
 def people(opened):
     """Nobody but the host, whose name is anna."""
     host = opened()
-    saver = host._session_state.saver
+    saver = host.session_state.saver
     saver._author = saver.moves._author = "anna"  # as if named on the command line
     people = Participants(host)
     yield people

@@ -82,7 +82,7 @@ def test_both_drag_at_once_on_frames_of_their_own(pair):
         who.dragging.begin(page, FRONT, 0, "torso", tuple(starts[page]))
     for step in range(1, 5):
         for page, who in enumerate((anna, ben)):
-            who._session_state.last_save = 0.0  # a checkpoint at every move
+            who.session_state.last_save = 0.0  # a checkpoint at every move
             who.dragging.move(page, tuple(starts[page] + (3.0 * step, 0.0)), step)
     for page, who in enumerate((anna, ben)):
         who.dragging.end(page)
@@ -117,7 +117,7 @@ def test_a_restart_knows_that_several_have_worked(people, opened):
     drag(ben, "torso", (5.0, 0.0))
     people.close()
     again = opened()
-    again._session_state.saver.moves._author = "anna"
+    again.session_state.saver.moves._author = "anna"
     again.history.redo()
     with pytest.raises(TrackerError, match="ben changed it since"):
         again.history.undo()
@@ -162,7 +162,7 @@ def test_a_canceled_drag_takes_back_its_checkpoints_only(pair):
     ben.navigation.seek(1)
     start = pixel_of(anna, "torso")
     anna.dragging.begin(1, FRONT, 0, "torso", tuple(start))
-    anna._session_state.last_save = 0.0
+    anna.session_state.last_save = 0.0
     anna.dragging.move(1, (start[0] + 6.0, start[1]), 1)
     drag(ben, "torso", (5.0, 0.0))
     anna.dragging.cancel(1)

@@ -38,14 +38,14 @@ def test_a_run_whose_poses_are_refused_ends_with_a_notice(people, tracker):
     anna, ben = people.host, people.join("annotate", "ben").controller
     start_run(anna)
     ben.navigation.seek(4)
-    ben._session_state.set(is_pin_held=True)  # as if begun a moment before the run
+    ben.session_state.set(is_pin_held=True)  # as if begun a moment before the run
     tracker.let_go(1000)
     wait_for(lambda: anna.state.track.message)
     assert not anna.state.track.running
     assert anna.state.track.failed
     assert "ben sets a pin on frame 4" in anna.state.track.notice
     assert anna.state.saved
-    ben._session_state.set(is_pin_held=False)
+    ben.session_state.set(is_pin_held=False)
     anna.navigation.seek(2)
     anna.tracking.start(False, 6)  # nothing is left of the former run
     tracker.let_go(1000)
@@ -56,7 +56,7 @@ def test_a_stop_reports_what_it_could_not_save(people, tracker):
     anna, ben = people.host, people.join("annotate", "ben").controller
     begin_run(anna, tracker)
     ben.navigation.seek(4)
-    ben._session_state.set(is_pin_held=True)
+    ben.session_state.set(is_pin_held=True)
     anna.tracking.stop()
     assert anna.state.track.notice.startswith("stopped, because expected frame 4 to be free")
     assert not anna.state.track.running
@@ -84,7 +84,7 @@ def test_work_on_a_range_that_fails_at_once_leaves_nothing_running(pair, monkeyp
         raise TrackerError("expected a disk, found none; bring it back")
 
     with monkeypatch.context() as gone:
-        gone.setattr(anna._session_state.saver, "write", fail)
+        gone.setattr(anna.session_state.saver, "write", fail)
         with pytest.raises(TrackerError, match="found none"):
             anna.ranges.mark(0, 0, "none")
     assert (

@@ -74,15 +74,15 @@ def test_a_person_is_drawn_at_the_time_of_the_picture(made):
     assert body.velocity is None
     late = replace(controller.session, cameras=tuple(replace(c, clock=Clock(0.5)) for c in cameras))
     controller.frames.set_cameras = lambda _: None  # the observer is shared by other tests
-    controller._session_state.show_frame(1)
+    controller.session_state.show_frame(1)
     drag(controller, "torso", (30.0, 0.0))  # another pose beside it gives a velocity
-    controller._session_state.set_cameras(late)
+    controller.session_state.set_cameras(late)
     assert found.jpeg(0, 0, None)
     (now,), (then,) = drawn[0][3], drawn[-1][3]
     velocity = controller.stored_poses.on_frame(0)[0].velocity
     assert np.abs(velocity).max() > 0
     np.testing.assert_allclose(then.values, now.model.retract(now.values, 0.5 * velocity))
-    controller._session_state.set_cameras(replace(controller.session, cameras=cameras))
+    controller.session_state.set_cameras(replace(controller.session, cameras=cameras))
 
 
 def test_corrected_cameras_are_followed(made):
@@ -92,11 +92,11 @@ def test_corrected_cameras_are_followed(made):
     turn[ROTATION] = np.radians([0.0, 0.0, 5.0])
     turned = [replace(c, camera=corrected(c.camera, turn)) for c in cameras]
     controller.frames.set_cameras = lambda _: None  # the observer is shared by other tests
-    controller._session_state.set_cameras(replace(controller.session, cameras=tuple(turned)))
+    controller.session_state.set_cameras(replace(controller.session, cameras=tuple(turned)))
     assert found.jpeg(0, 0, 1) != first
     used = drawn[-1][1].T_world_camera
     assert any(np.array_equal(used, c.camera.T_world_camera) for c in turned)
-    controller._session_state.set_cameras(replace(controller.session, cameras=cameras))
+    controller.session_state.set_cameras(replace(controller.session, cameras=cameras))
     assert found.jpeg(0, 0, 1) == first
 
 

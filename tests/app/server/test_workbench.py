@@ -256,7 +256,7 @@ def test_waiting_edits_do_not_keep_the_program_from_working(opened, session, mon
     monkeypatch.setattr(AnnotationStore, "commit", commit)
     other = sqlite3.connect(session / "annotations.sqlite", isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
-    controller._session_state.set(follow=False)  # plans an attempt
+    controller.session_state.set(follow=False)  # plans an attempt
     wait_for(lambda: "locked" in (controller.state.save_error or ""), 5)
     work = threading.Thread(target=controller.navigation.seek, args=(3,), daemon=True)
     work.start()

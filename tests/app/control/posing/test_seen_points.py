@@ -8,7 +8,7 @@ from tracker.session.store.records import SEEN
 
 
 def seen(controller):
-    return controller._session_state.saver.record(0, controller.state.frame).settings.get(SEEN, {})
+    return controller.session_state.saver.record(0, controller.state.frame).settings.get(SEEN, {})
 
 
 def test_the_end_of_a_drag_is_kept_even_out_of_reach(opened):
@@ -62,6 +62,6 @@ def test_fits_know_where_points_were_put(opened):
     controller = opened()
     put = np.add(pixel_of(controller, "left_wrist", 0), (30.0, -20.0))
     drag(controller, "left_wrist", (30.0, -20.0))
-    constraints = controller._session_state.fit_constraints(0)
+    constraints = controller.session_state.fit_constraints(0)
     assert [(at.point, at.camera) for at in constraints.seen] == [("left_wrist", 0)]
     np.testing.assert_allclose(constraints.seen[0].position_px, put, atol=0.5)

@@ -114,7 +114,7 @@ def test_decisions_of_others_are_seen_with_the_next_change(opened):
     controller = opened()
     planned(controller)
     move(controller)
-    store = controller._session_state.saver.store
+    store = controller.session_state.saver.store
     add_tasks(store, [("person", 2, "ben")], "lead")
     decide(store, ("person", 0), "rejected", "hip", author="rita")
     move(controller)

@@ -125,7 +125,7 @@ def test_a_fit_that_leaves_a_placed_joint_is_reported(fitted):
 
 def test_a_fit_that_leaves_a_pin_is_reported(fitted):
     controller, _ = fitted
-    noted, session_state = controller.state.compared, controller._session_state
+    noted, session_state = controller.state.compared, controller.session_state
     controller.held_points.set(0, None, held=False)
     u, v = pixel_of(controller, "right_wrist", camera=1)
     for off_px, is_left in ((1.0, False), (40.0, True)):
@@ -139,7 +139,7 @@ def test_a_fit_that_leaves_a_pin_is_reported(fitted):
 def test_a_joint_is_measured_from_where_it_was_put_and_not_from_where_later_drags_took_it(opened):
     """The elbow that the trunk carried away comes back to its place: nothing is left behind."""
     controller = opened()
-    session_state, model = controller._session_state, controller.models[0]
+    session_state, model = controller.session_state, controller.models[0]
     drag(controller, "left_elbow", (8.0, 0.0))
     put = controller.state.poses[0]
     drag(controller, "torso", (150.0, 0.0))
@@ -176,7 +176,7 @@ def test_costs_that_disagree_are_reported(fitted):
             before_px=before_px, after_px=after_px,
             before_view_costs_px=views_before, after_view_costs_px=views_after,
         )  # fmt: skip
-        warning = comparing._warning(controller._session_state, noted, {})
+        warning = comparing._warning(controller.session_state, noted, {})
         assert (words in warning) if words else warning == ""
     place = tuple(pixel_of(controller, "right_wrist"))
     controller.pinning.begin(PAGE, 0, 0, 0, "right_wrist", place, live=False)
@@ -185,13 +185,13 @@ def test_costs_that_disagree_are_reported(fitted):
     for after_px, words in ((5.4, ""), (6.0, "pins and edges disagree")):  # pins may raise the cost a little
         costs = {"before_view_costs_px": (), "after_view_costs_px": ()}
         noted = replace(controller.state.comparison, before_px=5.0, after_px=after_px, **costs)
-        warning = comparing._warning(controller._session_state, noted, {0: {}})
+        warning = comparing._warning(controller.session_state, noted, {0: {}})
         assert (words in warning) if words else warning == ""
 
 
 def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(opened):
     controller = opened()
-    session_state, model = controller._session_state, controller.models[0]
+    session_state, model = controller.session_state, controller.models[0]
     bent = np.array(controller.state.poses[0])
     bent[model.value_names.index("right_shoulder.abduction")] += 0.2
     session_state.show_pose(0, bent)
@@ -239,7 +239,7 @@ def test_a_fit_of_one_limb_leaves_the_rest_of_the_body(fitted):
     pose = np.array(before)
     for name in ("right_shoulder.abduction", "left_hip.abduction"):
         pose[model.value_names.index(name)] += 0.15
-    controller._session_state.show_pose(0, pose)
+    controller.session_state.show_pose(0, pose)
     controller.pinning.fit(0, 0, "right_wrist")
     after = controller.state.poses[0]
     moved = {name.split(".")[0] for name, a, b in zip(model.value_names, pose, after, strict=True) if a != b}

@@ -53,7 +53,7 @@ def compiling(opened, empty_cache):
 
 
 def test_the_page_shows_each_thing_once_its_kernels_are_compiled(compiling):
-    state = compiling._session_state
+    state = compiling.session_state
     assert state.state.compiling == "posing"
     assert compiling.frames.cached_evidence(0) is None
     for stage in ("posing", "contours"):

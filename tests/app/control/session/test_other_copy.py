@@ -56,7 +56,7 @@ def test_frames_that_both_annotated_are_compared_by_their_farthest_joint(both):
 
 def test_the_poses_of_both_are_read_once(both, monkeypatch):
     controller, ben = both
-    saver, read = controller._session_state.saver, []
+    saver, read = controller.session_state.saver, []
     real = saver.record
     monkeypatch.setattr(saver, "record", lambda person, frame: read.append(frame) or real(person, frame))
     controller.other_copies.open(ben)
@@ -83,13 +83,13 @@ def test_a_decision_is_one_step_and_undone_as_one(both, decision):
     wanted = {"take": other, "keep": own, "mean": mean_pose(controller.models[0], [own, other])}[decision]
     np.testing.assert_allclose(controller.state.poses[0], wanted, atol=1e-12)
     assert controller.state.frame == 1
-    record = controller._session_state.saver.record(0, 1)
+    record = controller.session_state.saver.record(0, 1)
     assert record.keyframe
     assert record.settings.get(TAKEN_FROM) == {"take": "ben", "mean": "the mean of session and ben"}.get(decision)
     wait_for(lambda: (0, 1) in controller.state.other_copy.decided and not controller.state.checked)
     if decision == "take":
         wait_for(lambda: controller.state.other_copy.differences[0][1].distance_m < 1e-9)
-        (back, *_) = controller._session_state.saver.alternatives(0, 1)
+        (back, *_) = controller.session_state.saver.alternatives(0, 1)
         np.testing.assert_array_equal(back.values, own)
     controller.history.undo()
     np.testing.assert_array_equal(controller.state.poses[0], own)

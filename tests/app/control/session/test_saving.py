@@ -82,7 +82,7 @@ def back_and_forth(controller):
     controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
     values = controller.state.poses[0]
     controller.dragging.move(PAGE, tuple(start + 40), 1)
-    session_state = controller._session_state
+    session_state = controller.session_state
     session_state.set(people=session_state.people_with_pose(0, values.copy()))
     controller.dragging.end(PAGE)
 
@@ -95,7 +95,7 @@ def undo(controller):
 
 
 def alternative(controller):
-    session_state = controller._session_state
+    session_state = controller.session_state
     record = session_state.saver.record(0, 2)
     other = Alternative(record.values + 0.01, record.model_revision, 1.0)
     session_state.saver.write("track", [PoseChange("person", 2, record, (other,))], None, by_program=False)

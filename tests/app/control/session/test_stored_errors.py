@@ -13,7 +13,7 @@ SIGMA_M = 0.04
 
 def store_tracked(controller, names):
     """Store tracked poses of some people on two frames, with errors on the first of them."""
-    session_state, changes = controller._session_state, []
+    session_state, changes = controller.session_state, []
     for i, (person, model) in enumerate(zip(controller.session.people, controller.models, strict=True)):
         errors = np.tile((1 + i) ** 2 * SIGMA_M**2 / 3 * np.eye(3), (len(model.point_names), 1, 1))
         values, revision = controller.state.poses[i], session_state.saver.revisions.current(i)

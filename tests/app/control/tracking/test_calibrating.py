@@ -47,7 +47,7 @@ def test_a_check_can_be_stopped(controller, monkeypatch):
 
 def corrected(controller):
     """Turn a camera, as a check would, by an entry of the history."""
-    saver, session = controller._session_state.saver, controller.session
+    saver, session = controller.session_state.saver, controller.session
     corrections = np.zeros((len(session.cameras), N_CORRECTIONS))
     corrections[0, 1] = 0.02
     change_calibration(session, saver._store, with_corrections(session, corrections), "corrected")

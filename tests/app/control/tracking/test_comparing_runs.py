@@ -14,7 +14,7 @@ RANGE = range(3, 7)
 
 def written(controller, method, turned, status):
     """Store poses of a run over the range, one degree of freedom turned by radians; return them."""
-    saver, model = controller._session_state.saver, controller.models[0]
+    saver, model = controller.session_state.saver, controller.models[0]
     pose = model.neutral()
     pose[model.value_names.index("left_elbow.extension")] = turned
     record = PoseRecord(
@@ -23,7 +23,7 @@ def written(controller, method, turned, status):
     )  # fmt: skip
     with controller.lock:
         saver.write(method, [PoseChange("person", f, record) for f in RANGE], None, by_program=True)
-        controller._session_state.refresh_saving()
+        controller.session_state.refresh_saving()
     return pose
 
 

@@ -57,7 +57,7 @@ def corrected(opened):
 
 def put(controller, frames, height_m=1.0):
     """Store poses of a run; heights tell them apart."""
-    session_state, values = controller._session_state, controller.models[0].neutral()
+    session_state, values = controller.session_state, controller.models[0].neutral()
     values[1] = height_m
     revision = session_state.saver.revisions.current(0)
     record = PoseRecord(values, ("tracked",) * len(values), revision, settings={"method": "chamfer"})
@@ -69,7 +69,7 @@ def put(controller, frames, height_m=1.0):
 
 
 def heights(controller, person=0):
-    found = {k: controller._session_state.saver.record(person, k) for k in FRAMES}
+    found = {k: controller.session_state.saver.record(person, k) for k in FRAMES}
     return {k: None if record is None else float(record.values[1]) for k, record in found.items()}
 
 
@@ -85,12 +85,12 @@ def test_all_poses_but_keyframes_are_estimated_as_one_entry(corrected, estimate)
     assert (sorted(asked.poses), list(asked.subjects.keyframes), asked.stays) == ([*FRAMES], [CORRECTED], False)
     moved = {k: pytest.approx(1.0 + STEP_M * (k != CORRECTED)) for k in FRAMES}
     assert heights(corrected) == moved
-    record = corrected._session_state.saver.record(0, CORRECTED)
+    record = corrected.session_state.saver.record(0, CORRECTED)
     assert (record.keyframe, record.status) == (True, "good")
     assert corrected.state.undo == "estimate frames 3 to 11"
     corrected.history.undo()
     assert heights(corrected) == dict.fromkeys(FRAMES, 1.0)
-    assert corrected._session_state.saver.record(0, CORRECTED).status == ""
+    assert corrected.session_state.saver.record(0, CORRECTED).status == ""
 
 
 def test_progress_is_shown_and_nothing_written_before_the_end(corrected, held):
@@ -120,7 +120,7 @@ def test_poses_that_change_meanwhile_keep_the_change(corrected, held):
     corrected.ranges.estimate(3, 11)
     wait_for(lambda: corrected.state.ranges.done)
     put(corrected, [4, CORRECTED], 2.0)  # as another program does
-    corrected._session_state.saver.write("clear", [PoseChange("person", 5, None)], None, by_program=True)
+    corrected.session_state.saver.write("clear", [PoseChange("person", 5, None)], None, by_program=True)
     held.go_on.set()
     assert done(corrected) == "estimated 6 frames"
     found = heights(corrected)

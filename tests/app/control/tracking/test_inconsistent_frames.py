@@ -17,7 +17,7 @@ KEY = 10
 def steady(opened):
     """A person who moves steadily on frames 0 to 20; frame 10 is a keyframe."""
     controller = opened()
-    saver, model = controller._session_state.saver, controller.session.people[0].model
+    saver, model = controller.session_state.saver, controller.session.people[0].model
     pose = np.array(controller.state.poses[0])
     revision = saver.revisions.current(0)
 
@@ -30,7 +30,7 @@ def steady(opened):
             cost_px=float(np.mean(costs)), view_costs_px=costs,
         )  # fmt: skip
         saver.write("place", [PoseChange("person", frame, record)], None, by_program=False)
-        controller._session_state.refresh_saving()
+        controller.session_state.refresh_saving()
         return values
 
     for frame in range(21):
@@ -40,7 +40,7 @@ def steady(opened):
 
 def checked(controller):
     checker = controller.inconsistent_frames
-    wait_for(lambda: checker._seen == controller._session_state.saver.index.version)
+    wait_for(lambda: checker._seen == controller.session_state.saver.index.version)
     return encoding.inconsistent(controller.state)
 
 
@@ -55,7 +55,7 @@ def test_a_wrong_keyframe_stands_for_its_neighbours_and_is_left_unchanged(steady
     assert doubt.point in ("left wrist", "left elbow")
     assert 20 < doubt.distance_cm < 60
     assert message.frames == (KEY,)
-    np.testing.assert_array_equal(controller._session_state.saver.record(0, KEY).values, values)
+    np.testing.assert_array_equal(controller.session_state.saver.record(0, KEY).values, values)
     place(KEY, keyframe=True)
     wait_for(lambda: not checked(controller).keyframes)
     assert checked(controller).frames == ()
@@ -78,11 +78,11 @@ def test_a_view_contradicts_a_keyframe_until_it_is_confirmed_or_changed(steady, 
 
 def test_an_assessment_makes_a_keyframe_doubted_until_it_is_confirmed_marked_or_undone(steady):
     controller, place = steady
-    values, saver = place(KEY, keyframe=True), controller._session_state.saver
+    values, saver = place(KEY, keyframe=True), controller.session_state.saver
 
     def write(change):
         saver.write("audit", [change], None, by_program=True)
-        controller._session_state.refresh_saving()
+        controller.session_state.refresh_saving()
 
     write(AssessmentChange("person", KEY, values, "lost", "left arm uncertain without FRONT", (0.9,) * 5, None))
     wait_for(lambda: checked(controller).keyframes)
@@ -117,9 +117,9 @@ def test_a_confirmed_keyframe_is_judged_again_when_its_pose_changes(steady):
 def test_the_check_of_a_long_recording_rests_between_intervals(couple, monkeypatch, n_frames, n_rests):
     did, clock = [], iter(range(10_000))
     monkeypatch.setattr(inconsistent_frames, "_MAX_INTERVAL", 10)
-    found = inconsistent_frames.InconsistentFrames(couple._session_state)
+    found = inconsistent_frames.InconsistentFrames(couple.session_state)
     wait_for(lambda: found._seen)
-    monkeypatch.setattr(couple._session_state.saver.index, "timeline", lambda *_: dict.fromkeys(range(n_frames)))
+    monkeypatch.setattr(couple.session_state.saver.index, "timeline", lambda *_: dict.fromkeys(range(n_frames)))
     monkeypatch.setattr(found, "_check_interval", lambda *_: did.append("check"))
     sleeping = SimpleNamespace(monotonic=lambda: next(clock), sleep=lambda s: did.append(s))
     monkeypatch.setattr(inconsistent_frames, "time", sleeping)

@@ -172,7 +172,7 @@ def test_a_set_that_cannot_be_read_is_listed_with_the_reason(imported):
 
 def covered(controller):
     """Share of the regions of evidence that silhouettes cover, at least, of all views."""
-    evidence = controller._session_state.frames.evidence(controller.state.frame)
+    evidence = controller.frames.evidence(controller.state.frame)
     return min(view.silhouette.inside.mean() for view in evidence)
 
 
@@ -196,7 +196,7 @@ def test_masks_are_used_at_once_in_place_of_the_background(controller, tmp_path)
     assert controller.session.cameras[0].masks == session.folder / "observations" / "net" / "masks" / "FRONT"
     assert all(c.masks is not None for c in load_session(session.folder).cameras)
     assert covered(controller) > 0.6
-    assert controller._session_state.saver._session is controller.session  # else it would write the old cameras
+    assert controller.session_state.saver._session is controller.session  # else it would write the old cameras
 
 
 def judged(controller):

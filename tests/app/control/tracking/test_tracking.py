@@ -171,7 +171,7 @@ def test_a_run_takes_the_chosen_stride_and_cameras(placed, tracker):
     assert tracker.seen == [5, 8]
     observer = tracker.run.observer
     assert [c.camera.name for c in observer.cameras] == [names[1], names[3]]
-    whole = placed._session_state.frames.observer.evidence(5)
+    whole = placed.frames.observer.evidence(5)
     for own, same in zip(observer.evidence(5), (whole[1], whole[3]), strict=True):
         np.testing.assert_array_equal(own.points_px, same.points_px)
     assert set(placed.stored_poses.timeline()) == {2, 5, 8}
