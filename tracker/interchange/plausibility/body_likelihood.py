@@ -50,6 +50,8 @@ class PeoplePriors(NamedTuple):
 
 PRIORS = PeoplePriors()
 _BODY, _PERSON = "gavrila38", USUAL_SIZES["person"]
+_usual_body = cache(lambda stature_m: typical_body(load_model(_BODY, stature_m)))
+"""Return the body of typical proportions for a stature, metres."""
 _SEGMENTS = {
     **SEGMENTS,
     "foot": [(["left_ankle"], ["left_toe"]), (["right_ankle"], ["right_toe"])],
@@ -100,8 +102,10 @@ def bones(places: Places) -> Bones:
     logs = np.log(np.maximum([*known.values()], TINY))
     stature = usual = np.ones(1)
     for _ in range(2):  # a child has other proportions
-        lengths = _usual_lengths(round(float(np.clip(stature, *_PERSON).item()), 2))
-        usual = np.log([lengths[name] for name, _ in known])[:, None]
+        body = _usual_body(round(float(np.clip(stature, *_PERSON).item()), 2))
+        own = body.named_points_world(body.neutral())
+        lengths = {n: np.linalg.norm(_middle(own, a) - _middle(own, b)) for n, ((a, b), *_) in _SEGMENTS.items()}
+        usual = np.log([lengths[name] / body.height_m for name, _ in known])[:, None]
         stature = np.exp(np.nanmedian(logs - usual))
     priors = SizePriors()
     of_joints = np.sqrt(2) * np.hypot(priors.joint, PRIORS.error) / np.exp(usual)
@@ -111,17 +115,6 @@ def bones(places: Places) -> Bones:
     low, high = np.nanquantile(np.exp(logs[oddest]), (0.1, 0.9))
     is_of_person = bool(nats[oddest] > 0.5 * np.log(PRIORS.gross))
     return Bones(float(nats.sum()), float(stature), [*known][oddest][0], (float(low), float(high)), is_of_person)
-
-
-@cache
-def _usual_lengths(stature_m: float) -> dict[str, float]:
-    """Return the lengths of segments of a body of typical proportions, in shares of its height."""
-    body = typical_body(load_model(_BODY, stature_m))
-    places = body.named_points_world(body.neutral())
-    return {
-        n: float(np.linalg.norm(_middle(places, a) - _middle(places, b)) / body.height_m)
-        for n, ((a, b), *_) in _SEGMENTS.items()
-    }
 
 
 def stature_nats(stature_m: float, expected_m: float) -> float:
@@ -157,6 +150,7 @@ def upright_nats(places: Places, up: Array) -> float:
     return _mean(np.log((1 - PRIORS.gross) * ratios + PRIORS.gross))
 
 
+@np.errstate(invalid="ignore", divide="ignore")
 def bend_nats(places: Places) -> float:
     """Return the log likelihood ratio of knees, elbows and feet that point the right way; they do not if mirrored."""
     from scipy.special import ndtr  # imported lazily: loading takes 0.1 s
@@ -166,8 +160,7 @@ def bend_nats(places: Places) -> float:
     up = _middle(places, _both("shoulder")) - _middle(places, _both("hip"))
     left = sum(places[f"left_{j}"] - places[f"right_{j}"] for j in ("shoulder", "hip"))
     forward = np.cross(left, up)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
+    forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
     height, total = np.linalg.norm(up, axis=-1), 0.0
     for side in ("left", "right"):
         for before, at, after, is_ahead, is_sure in _DIRECTIONS:
@@ -176,8 +169,7 @@ def bend_nats(places: Places) -> float:
                 continue
             a, b, c = (places[n] for n in names)
             line = c - a
-            with np.errstate(invalid="ignore", divide="ignore"):
-                along = np.sum((b - a) * line, axis=-1) / np.sum(line * line, axis=-1)
+            along = np.sum((b - a) * line, axis=-1) / np.sum(line * line, axis=-1)
             foot = a + np.nan_to_num(along)[:, None] * line
             # The trunk is 30% of the height.
             ahead = np.sum((b - foot) * forward, axis=-1) / (PRIORS.error * height / 0.3)
