@@ -116,13 +116,8 @@ def _triangulated(
     assert key_points is not None
     flat = np.where(key_points.is_known[..., None], key_points.points_px, np.nan)
     chosen = _window(flat.reshape(key_points.n_frames, -1, *flat.shape[-2:]), fps)
-    few = replace(
-        key_points,
-        points_px=key_points.points_px[chosen],
-        confidence=key_points.confidence[chosen],
-        tracks=None,
-        colors=None,
-    )
+    px, confidence = key_points.points_px[chosen], key_points.confidence[chosen]
+    few = replace(key_points, points_px=px, confidence=confidence, tracks=None, colors=None)
     found = triangulate_observations(replace(observations, points=few), cameras, mend_sides=False)
     names = () if key_points.names == observations.joint_map.points else key_points.names
     return chosen, names, found.joints.joints_world
