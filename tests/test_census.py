@@ -14,7 +14,7 @@ its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names t
 MAX_CODE_LINES = {"tracker": 49081, "app": 20786, "js": 14505, "css": 4472, "tests": 66026}
 """Lines without blanks, comments and docstrings."""
 MAX_HIDDEN_SUBJECTS = 25
-MAX_PRIVATE = 207
+MAX_PRIVATE = 209
 """Uses of private names in tests: a test goes through the public surface where that shows the same."""
 HIDDEN_SUBJECT = re.compile(r"(?:^|(?<=[.!?:])\s+)(?:What|Where|Who|Whose|Those|Nor)\b")
 COMMENT = re.compile(r"(?:^|[ \t])#.*", re.MULTILINE)

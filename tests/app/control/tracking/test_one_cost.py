@@ -49,7 +49,7 @@ def test_each_place_has_the_same_cost_of_a_tracked_pose(run, session, opened, tm
     table, records, controller = exported(run, session, tmp_path), stored(session), opened()
     top = {k: shown(controller, k) for k in FRAMES}
     rows = {k: [r.cost_px, *r.view_costs_px] for k, r in records.items()}
-    cells = {k: cell["cost_px"] for k, cell in controller._session_state.saver.index.timeline(0).items()}
+    cells = {k: cell["cost_px"] for k, cell in controller.session_state.saver.index.timeline(0).items()}
     for k in FRAMES:
         if k == 0 and words == ("--paper",):  # nothing assesses a keyframe there
             continue
@@ -80,7 +80,7 @@ def test_edits_searches_and_replays_end_at_the_cost_of_the_pose(opened):
     assert within([controller.state.drawn.cost_px, *controller.state.drawn.view_costs_px], dragged)
     controller.replay.leave()
     assert within(shown(controller, 0), [state.cost_px, *state.view_costs_px])
-    saver = controller._session_state.saver
+    saver = controller.session_state.saver
     curves = plots_of(controller.models[0], controller.session.camera_names, "cost")
     curve = samples(controller.models[0], curves, [0], saver.pose_rows(0, [0]))[:, 0]
     assert within(curve, [state.cost_px, *state.view_costs_px])
@@ -89,5 +89,5 @@ def test_edits_searches_and_replays_end_at_the_cost_of_the_pose(opened):
 def test_the_cell_of_a_frame_has_the_cost_of_all_people_as_they_are(couple):
     for person, by in ((0, 60.0), (1, 9.0), (0, -58.0)):  # the cost falls, while bob's row has that of before
         drag(couple, "torso", (by, 0.0), person=person)
-    cell = couple._session_state.saver.index.timeline(0)[0]
+    cell = couple.session_state.saver.index.timeline(0)[0]
     assert cell["cost_px"] == pytest.approx(shown(couple, 0)[0], abs=0.01)
