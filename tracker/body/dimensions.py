@@ -18,6 +18,9 @@ from tracker.geometry.arrays import TINY, Array
 
 HEIGHT_LIMITS_M = (0.3, 3.0)
 """Least and largest height of a body, metres."""
+STATED_HEIGHT_SIGMA = 0.0055
+"""Standard deviation of the logarithm of a height that somebody states: people lose 1.1% of it over a day (Tyrrell et
+al. 1985), and nobody says at which hour it was measured."""
 MIN_PART_M, _MAX_SHARE = 0.005, 0.7
 """Shortest dimension of a part, metres; longest, as a share of the body's height."""
 _SIDES = ("left_", "right_")
@@ -119,7 +122,7 @@ def with_sizes_of(model: BodyModel, source: BodyModel) -> BodyModel:
     Parts correspond if they have the same name and the same joints and landmarks at their ends: a rigid trunk has none
     of the lengths of one that bends. The others keep their proportions.
     """
-    base = model.with_height(source.height_m)
+    base = replace(model, height_m=source.height_m, height_sigma=source.height_sigma)
     own, other = dimensions_of(base), dimensions_of(source)
     same = [n for n in own.parts.keys() & other.parts.keys() if {*_points_on(base, n)} == {*_points_on(source, n)}]
     parts = {**own.parts, **{name: other.parts[name] for name in same}}

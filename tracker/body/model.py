@@ -47,6 +47,8 @@ class BodyModel:
     joint_sigma_m: float | None = None
     """Standard deviation along each axis with which a person's sizes determine the joints, metres; None where the sizes
     are nobody's own."""
+    height_sigma: float | None = None
+    """Standard deviation of the logarithm of the height where somebody has stated it; None elsewhere."""
 
     def with_height(self, height_m: float) -> "BodyModel":
         """Return the same proportions at another body height."""

@@ -142,6 +142,7 @@ class _ModelFile(_Row):
     version: int = VERSION
     height_m: _Height = DEFAULT_HEIGHT_M
     joint_sigma_m: Annotated[float, Meta(ge=0, le=1, description="0 to 1 metre")] | None = None
+    height_sigma: Annotated[float, Meta(gt=0, le=1, description="a number above 0, at most 1")] | None = None
     landmarks: Annotated[list[_LandmarkRow], Meta(max_length=256, description="at most 256 landmarks")] = []
     search: Annotated[list[_GroupRow], Meta(max_length=32, description="at most 32 search groups")] = []
 
@@ -193,7 +194,8 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
     for what, names in (("joint and landmark", model.point_names), ("degree of freedom", model.dof_names)):
         if doubles := _doubles(names):
             raise ModelError(f"{where}: expected each {what} once, found '{min(doubles)}' twice; rename one")
-    return replace(model, search_groups=_search_groups(model, row.search, where), joint_sigma_m=row.joint_sigma_m)
+    groups = _search_groups(model, row.search, where)
+    return replace(model, search_groups=groups, joint_sigma_m=row.joint_sigma_m, height_sigma=row.height_sigma)
 
 
 def format_model(model: BodyModel) -> str:
@@ -228,13 +230,13 @@ def format_model(model: BodyModel) -> str:
     ]
     search = [{"name": g.name, "dofs": list(g.dofs)} for g in model.search_groups]
     # Only where it is known, so that older programs read other files.
-    sigma = {} if model.joint_sigma_m is None else {"joint_sigma_m": model.joint_sigma_m}
+    sigmas = {"joint_sigma_m": model.joint_sigma_m, "height_sigma": model.height_sigma}
     return tomli_w.dumps(
         {
             "version": VERSION,
             "name": model.name,
             "height_m": model.height_m,
-            **sigma,
+            **{name: sigma for name, sigma in sigmas.items() if sigma is not None},
             "search": search,
             "joints": joints,
             "landmarks": landmarks,
@@ -332,4 +334,6 @@ def has_preset_sizes(model: BodyModel) -> bool:
 
 def has_preset_proportions(model: BodyModel) -> bool:
     """Return whether a body has the sizes of its preset but for its height, so that they are nobody's own."""
-    return model.name in PRESETS and has_preset_sizes(model.with_height(load_model(model.name).height_m))
+    return model.name in PRESETS and has_preset_sizes(
+        replace(model, height_m=load_model(model.name).height_m, height_sigma=None)
+    )

@@ -80,7 +80,8 @@ def set_pose_at_joints(
         raise doubts[0]
     points = dict(zip(joints.names, joints.points[row[0]], strict=True))
     limbs = {n: p for n, p in points.items() if n in LIMB_JOINTS and np.all(np.isfinite(p))}
-    if fit_sizes or (has_preset_sizes(person.model) and set(joints.names).issuperset(LIMB_JOINTS)):
+    is_open = fit_sizes and person.model.height_sigma is None
+    if is_open or (has_preset_sizes(person.model) and set(joints.names).issuperset(LIMB_JOINTS)):
         person = replace(person, model=person.model.with_height(height_from_joints(person.model, joints)))
     with SessionLock(session.folder):
         acquired = _acquire(session, person, joints) if fit_sizes else None

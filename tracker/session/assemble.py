@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
+from tracker.body.dimensions import STATED_HEIGHT_SIGMA
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
@@ -379,5 +380,7 @@ def _make_people(
     for i, name in enumerate(names):
         model = models.get(name, DEFAULT_MODEL) if isinstance(models, Mapping) else models
         height = heights.get(name) if isinstance(heights, Mapping) else heights
-        people.append(Person(name, load_model(model, height), PALETTE[i % len(PALETTE)]))
+        sigma = None if height is None else STATED_HEIGHT_SIGMA
+        body = replace(load_model(model, height), height_sigma=sigma)
+        people.append(Person(name, body, PALETTE[i % len(PALETTE)]))
     return tuple(people)

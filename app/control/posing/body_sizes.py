@@ -1,6 +1,7 @@
 """Edit body sizes: first a draft that the views show, then a new model revision, as an entry of the history."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,15 @@ from app.control.search.search_runs import SearchRuns
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.state.people import SizeDraft
-from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
+from tracker.body.dimensions import (
+    STATED_HEIGHT_SIGMA,
+    BodyDimensions,
+    PartDimensions,
+    dimensions_of,
+    mirror_part,
+    scaled,
+    with_dimensions,
+)
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.retarget import retarget_pose
@@ -74,7 +83,8 @@ class BodySizeEditing:
             sizes = self._sizes(person)
             # Lengths are divided by the height, so it is checked before they are scaled.
             wrong = not (np.isfinite(height_m) and height_m > 0)
-            self._draft(person, sizes._replace(height_m=height_m) if wrong else scaled(sizes, height_m))
+            found = sizes._replace(height_m=height_m) if wrong else scaled(sizes, height_m)
+            self._draft(person, found, STATED_HEIGHT_SIGMA)
 
     def set_part(self, person: int, part: str, sizes: PartDimensions) -> None:
         """Give a part of the draft other sizes, and its mirror_part where both sides are edited at once.
@@ -129,9 +139,7 @@ class BodySizeEditing:
         with self._activities.editing(alone=True):
             session_state, name = self._session_state, self._session_state.session.people[person].name
             before, model = session_state.saver.revisions.current(person), self.model(person)
-            same = model is session_state.present[person] or dimensions_of(model) == dimensions_of(
-                session_state.present[person]
-            )
+            same = _stated(model) == _stated(session_state.present[person])
             if not same:
                 session_state.set_body_models(save_model(session_state.session, person, model))
             draft = session_state.state.draft
@@ -226,10 +234,12 @@ class BodySizeEditing:
     def _sizes(self, person: int) -> BodyDimensions:
         return dimensions_of(self.model(person))
 
-    def _draft(self, person: int, sizes: BodyDimensions) -> None:
-        if sizes == self._sizes(person):
+    def _draft(self, person: int, sizes: BodyDimensions, height_sigma: float | None = None) -> None:
+        before = _stated(self.model(person))
+        sigma = height_sigma or before[1]
+        if (sizes, sigma) == before:
             return
-        model = with_dimensions(self._session_state.present[person], sizes)
+        model = replace(with_dimensions(self._session_state.present[person], sizes), height_sigma=sigma)
         self._session_state.set(draft=SizeDraft(person, model), sizes_message="")
 
     def _rest(self, person: int) -> str:
@@ -271,3 +281,8 @@ class BodySizeEditing:
                 changes.append(PoseChange(name, row.frame, resized_start(stored, becomes, revision)))
             off_m.append(joints_off_m(stored.body, PosedBody(becomes, values)))
         return _Refitted(changes, float(np.mean(off_m)) if off_m else 0.0)
+
+
+def _stated(model: BodyModel) -> tuple[BodyDimensions, float | None]:
+    """Return the dimensions of a body, and how sure its height is."""
+    return dimensions_of(model), model.height_sigma

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tracker.body.dimensions import STATED_HEIGHT_SIGMA
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.estimation.acquisition.size_parameters import SizeParameters, SizePriors
@@ -14,7 +15,7 @@ from tracker.estimation.initialization.first_pose import HEIGHT_SIGMA
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.formats.model_toml import format_model, has_preset_sizes, load_model
+from tracker.formats.model_toml import format_model, has_preset_proportions, has_preset_sizes, load_model
 from tracker.geometry.triangulation import sigma_px
 from tracker.pipeline import body_acquisition
 from tracker.pipeline.body_acquisition import MEASURED, PLACED_M, SIZES_EDITS, acquire_body, posed_frames, store_body
@@ -123,6 +124,8 @@ def test_a_preset_is_told_from_sizes_that_somebody_chose():
     assert has_preset_sizes(load_model("gavrila34"))
     assert not has_preset_sizes(load_model("gavrila34", 1.6))
     assert not has_preset_sizes(larger(load_model("gavrila34")))
+    stated = replace(load_model("gavrila34"), height_sigma=STATED_HEIGHT_SIGMA)  # somebody is as tall as the preset
+    assert (has_preset_sizes(stated), has_preset_proportions(stated)) == (False, True)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pytest
 from clips import SIZE, encode, encode_stamped, write_images
 from new_sessions import K, assert_refused, new, noted, place, room
 
+from tracker.body.dimensions import STATED_HEIGHT_SIGMA
 from tracker.errors import CalibrationError, ModelError, RecordingError, Remedy, SessionError
 from tracker.evaluation.references import placement
 from tracker.footage.recording import Recording
@@ -82,6 +83,8 @@ def test_images_of_other_instants(room):
 def test_people_models_and_heights(room):
     session = new(room, people=["ann", "bob"], models={"bob": "gavrila22"}, heights={"ann": 1.6})
     assert [(p.name, p.model.height_m) for p in session.people] == [("ann", 1.6), ("bob", 1.75)]
+    loaded = [p.model.height_sigma for p in load_session(session.folder).people]
+    assert loaded == [STATED_HEIGHT_SIGMA, None]  # a height that was stated is fixed in an acquisition
     assert session.people[0].color != session.people[1].color
 
 

@@ -185,25 +185,27 @@ class ContourBundle:
         residuals = map_parallel(lambda g: self._residuals(g, state, bodies[g]), range(len(bodies)))
         priors = self._shared_priors(state)
         cost = sum(r.cost for r in residuals)
-        cost += sum(0.5 * float(np.sum((deviations / sigmas) ** 2)) for _, deviations, sigmas in priors)
+        cost += sum(0.5 * float(residuals @ residuals) for _, residuals, _ in priors)
         out = ArrowEquations.zeros(self.n_shared, len(self._seen), self._n_own)._replace(cost=cost)
         if cost >= below:
             return out
         found = map_parallel(lambda g: self._summed(g, state, bodies[g], residuals[g]), range(len(bodies)))
         for group, (seen, own) in enumerate(zip(self._seen, found, strict=True)):
             self._enter(out, group, seen.person, own)
-        for at, deviations, sigmas in priors:
-            out.gradient[at] += deviations / sigmas**2
-            out.hessian[at, at] += np.diag(1 / sigmas**2)
+        for at, residuals, rows in priors:
+            out.gradient[at] += rows.T @ residuals
+            out.hessian[at, at] += rows.T @ rows
         return out
 
     def _shared_priors(self, state: RigState) -> list[tuple[slice, Array, Array]]:
-        corrections = state.corrections[: len(self._sigmas)]
-        rows = [(slice(0, self._sigmas.size), corrections.ravel(), self._sigmas.ravel())]
+        """Return the range of each prior among the shared parameters, its residuals, and their derivatives."""
+        corrections, sigmas = state.corrections[: len(self._sigmas)].ravel(), self._sigmas.ravel()
+        rows = [(slice(0, sigmas.size), corrections / sigmas, np.diag(1 / sigmas))]
         for at, sizes, parameters, fitted in zip(
             self._ranges, state.sizes, self._parameters, self._fitted, strict=True
         ):
-            rows.append((at, sizes[fitted], parameters.sigmas[fitted]))
+            prior = parameters.prior[:, fitted]
+            rows.append((at, prior @ sizes[fitted], prior))
         return rows
 
     def _enter(self, out: ArrowEquations, group: int, person: int, found: NormalEquations) -> None:

@@ -150,6 +150,7 @@ def fit_sizes_to_contours(
         n_evaluations += found.evaluations
         if step is settings.rounds[-1]:
             covariance = _covariance(found.equations, parameters.sigmas, settings.frame_correlation)
+            covariance[0, 0] += (parameters.base.height_sigma or 0.0) ** 2  # that of a fixed height, the first size
     (sizes,) = state.sizes
     body = with_height_of_stature(parameters.body(sizes), parameters.base)
     return SizeFit(sizes, body, state.poses, cost, covariance, n_evaluations)

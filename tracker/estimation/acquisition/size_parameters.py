@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.dimensions import main_axis, mirror_part
+from tracker.body.dimensions import main_axis, mirror_part, stature_m
 from tracker.body.model import BodyModel
 from tracker.estimation.fitting.gauss_newton import JOINT_SHARE
 from tracker.geometry.arrays import Array
@@ -44,6 +44,10 @@ _OWN_PRIORS = {
     "foot.free_end": "end",
 }
 """Parameters whose standard deviation is not that of their kind."""
+
+
+_ANATOMICAL = 0.004
+"""Standard deviation of a limb's joint as anatomy defines it, fraction of height; see `SizePriors.anatomical`."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +92,8 @@ class SizePriors:
         """
         return replace(
             self,
-            limb_joint=min(0.004, self.limb_joint),
-            limb_side=min(0.004, self.limb_side),
+            limb_joint=min(_ANATOMICAL, self.limb_joint),
+            limb_side=min(_ANATOMICAL, self.limb_side),
             sole=min(0.015, self.sole),
         )
 
@@ -131,6 +135,19 @@ class SizeParameters:
         """Standard deviation of each parameter in the prior, (n_sizes,)."""
         sideless = [n.removeprefix("left_").removeprefix("right_") for n in self.names]
         return np.array([getattr(self.priors, _OWN_PRIORS.get(n) or kind_of(n)) for n in sideless])
+
+    @cached_property
+    def prior(self) -> Array:
+        """Rows of the prior, (n_rows, n_sizes): their products with the parameters have a standard deviation of 1.
+
+        A height that somebody has stated is the stature, which lengths change, too. It is fixed: errors of contours are
+        alike on all frames, so they would outweigh any word. Its own variance stands for how tightly it is held.
+        """
+        rows, sigma = np.diag(1 / self.sigmas), self.base.height_sigma
+        if sigma is None:
+            return rows
+        own, grown = stature_m(self.base), [stature_m(self.body(step)) for step in np.diag(self.sigmas)]
+        return np.vstack([rows, np.log(np.array(grown) / own) / self.sigmas / sigma**2])
 
     def of_kinds(self, *kinds: str) -> NDArray[np.bool_]:
         """Return which parameters are of some kinds, the names of `SizePriors`, (n_sizes,)."""

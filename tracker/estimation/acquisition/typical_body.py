@@ -1,5 +1,7 @@
 """The body of typical proportions for a stature, on which the priors of an acquisition are centred."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tracker.body.dimensions import dimensions_of, stature_m, with_dimensions
@@ -22,7 +24,7 @@ def typical_body(body: BodyModel) -> BodyModel:
     """
     if body.name not in PRESETS:
         return body
-    preset = load_model(body.name, body.height_m)
+    preset = replace(load_model(body.name, body.height_m), height_sigma=body.height_sigma)
     if preset.dof_names != body.dof_names or list(preset.part_index) != list(body.part_index):
         return body
     statures_m, shares = np.transpose(_LEG_SHARES)

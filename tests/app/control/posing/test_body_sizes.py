@@ -8,7 +8,7 @@ from gestures import PAGE, drag, pixel_of, wait_for
 
 from app.messages import encoding
 from app.state.page_view import View
-from tracker.body.dimensions import PartDimensions, dimensions_of
+from tracker.body.dimensions import STATED_HEIGHT_SIGMA, PartDimensions, dimensions_of
 from tracker.errors import TrackerError
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
@@ -156,6 +156,9 @@ def test_wrong_sizes_are_refused_in_a_sentence(posed):
         lengthen(posed, 9.0)
     with pytest.raises(TrackerError, match="height of 30 to 300 cm, found 0"):
         posed.body_sizes.set_height(0, 0.0)
+    posed.body_sizes.set_height(0, posed.session.people[0].model.height_m)
+    assert posed.body_sizes.model(0).height_sigma == STATED_HEIGHT_SIGMA  # as tall as before, but stated now
+    posed.body_sizes.discard()
     with pytest.raises(TrackerError, match="distance of the hips"):
         posed.body_sizes.set_width(0, "hip", -0.1)
     assert posed.state.draft is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from staging import cameras_around, own_evidence, posed, shaken
 
-from tracker.body.dimensions import PartDimensions, dimensions_of, stature_m, with_dimensions
+from tracker.body.dimensions import STATED_HEIGHT_SIGMA, PartDimensions, dimensions_of, stature_m, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.frame_choice import choose_frames
@@ -74,6 +74,21 @@ def test_lengths_and_girths_of_another_body_are_found(seed):
         for p, f in zip(found.poses, frames, strict=True)
     ]
     assert np.mean(off) < 0.012
+
+
+def test_a_stated_height_is_kept_against_contours_of_another():
+    """Somebody seems 4% taller than stated, as by the scale of the cameras. How sure the height is stays, too."""
+    person, found = load_model("gavrila22", 1.768), {}
+    quick = SizeFitSettings(rounds=(Round(("height", "build", "length"), 1.5, 4),))
+    for sigma in (None, STATED_HEIGHT_SIGMA):
+        model = replace(load_model("gavrila22", 1.7), height_sigma=sigma)
+        parameters = SizeParameters(model)
+        found[sigma] = fit_sizes_to_contours(parameters, sighted(person, model, range(2)), quick)
+        assert found[sigma].body.height_sigma == sigma
+    kept, other = found[STATED_HEIGHT_SIGMA], found[None].body.height_m
+    assert abs(kept.body.height_m - 1.7) < 0.002 < 0.02 < other - 1.7
+    by_sizes = parameters.prior[-1] * STATED_HEIGHT_SIGMA**2
+    assert np.sqrt(by_sizes @ kept.covariance @ by_sizes) == pytest.approx(STATED_HEIGHT_SIGMA, rel=0.1)
 
 
 @pytest.mark.slow
