@@ -42,16 +42,7 @@ def command(
     reporter = Reporter()
     with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
         simulation = Simulation(
-            scene,
-            cameras,
-            frames,
-            seed,
-            size,
-            body=body,
-            masks=masks,
-            person=person,
-            fisheyes=fisheye,
-            room=room,
+            scene, cameras, frames, seed, size, body=body, masks=masks, person=person, fisheyes=fisheye, room=room
         )
         simulate(out, simulation, progress=lambda *_: tick())
     print(f"made {out}")

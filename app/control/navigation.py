@@ -10,11 +10,7 @@ class Navigation:
     """Moves through the recording. No stored pose changes, but gestures and searches end."""
 
     def __init__(
-        self,
-        session_state: SessionState,
-        activities: Activities,
-        search: SearchRunner,
-        tracking: Tracking,
+        self, session_state: SessionState, activities: Activities, search: SearchRunner, tracking: Tracking
     ) -> None:
         """Navigate in this session.
 

@@ -104,10 +104,7 @@ def _joined(one: LoggedEdit, other: LoggedEdit) -> tuple[LoggedEdit, LoggedEdit]
     first, second = sorted((one, other), key=lambda e: (-len(e.poses) - len(e.pins), repr((e.poses, e.pins))))
     all_poses, both_poses = _changes(first.poses, second.poses)
     all_pins, both_pins = _changes(first.pins, second.pins)
-    return (
-        first._replace(poses=all_poses, pins=all_pins),
-        first._replace(poses=both_poses, pins=both_pins),
-    )
+    return (first._replace(poses=all_poses, pins=all_pins), first._replace(poses=both_poses, pins=both_pins))
 
 
 def _changes(first: Sequence[T], second: Sequence[T]) -> tuple[tuple[T, ...], tuple[T, ...]]:

@@ -302,10 +302,7 @@ def open_stored_session(session: Session) -> Generator[StoredSession, None, None
         TrackerError: another program has it open, or footage is missing.
     """
     require_files(session)
-    with (
-        SessionLock(session.folder),
-        closing(AnnotationStore(session.annotations_path)) as store,
-    ):
+    with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
         session = follow_history(session, store)
         with Recording(session.cameras) as recording:
             yield StoredSession(session, store, Observer(session.cameras, recording).in_time())

@@ -26,13 +26,7 @@ from tracker.geometry.ground_plane import floor_plane
 from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, with_keypoints
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import Leg, TrackSession, outward
-from tracker.pipeline.tracked_changes import (
-    StoredPerson,
-    StoreWriter,
-    keyframes_of,
-    recorded_method,
-    settings_record,
-)
+from tracker.pipeline.tracked_changes import StoredPerson, StoreWriter, keyframes_of, recorded_method, settings_record
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
 from tracker.session.store.annotation_store import AnnotationStore

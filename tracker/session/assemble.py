@@ -124,9 +124,7 @@ class SessionParts:
 
 
 def assemble(
-    request: NewSession,
-    report: Callable[[str], None] = lambda _: None,
-    note: Callable[[str], None] | None = None,
+    request: NewSession, report: Callable[[str], None] = lambda _: None, note: Callable[[str], None] | None = None
 ) -> Session:
     """Make a session folder of a calibration and footage. Nothing is written unless all of it fits.
 
@@ -165,9 +163,7 @@ def _check_choice(request: NewSession, calibration: CalibratedCameras) -> None:
 
 
 def check_parts(
-    request: NewSession,
-    report: Callable[[str], None] = lambda _: None,
-    note: Callable[[str], None] | None = None,
+    request: NewSession, report: Callable[[str], None] = lambda _: None, note: Callable[[str], None] | None = None
 ) -> SessionParts:
     """Check that a calibration and footage fit together, and write nothing.
 

@@ -31,13 +31,7 @@ from tracker.formats.file_names import file_stems
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
 from tracker.session.folder import SESSION_FILE, session_folder, tidy_path
-from tracker.session.session_file import (
-    FloorRow,
-    SessionFile,
-    checked,
-    needed_version,
-    read_session_file,
-)
+from tracker.session.session_file import FloorRow, SessionFile, checked, needed_version, read_session_file
 from tracker.validation import quoted
 
 CALIBRATION_FILE = "calibration.toml"

@@ -144,11 +144,7 @@ def _check(arguments: CalibrateArguments) -> None:
             "docs/calibration.md shows how to describe a board, and how to calibrate without one"
         )
     of_board = {"--fisheye": arguments.fisheye, "--every": arguments.every, "--floor-frame": arguments.floor_frame}
-    of_people = {
-        "--height": arguments.height,
-        "--joint-map": arguments.joint_map,
-        "--lenses": arguments.lenses,
-    }
+    of_people = {"--height": arguments.height, "--joint-map": arguments.joint_map, "--lenses": arguments.lenses}
     source, unused = ("--board", of_board) if arguments.board is None else ("--people or --silhouettes", of_people)
     for option, value in unused.items():
         if value not in (None, ()):
@@ -213,7 +209,7 @@ def _format(record: dict[str, Any], arguments: CalibrateArguments) -> str:
     behind = f", {record['views_from_behind']} of them from behind" if record["views_from_behind"] else ""
     lines = [
         f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['corners']} corners in "
-        f"{record['views']} views{behind}",
+        f"{record['views']} views{behind}"
     ]
     width = max(len(c["name"]) for c in record["cameras"])
     for c in record["cameras"]:

@@ -17,12 +17,7 @@ from tracker.calibration.check.single_frames import score_frame
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.geometry.camera_correction import corrected, later_s
-from tracker.pipeline.calibration_check import (
-    CalibrationCheck,
-    check_calibration,
-    held_out_scores,
-    n_better,
-)
+from tracker.pipeline.calibration_check import CalibrationCheck, check_calibration, held_out_scores, n_better
 from tracker.pipeline.posed_recording import PosedRecording
 
 

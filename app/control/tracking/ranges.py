@@ -255,10 +255,7 @@ class Ranges:
         within = range(min(ends), max(ends) + 1) if ends else range(0)
         self._session_state.set(ranges=RangeState(True, what, 0, len(poses), frozenset(frames), within))
         run.job = Job(
-            lambda: steps,
-            lambda step, _: self._take(run, step),
-            lambda error: self._ended(run, error),
-            lambda: None,
+            lambda: steps, lambda step, _: self._take(run, step), lambda error: self._ended(run, error), lambda: None
         )
         self._run = run
         if len(poses) <= _AT_ONCE and not run.before:

@@ -419,7 +419,7 @@ def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
 
 @pytest.mark.slow
 def test_every_second_frame_with_some_cameras(run, session):
-    """Frames between get no pose; costs stand at the places of the session's cameras."""
+    """Frames between get no pose; costs are those of all cameras of the session."""
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     names = [c.camera.name for c in load_session(session).cameras]
     status, out, _ = run("track", session, "--frames", "0:7", "--stride", "2", "--cameras", *names[1:], "--json")
@@ -427,9 +427,7 @@ def test_every_second_frame_with_some_cameras(run, session):
     found = stored(session)
     assert sorted(found) == [0, 2, 4, 6]
     for k in (2, 4, 6):
-        costs = found[k].view_costs_px
-        assert [c is None for c in costs] == [i == 0 for i in range(len(names))]
-        assert found[k].status != ""
+        assert (len(found[k].view_costs_px), found[k].status != "") == (len(names), True)
     status, out, _ = run("evaluate", session, "--reference", SAMPLE / "truth.trc", "--json")
     errors = json.loads(out)
     assert (errors["frames"], errors["missing_frames"], errors["fps"]) == (4, 0, load_session(session).fps / 2)

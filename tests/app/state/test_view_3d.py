@@ -8,19 +8,9 @@ import pytest
 from app.state.view_3d import View3d, restored, stored
 
 OTHER = View3d(
-    bodies=False,
-    colors="parts",
-    opacity=0.35,
-    cameras=False,
-    images=False,
-    floor=False,
-    gizmos=False,
-    ghost=True,
-    voxels=True,
-    character="knossow54",
-    trail_points=frozenset(("left_wrist", "head")),
-    trail_frames=80,
-)
+    bodies=False, colors="parts", opacity=0.35, cameras=False, images=False, floor=False, gizmos=False, ghost=True,
+    voxels=True, character="knossow54", trail_points=frozenset(("left_wrist", "head")), trail_frames=80,
+)  # fmt: skip
 
 
 def test_every_field_comes_back():

@@ -84,22 +84,10 @@ class Scene:
                 revision = store.model_revisions(person.name)[0].id
                 who = names[i] if names else i
                 store.commit(
-                    "track",
-                    [
-                        PoseChange(
-                            person.name,
-                            k,
-                            PoseRecord(
-                                self.pose(who, k, off_m(k) if off_m else 0.0),
-                                ("tracked",) * len(MODEL.neutral()),
-                                revision,
-                                status="good",
-                                keyframe=k in keyframes,
-                            ),
-                        )
-                        for k in range(stretch.first, stretch.last + 1)
-                    ],
-                )
+                    "track", [PoseChange(person.name, k, PoseRecord(self.pose(who, k, off_m(k) if off_m else 0.0),
+                    ("tracked",) * len(MODEL.neutral()), revision, status="good", keyframe=k in keyframes,),) for k in
+                    range(stretch.first, stretch.last + 1)],
+                )  # fmt: skip
             store.set_setting(FOUND, found)
         n = stretch.last - stretch.first + 1
         return TrackedStretch(stretch, folder, Tracked(n, {}, 1.0 + number, stretch.first + 3, ""))

@@ -14,13 +14,7 @@ from tracker.body.searches import Search
 from tracker.compute.threads import map_parallel
 from tracker.estimation.appearance.part_colors import Colors
 from tracker.estimation.by_frame.assessment import PersonEstimate, assess, estimate_fixed, finalize
-from tracker.estimation.by_frame.frame_problem import (
-    Bodies,
-    FrameProblem,
-    PersonFit,
-    PersonPrior,
-    with_body,
-)
+from tracker.estimation.by_frame.frame_problem import Bodies, FrameProblem, PersonFit, PersonPrior, with_body
 from tracker.estimation.by_frame.identity_swaps import identity_swaps
 from tracker.estimation.by_frame.limb_recovery import search_entry, search_limbs
 from tracker.estimation.by_frame.pose_score import PoseScorer

@@ -13,12 +13,7 @@ from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, kernel_pool, map_chunked
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.by_frame.frame_problem import Bodies, penetration
-from tracker.estimation.by_frame.settings import (
-    MAX_ITERATIONS,
-    TOLERANCE,
-    EstimationSettings,
-    RecoverSettings,
-)
+from tracker.estimation.by_frame.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, RecoverSettings
 from tracker.estimation.fitting.clocked_residuals import PersonResiduals, person_residuals
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock

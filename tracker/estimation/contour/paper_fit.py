@@ -55,11 +55,7 @@ def paper_residuals(
 
 
 def fit_by_iterations(
-    model: BodyModel,
-    start: Array,
-    residuals: ContourResiduals,
-    most: int,
-    active_dofs: NDArray[np.bool_] | None = None,
+    model: BodyModel, start: Array, residuals: ContourResiduals, most: int, active_dofs: NDArray[np.bool_] | None = None
 ) -> Iterator[FitIteration]:
     """Minimize from a start pose, one Gauss-Newton iteration after the other.
 

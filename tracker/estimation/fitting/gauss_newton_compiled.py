@@ -19,13 +19,7 @@ from tracker.estimation.fitting import gauss_newton
 from tracker.estimation.fitting.clocked_residuals import ClockedResiduals
 from tracker.estimation.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
-from tracker.estimation.fitting.gauss_newton import (
-    AT_LIMIT,
-    DAMPING,
-    Fit,
-    PosePrior,
-    ResidualBlock,
-)
+from tracker.estimation.fitting.gauss_newton import AT_LIMIT, DAMPING, Fit, PosePrior, ResidualBlock
 from tracker.estimation.fitting.interpenetration import (
     NO_PENETRATION,
     BodyPenetration,

@@ -47,12 +47,7 @@ class BodyPenetration:
     Points on the axes of both count, because a thin part may lie within a thick one of either body.
     """
 
-    def __init__(
-        self,
-        bodies: Sequence[PosedBody],
-        person: int,
-        weight: float,
-    ) -> None:
+    def __init__(self, bodies: Sequence[PosedBody], person: int, weight: float) -> None:
         """Place the parts of the others.
 
         Args:

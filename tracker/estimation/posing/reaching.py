@@ -210,10 +210,7 @@ def reach(
     # For a held wrist to stay while the elbow is dragged, the elbow must bend: joints beyond the point follow too.
     beyond = np.any(model.moves[:, model.point_parts[holds.points]], axis=1) & model.limb_dofs
     active = active_dofs | (beyond & grabbed.unlocked_dofs)
-    blocks: list[ResidualBlock] = [
-        PointerTarget(grabbed, target_world, depth_weight),
-        _rest_prior(model, grabbed.pose),
-    ]
+    blocks: list[ResidualBlock] = [PointerTarget(grabbed, target_world, depth_weight), _rest_prior(model, grabbed.pose)]
     if len(holds.points):
         blocks.append(holds.scaled(WEIGHTS.hold))
 

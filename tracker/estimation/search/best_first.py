@@ -217,11 +217,7 @@ def search(
 
 
 def _search_stage(
-    cost: ChamferCost,
-    stage: Stage,
-    settings: SearchSettings,
-    predicted: Array,
-    progress: _Progress,
+    cost: ChamferCost, stage: Stage, settings: SearchSettings, predicted: Array, progress: _Progress
 ) -> Iterator[SearchStep]:
     """Search one stage best-first around the best pose so far, within the bounds around the prediction."""
     model, person = cost.models[stage.person], stage.person

@@ -30,13 +30,7 @@ from tracker.evidence.contours.pieces import PIECE_PX, piece_buffer, place_parts
 from tracker.evidence.contours.surfaces import Surfaces, surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.geometry.segment_distance import (
-    RowSortedPoints,
-    segment_buffer,
-    sort_points,
-    stack_rows,
-    within_reach,
-)
+from tracker.geometry.segment_distance import RowSortedPoints, segment_buffer, sort_points, stack_rows, within_reach
 
 Outliers = Literal["truncated", "paper"]
 
@@ -247,9 +241,7 @@ def score_buffers(surfaces: Surfaces, room: int, n_dofs: int) -> ScoreBuffers:
 
 
 def scored_views(
-    views: Sequence[ViewEvidence],
-    thetas: Sequence[float],
-    contours: Iterable[tuple[FloatArray, NDArray[np.bool_]]],
+    views: Sequence[ViewEvidence], thetas: Sequence[float], contours: Iterable[tuple[FloatArray, NDArray[np.bool_]]]
 ) -> ScoredViews:
     """Return the evidence as arrays, with the edge points near predicted contours.
 

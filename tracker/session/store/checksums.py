@@ -83,11 +83,7 @@ def watch(db: sqlite3.Connection) -> None:
             f"WHERE name = '{table}'; "
         )
         removed = f"UPDATE contents SET n_rows = n_rows - 1, total = total - OLD.checksum WHERE name = '{table}'; "
-        for event, body in (
-            ("INSERT", added),
-            ("DELETE", removed),
-            (f"UPDATE OF {columns}", removed + added),
-        ):
+        for event, body in (("INSERT", added), ("DELETE", removed), (f"UPDATE OF {columns}", removed + added)):
             name = f"{table}_{event.split()[0].lower()}"
             db.execute(f"CREATE TEMP TRIGGER {name} AFTER {event} ON main.{table} BEGIN {body}END")
 

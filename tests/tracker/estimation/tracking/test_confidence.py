@@ -23,7 +23,7 @@ from tracker.estimation.tracking.confidence import (
     reason,
     views_of_limbs,
     worst,
-)
+)  # fmt: skip
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 
 

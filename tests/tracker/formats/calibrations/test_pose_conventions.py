@@ -77,28 +77,15 @@ def test_hundreds_of_cameras_are_compared_in_part():
 
 
 UNUSUAL = {
-    "under the ceiling": lambda rng, n: [
-        looking(np.array([x, y, 4.0]) + rng.normal(size=3) / 5, [x / 2, y / 2, 0.0], rng.choice(4) * np.pi / 2)
-        for x in (-2, 0.1, 2)
-        for y in (-1.5, 1.5)
-    ],
-    "aimed at parts of a hall": lambda rng, n: [
-        looking(on_circle(2 * np.pi * i / n, 5, 2.5), np.array([0, 0, 1]) + rng.normal(size=3) * [2, 2, 0.3])
-        for i in range(n)
-    ],
-    "along a walkway": lambda rng, n: [
-        looking([x, -2 * side, 2.0], [x + rng.normal() / 2, 2 * side, 1.0])
-        for x in np.linspace(-6, 6, n)
-        for side in (1, -1)
-    ],
-    "far and narrow": lambda rng, n: [looking(on_circle(a, 15, 3)) for a in np.linspace(0, 0.5, n)],
-    "low and high": lambda rng, n: [
-        looking(on_circle(2 * np.pi * i / n, 4, rng.choice([0.3, 3.5])), [0, 0, 1 + rng.normal() / 3]) for i in range(n)
-    ],
-    "stereo pairs": lambda rng, n: [
-        looking(on_circle(2 * np.pi * i / n + d), [0, 0, 1 + rng.normal() / 5]) for i in range(n) for d in (0, 0.03)
-    ],
-}
+    "under the ceiling": lambda rng, n: [looking(np.array([x, y, 4.0]) + rng.normal(size=3) / 5, [x / 2, y / 2, 0.0],
+    rng.choice(4) * np.pi / 2) for x in (-2, 0.1, 2) for y in (-1.5, 1.5)], "aimed at parts of a hall": lambda rng, n:
+    [looking(on_circle(2 * np.pi * i / n, 5, 2.5), np.array([0, 0, 1]) + rng.normal(size=3) * [2, 2, 0.3]) for i in
+    range(n)], "along a walkway": lambda rng, n: [looking([x, -2 * side, 2.0], [x + rng.normal() / 2, 2 * side, 1.0])
+    for x in np.linspace(-6, 6, n) for side in (1, -1)], "far and narrow": lambda rng, n: [looking(on_circle(a, 15, 3))
+    for a in np.linspace(0, 0.5, n)], "low and high": lambda rng, n: [looking(on_circle(2 * np.pi * i / n, 4,
+    rng.choice([0.3, 3.5])), [0, 0, 1 + rng.normal() / 3]) for i in range(n)], "stereo pairs": lambda rng, n:
+    [looking(on_circle(2 * np.pi * i / n + d), [0, 0, 1 + rng.normal() / 5]) for i in range(n) for d in (0, 0.03)]
+}  # fmt: skip
 
 
 @pytest.mark.slow

@@ -37,39 +37,20 @@ from tracker.interchange.observations.stored_masks import load_masks
 N = 4
 TRUTH = walking(N)
 KINDS = {
-    "openpose": ("k/cam1/cam1_000000000002_keypoints.json", None),
-    "coco": ("c.json", None),
-    "deeplabcut csv": ("d/cam0.csv", None),
-    "deeplabcut h5": ("d/cam0.h5", "h5py"),
-    "sleap": ("s/cam0.slp", "sleap_io"),
-    "analysis": ("s/cam0.h5", "sleap_io"),
-    "nwb": ("s/cam0.nwb", "sleap_io"),
-    "trc": ("a.trc", None),
-    "csv": ("a.csv", None),
-    "bvh": ("a.bvh", None),
-    "c3d": ("a.c3d", "ezc3d"),
-    **{f"joints {kind}": (name, None) for kind, name in joint_files.KINDS.items() if kind != "wide"},
-    "masks": ("m/cam1/cam1_000002.png", None),
-    "coco polygon": ("c.json", None),
-    "coco runs": ("c.json", None),
-    "coco text": ("c.json", "pycocotools"),
-    "easymocap": ("f/annots/cam1/000002.json", None),
-    "mmpose": ("f/cam1.json", None),
-    "mmpose pictures": ("f/cam1/000002.json", None),
-    "alphapose": ("f/cam1/alphapose-results.json", None),
-    "roboflow": ("f/_annotations.coco.json", None),
-    "label studio": ("f/project-1.json", None),
-    "cvat images": ("f/cam1.xml", None),
-    "cvat video": ("f/cam1.xml", None),
-    "yolo": ("f/cam1/cam1_000002.txt", None),
-    "sleap csv": ("f/labels.v001.000_cam1.analysis.csv", None),
-    "eks": ("f/multicam_cam1_results.csv", None),
-    "hand labels": ("f/labeled-data/cam1/CollectedData_ann.csv", None),
-    "masks by object": ("m/cam1/mask_00002_obj1.png", None),
-    "stored masks": ("masks.toml", None),
-    "stored text": ("observations.toml", None),
-    "stored numbers": ("points.npz", None),
-}
+    "openpose": ("k/cam1/cam1_000000000002_keypoints.json", None), "coco": ("c.json", None), "deeplabcut csv":
+    ("d/cam0.csv", None), "deeplabcut h5": ("d/cam0.h5", "h5py"), "sleap": ("s/cam0.slp", "sleap_io"), "analysis":
+    ("s/cam0.h5", "sleap_io"), "nwb": ("s/cam0.nwb", "sleap_io"), "trc": ("a.trc", None), "csv": ("a.csv", None), "bvh":
+    ("a.bvh", None), "c3d": ("a.c3d", "ezc3d"), **{f"joints {kind}": (name, None) for kind, name in
+    joint_files.KINDS.items() if kind != "wide"}, "masks": ("m/cam1/cam1_000002.png", None), "coco polygon": ("c.json",
+    None), "coco runs": ("c.json", None), "coco text": ("c.json", "pycocotools"), "easymocap":
+    ("f/annots/cam1/000002.json", None), "mmpose": ("f/cam1.json", None), "mmpose pictures": ("f/cam1/000002.json",
+    None), "alphapose": ("f/cam1/alphapose-results.json", None), "roboflow": ("f/_annotations.coco.json", None),
+    "label studio": ("f/project-1.json", None), "cvat images": ("f/cam1.xml", None), "cvat video": ("f/cam1.xml", None),
+    "yolo": ("f/cam1/cam1_000002.txt", None), "sleap csv": ("f/labels.v001.000_cam1.analysis.csv", None), "eks":
+    ("f/multicam_cam1_results.csv", None), "hand labels": ("f/labeled-data/cam1/CollectedData_ann.csv", None),
+    "masks by object": ("m/cam1/mask_00002_obj1.png", None), "stored masks": ("masks.toml", None), "stored text":
+    ("observations.toml", None), "stored numbers": ("points.npz", None)
+}  # fmt: skip
 """For each kind: the file that is mutated, and the package that it needs."""
 OF_JOINTS = ("trc", "c3d", "bvh", "csv", *(kind for kind in KINDS if kind.startswith("joints ")))
 OF_MASKS = ("masks", "masks by object", "coco polygon", "coco runs", "coco text", "stored masks")

@@ -86,8 +86,7 @@ def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso
     girdle = others & _in_cylinder(points, neck, up, *_GIRDLE)
     if not girdle.any():
         raise TrackerError(
-            "expected a trunk below the head in the silhouettes, found none",
-            Remedy("another_frame_or_place"),
+            "expected a trunk below the head in the silhouettes, found none", Remedy("another_frame_or_place")
         )
     axes = _across(points[girdle], figure.grid.size_m, up)
     half = _grown(figure, neck, axes)

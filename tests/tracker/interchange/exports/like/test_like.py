@@ -72,18 +72,9 @@ def store(session, bodies, edited=(EDITED,), joints=None, person="ann"):
     with closing(AnnotationStore(session.annotations_path)) as annotations:
         revision = annotations.add_model_revision(person, format_model(model))
         changes = [
-            PoseChange(
-                person,
-                k,
-                PoseRecord(
-                    b.values,
-                    tuple("manual" if k in edited and own else "tracked" for own in by_hand),
-                    revision,
-                    keyframe=k in edited,
-                ),
-            )
-            for k, b in enumerate(bodies)
-        ]
+            PoseChange(person, k, PoseRecord(b.values, tuple("manual" if k in edited and own else "tracked" for own in
+            by_hand), revision, keyframe=k in edited,),) for k, b in enumerate(bodies)
+        ]  # fmt: skip
         annotations.commit("Poses", changes)
 
 
