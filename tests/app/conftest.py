@@ -130,6 +130,12 @@ def opened(session, observer):
 
 
 @pytest.fixture
+def controller(opened):
+    """The sample, opened once."""
+    return opened()
+
+
+@pytest.fixture
 def couple(session, opened):
     """A controller of two people, ann and bob, of whom the sample's footage shows one; nobody has been placed."""
     toml = session / "session.toml"
@@ -149,9 +155,8 @@ def tracker(monkeypatch):
 
 
 @pytest.fixture
-def placed(opened, tracker):
+def placed(tracker, controller):
     """A controller whose body stands on frame 2."""
-    controller = opened()
     controller.navigation.seek(2)
     drag(controller, "torso", (4.0, 0.0))
     yield controller

@@ -16,6 +16,13 @@ def stored(session, person="person"):
     return poses
 
 
+def output_of(result):
+    """Standard output of a command, which succeeded."""
+    status, out, err = result
+    assert status == 0, err
+    return out
+
+
 def assert_refused(result, expected):
     """Status 1, nothing on standard output, and one sentence on standard error that holds the expected words."""
     status, out, err = result

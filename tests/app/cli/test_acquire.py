@@ -6,7 +6,7 @@ import signal
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, WITH_POSE, assert_refused, stored
+from command_line import SAMPLE, WITH_POSE, assert_refused, output_of, stored
 
 from tracker.estimation.acquisition import size_fit
 from tracker.estimation.acquisition.chamfer_search import ChamferSearchSettings
@@ -108,8 +108,7 @@ def test_the_paper_s_way_names_its_views(run, placed, monkeypatch):
     assert (found["frames"], len(found["views"])) == ([20], 2)
     assert {s["sigma_m"] for s in found["sizes"]} == {None}
     assert format_model(load_session(placed).people[0].model) != found["model"]
-    status, out, _ = run(*words)
-    assert status == 0
+    out = output_of(run(*words))
     assert f"from frame 20, front view {found['views'][0]}, side view {found['views'][1]}" in out
 
 
@@ -128,8 +127,7 @@ def test_voxels_before_the_contours(run, placed, quick):
     assert (status, alone["evaluations"]) == (0, 0)
     assert alone["height_m"] == alone["voxels"]["height_m"]
     assert before != alone["model"] == format_model(load_session(placed).people[0].model)
-    status, out, _ = run(*words, "--dry-run")
-    assert status == 0
+    out = output_of(run(*words, "--dry-run"))
     assert "voxels: " in out
     assert "evaluations" in out
 

@@ -6,7 +6,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, assert_refused, stored
+from command_line import SAMPLE, assert_refused, output_of, stored
 from run_poses import Estimate, doubted
 
 from tracker.pipeline import audit
@@ -37,8 +37,7 @@ def posed(run, session):
 @pytest.mark.slow
 def test_poses_are_assessed_but_stay(run, posed, estimate):
     before = stored(posed)
-    status, out, _ = run("audit", posed, "--json")
-    assert status == 0
+    out = output_of(run("audit", posed, "--json"))
     found, after = json.loads(out)["person"], stored(posed)
     assert [[*asked.poses] for asked in estimate.asked] == [[*FRAMES]]
     (doubt,) = found["doubts"]
@@ -57,8 +56,7 @@ def test_a_keyframe_is_assessed_and_stays(run, posed, estimate):
         store.commit("keyframes", [MarkChange("person", k, True, True) for k in (APART, 24)], author="eve")
         store.commit("pin", [PinChange("person", APART, "left_wrist", "FRONT", (10.0, 20.0))])
     before = stored(posed)
-    status, out, _ = run("audit", posed, "--json")
-    assert status == 0
+    out = output_of(run("audit", posed, "--json"))
     (doubt,) = json.loads(out)["person"]["doubts"]
     assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain: elsewhere on 50% of the likely paths")
     after = stored(posed)
@@ -67,7 +65,7 @@ def test_a_keyframe_is_assessed_and_stays(run, posed, estimate):
     np.testing.assert_array_equal(after[APART].values, before[APART].values)
     for name in ("sources", "settings", "author", "time", "reviewed"):
         assert getattr(after[APART], name) == getattr(before[APART], name), name
-    status, out, _ = run("evaluate", posed, "--reference", SAMPLE / "truth.trc", "--json")
+    out = output_of(run("evaluate", posed, "--reference", SAMPLE / "truth.trc", "--json"))
     (told,) = [f for f in json.loads(out)["per_frame"] if f["frame"] == APART]
     assert (told["status"], told["reason"]) == ("keyframe", doubt["reason"])
     assert told["probability_off"] == pytest.approx(doubt["probability_off"], abs=0.01)
@@ -100,8 +98,7 @@ def test_alternatives_are_proposed_and_only_those_that_may_be_stay(run, posed, e
 @pytest.mark.slow
 def test_the_likeliest_poses_take_the_place_of_the_stored_ones_if_that_is_asked(run, posed, estimate):
     before = stored(posed)
-    status, out, _ = run("audit", posed, "--replace", "--frames", "22:25")
-    assert status == 0
+    out = output_of(run("audit", posed, "--replace", "--frames", "22:25"))
     assert "person: 2 good, 1 doubtful" in out
     after = stored(posed)
     for k in (22, APART, 24):

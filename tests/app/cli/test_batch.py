@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 from bodies import MODELS
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 from full_disks import full_disk
 from stored_motions import store_motion
 
@@ -93,8 +93,7 @@ def test_memory_bounds_the_workers_and_that_is_said(wanted, n_tasks, cores, free
 
 
 def test_the_scripts_of_a_job_array_are_shell_and_name_what_is_there(run, plan):
-    status, out, _ = run("batch", plan, "--slurm")
-    assert status == 0
+    out = output_of(run("batch", plan, "--slurm"))
     assert out.count("sbatch") == 3
     folder = plan.with_name("plan_batch")
     for name in ("kernels.sh", "array.sh", "merge.sh"):

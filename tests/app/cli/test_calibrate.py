@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 from drawn_boards import arc, carried, facing, filmed_folders
 
 from tracker.calibration.boards.board_description import Board
@@ -36,9 +36,7 @@ def words(footage, out, *more, board="board.toml"):
 
 @pytest.mark.slow
 def test_cameras_are_calibrated_in_the_world_of_the_floor(run, footage, tmp_path):
-    status, out, _ = run(*words(footage, tmp_path / "c.toml", "--floor-frame", "13"))
-    assert status == 0
-    record = json.loads(out)
+    record = json.loads(output_of(run(*words(footage, tmp_path / "c.toml", "--floor-frame", "13"))))
     cameras = read_calibration(tmp_path / "c.toml")
     assert [c.name for c in cameras] == [c["name"] for c in record["cameras"]] == ["cam0", "cam1", "cam2"]
     true = rigid.inverse(FLOOR @ np.diag([1.0, -1.0, -1.0, 1.0]))
@@ -57,8 +55,7 @@ def test_cameras_are_calibrated_in_the_world_of_the_floor(run, footage, tmp_path
 @pytest.mark.slow
 def test_a_layout_is_written_and_the_report_is_read_by_people(run, footage, tmp_path):
     given = [w for w in words(footage, tmp_path / "rig.yml", "--layout", "opencv") if w != "--json"]
-    status, out, _ = run(*given)
-    assert status == 0
+    out = output_of(run(*given))
     assert "expected error in the volume of the board" in out
     assert "with 90% between" in out
     assert "the world is that of camera 'cam0', with y down: say --up -y to quadrille new" in out

@@ -6,7 +6,7 @@ import shutil
 import cv2
 import numpy as np
 import pytest
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 from detected_people import danced, detected
 from filmed_people import FOCAL_PX, NAMES, SIZE, STATURE_M, dancing, observed, rig
 from observed_files import write_deeplabcut
@@ -57,14 +57,11 @@ def words(footage, out, *more, files="keypoints"):
 @pytest.mark.slow
 def test_several_people_are_reported(run, footage, tmp_path):
     heights = ("--height", f"animal0={STATURE_M}", f"animal1={STATURE_M}", "--lenses", footage / "lenses.toml")
-    status, text, _ = run(*words(footage, tmp_path / "c.toml", *heights, "--json", files="named"))
-    assert status == 0
-    record = json.loads(text)
+    record = json.loads(output_of(run(*words(footage, tmp_path / "c.toml", *heights, "--json", files="named"))))
     assert [person["name"] for person in record["people"]] == ["animal0", "animal1"]
     assert all(8 <= person["frames"] <= N_FRAMES for person in record["people"])
     assert (record["pictures_left_out"], record["exchanged"]) == (0, 0)
-    status, text, _ = run(*words(footage, tmp_path / "d.toml", *heights, files="named"))
-    assert status == 0
+    text = output_of(run(*words(footage, tmp_path / "d.toml", *heights, files="named")))
     assert "joints of 2 people in 10 frames\n  people: animal0 in 10 frames, animal1 in 10 frames\n" in text
     assert "below them" in text
 
@@ -94,8 +91,7 @@ def test_wrong_people_are_refused(run, footage, tmp_path):
 @pytest.mark.slow
 def test_a_calibration_is_written_and_reported(run, footage, tmp_path):
     out = tmp_path / "c.toml"
-    status, text, _ = run(*words(footage, out, "--height", STATURE_M, "--json"))
-    assert status == 0
+    text = output_of(run(*words(footage, out, "--height", STATURE_M, "--json")))
     record, cameras = json.loads(text), read_calibration(out)
     assert [c.name for c in cameras] == [c["name"] for c in record["cameras"]] == ["cam0", "cam1", "cam2"]
     assert cameras[0].K[0, 0] == pytest.approx(FOCAL_PX, rel=0.05)
@@ -110,8 +106,7 @@ def test_a_calibration_is_written_and_reported(run, footage, tmp_path):
 @pytest.mark.slow
 def test_lenses_are_taken_and_a_lacking_height_is_said(run, footage, tmp_path):
     out = tmp_path / "c.toml"
-    status, text, _ = run(*words(footage, out, "--lenses", footage / "lenses.toml"))
-    assert status == 0
+    text = output_of(run(*words(footage, out, "--lenses", footage / "lenses.toml")))
     assert read_calibration(out)[2].K[0, 0] == FOCAL_PX
     assert "focal length   500.0 px, as given" in text
     assert "no height was given: the scale is that of a person of 1.75 m and may be off by 7%" in text

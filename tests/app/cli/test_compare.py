@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 import pytest
 from bodies import MODELS
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 from stored_motions import random_poses, store_motion
 
 from tracker.estimation.fitting.gauss_newton import PointTargets, solve
@@ -128,8 +128,7 @@ def test_text_table_and_report(run, apart):
     folder, _, _ = apart
     table, report = folder / "t.csv", folder / "r.html"
     words = ("compare", folder / "ann", folder / "ben", "--tolerance", "1", "--csv", table, "--report", report)
-    status, out, _ = run(*words)
-    assert status == 0
+    out = output_of(run(*words))
     assert "30 poses by ann, ben; differences: second less first" in out
     assert "30 of 30 poses differ by more than 1 mm:" in out
     assert "and 20 more; --json lists all" in out

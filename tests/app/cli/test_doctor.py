@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
+from command_line import output_of
 
 from app.cli import doctor
 from tracker.compute import extensions
@@ -12,8 +13,7 @@ from tracker.compute import extensions
 
 @pytest.fixture
 def found(run):
-    status, out, _ = run("doctor", "--json")
-    assert status == 0
+    out = output_of(run("doctor", "--json"))
     return {f["name"]: f for f in json.loads(out)["findings"]}
 
 

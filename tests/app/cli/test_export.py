@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 from bodies import MODELS
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 from full_disks import full_disk
 from stored_motions import store_motion
 
@@ -31,14 +31,11 @@ def couple(tmp_path):
 
 
 def test_each_person_has_a_file_of_the_name(run, couple, tmp_path):
-    status, out, _ = run("export", couple, "--format", "trc", "--out", tmp_path / "m.trc", "--json")
-    assert status == 0
-    found = json.loads(out)
+    found = json.loads(output_of(run("export", couple, "--format", "trc", "--out", tmp_path / "m.trc", "--json")))
     assert found["files"] == [str(tmp_path / f"m_{name}.trc") for name in ("ann", "bob")]
     assert (found["frames"], found["missing"], found["lost"]) == ([0, 8], 2, 1)
     assert found["provenance"] == [str(tmp_path / f"m_{name}.trc.provenance.json") for name in ("ann", "bob")]
-    status, out, _ = run("export", couple, "--out", tmp_path / "m.mot", "--person", "bob", "--skip-lost")
-    assert status == 0
+    out = output_of(run("export", couple, "--out", tmp_path / "m.mot", "--person", "bob", "--skip-lost"))
     assert (tmp_path / "m.osim").is_file()
     lines = out.splitlines()
     assert lines[3:] == [
@@ -204,8 +201,7 @@ def test_a_session_without_poses(run, session, tmp_path):
 
 
 def test_help_lists_every_format(run):
-    status, out, _ = run("export", "--help")
-    assert status == 0
+    out = output_of(run("export", "--help"))
     text = " ".join(out.replace("│", " ").split())
     for one in FORMATS.values():
         assert f"{one.name}: {one.title}" in text

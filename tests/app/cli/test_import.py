@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 from mask_files import SIZE, person_masks, write_masks
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
@@ -25,8 +25,7 @@ def keypoints(session, tmp_path):
 
 
 def test_import_shows_what_it_found(run, session, keypoints):
-    status, out, _ = run("import", session.folder, keypoints, "--as", "mp", "--dry-run")
-    assert status == 0
+    out = output_of(run("import", session.folder, keypoints, "--as", "mp", "--dry-run"))
     lines = out.splitlines()
     assert lines[0] == "mp: openpose, of ann"
     assert lines[1] == f"  cam0: {keypoints}/cam0, 6 rows, points in frames 0 to 5, median confidence 0.90"
@@ -37,9 +36,7 @@ def test_import_shows_what_it_found(run, session, keypoints):
 
 
 def test_import_and_info_and_back(run, session, keypoints, tmp_path):
-    status, out, _ = run("import", session.folder, keypoints, "--as", "mp", "--json")
-    assert status == 0
-    found = json.loads(out)
+    found = json.loads(output_of(run("import", session.folder, keypoints, "--as", "mp", "--json")))
     assert (found["stored"], found["skeleton"], found["matched"], found["problems"]) == (True, "BODY_25", 18, [])
     assert found["views"][1]["frames"] == [0, 5]
     status, out, _ = run("info", session.folder, "--no-check")
@@ -101,8 +98,7 @@ def test_exchanged_sides_are_counted_when_they_go_back(run, session, tmp_path):
 def test_damaged_observations_are_listed_with_the_reason(run, session, keypoints):
     run("import", session.folder, keypoints, "--as", "mp")
     (session.folder / "observations" / "mp" / "points.npz").write_bytes(b"x")
-    status, out, _ = run("info", session.folder, "--no-check")
-    assert status == 0
+    out = output_of(run("info", session.folder, "--no-check"))
     assert "warning: observations mp: " in out
 
 
@@ -111,15 +107,13 @@ def test_masks_are_used_and_left(run, tmp_path):
     for source in session.cameras:
         source.footage.touch()
     folder = write_masks(tmp_path / "m", session.camera_names, person_masks(N, 4))
-    status, out, _ = run("import", session.folder, folder, "--as", "net", "--dry-run")
-    assert status == 0
+    out = output_of(run("import", session.folder, folder, "--as", "net", "--dry-run"))
     lines = out.splitlines()
     assert lines[0] == "net: masks, of anyone"
     assert lines[1] == f"  cam0: {folder}/cam0, 6 masks, people in frames 0 to 5, 6.2% of the picture"
     assert lines[-1] == "nothing was stored"
     assert not (session.folder / "observations").exists()
-    status, out, _ = run("import", session.folder, folder, "--as", "net", "--values", "ann=1")
-    assert status == 0
+    out = output_of(run("import", session.folder, folder, "--as", "net", "--values", "ann=1"))
     assert out.startswith("net: masks, of ann\n")
     assert out.endswith("stored as net; the cameras use these masks as silhouettes\n")
     used = "  masks net: 24 pictures of cam0, cam1, cam2, cam3, masks, used by cam0, cam1, cam2, cam3"

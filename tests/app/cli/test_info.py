@@ -4,7 +4,7 @@ import json
 from contextlib import closing
 
 import numpy as np
-from command_line import WITH_POSE
+from command_line import WITH_POSE, output_of
 
 from tracker.footage.start_times import StartTime, time_code_frames
 from tracker.geometry.camera_correction import N_CORRECTIONS
@@ -23,10 +23,9 @@ def test_poses_of_an_earlier_calibration_are_counted(run, session):
     with closing(AnnotationStore(loaded.annotations_path)) as store:
         change_calibration(loaded, store, with_corrections(loaded, corrections), "corrected")
     assert run("init", session, *WITH_POSE, "--frame", 5)[0] == 0
-    status, out, _ = run("info", session, "--no-check")
-    assert status == 0
+    out = output_of(run("info", session, "--no-check"))
     assert "3 poses, 3 keyframes, 2 of an earlier calibration\n" in out
-    status, out, _ = run("info", session, "--no-check", "--json")
+    out = output_of(run("info", session, "--no-check", "--json"))
     assert json.loads(out)["people"][0]["earlier_calibration"] == 2
 
 

@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, assert_refused
+from command_line import SAMPLE, assert_refused, output_of
 from observed_people import BODY_25
 
 from tracker.estimation.fitting.gauss_newton import fit_to_points
@@ -57,9 +57,7 @@ def imported(run, session, tmp_path, monkeypatch, film_once):
 
 
 def test_exchanged_legs_come_first(run, imported):
-    status, out, _ = run("judge", imported, "--of", "net", "--json")
-    assert status == 0
-    found = json.loads(out)
+    found = json.loads(output_of(run("judge", imported, "--of", "net", "--json")))
     assert [f["frame"] for f in found["frames"]] == list(FRAMES)
     assert {(d["frame"], d["limb"]) for d in found["worst"][:4]} == {
         (k, f"{side} leg") for k in EXCHANGED for side in ("left", "right")
@@ -74,8 +72,7 @@ def test_exchanged_legs_come_first(run, imported):
 @pytest.mark.slow
 def test_the_report_is_one_file_with_pictures(run, imported, tmp_path):
     path = tmp_path / "judged.html"
-    status, out, _ = run("judge", imported, "--of", "net", "--report", path)
-    assert status == 0
+    out = output_of(run("judge", imported, "--of", "net", "--report", path))
     assert "person: 83% of 12 frames in order" in out
     assert "frame 14: legs exchanged (100%)" in out
     text = path.read_text("utf-8")

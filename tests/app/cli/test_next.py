@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, assert_refused
+from command_line import SAMPLE, assert_refused, output_of
 
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.formats.model_toml import format_model
@@ -44,8 +44,7 @@ def test_next_names_frame_limb_and_view(run, session):
     low, high = found["interval_mm"]
     assert low < found["expected_error_mm"] < high
     assert found["next"][0] == {k: v for k, v in found.items() if k in found["next"][0]}
-    status, out, _ = run("next", session)
-    assert status == 0
+    out = output_of(run("next", session))
     assert f"frame 24: {found['reason']}; gains " in out
 
 
@@ -72,9 +71,7 @@ def test_only_stretches_whose_keyframes_changed_are_tracked_again(run, session):
         assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", k)[0] == 0
 
     def tracked(*options):
-        status, out, _ = run("track", session, "--between-keyframes", "--json", *options)
-        assert status == 0
-        found = json.loads(out)
+        found = json.loads(output_of(run("track", session, "--between-keyframes", "--json", *options)))
         return [(s["first"], s["last"], s["people"]) for s in found["stretches"]], found["runs"]
 
     for k in (20, 23, 26):
@@ -96,8 +93,7 @@ def test_only_stretches_whose_keyframes_changed_are_tracked_again(run, session):
 def test_the_voxel_tracker_runs_between_keyframes(run, session):
     for k in (20, 24):
         assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", k)[0] == 0
-    status, out, _ = run("track", session, "--between-keyframes", "--method", "voxel", "--json")
-    assert status == 0
+    out = output_of(run("track", session, "--between-keyframes", "--method", "voxel", "--json"))
     assert [(s["first"], s["last"]) for s in json.loads(out)["stretches"]] == [(20, 24)]
     result = json.loads(run("evaluate", session, "--reference", SAMPLE / "truth.trc", "--json")[1])
     assert [e["frame"] for e in result["per_frame"]] == [20, 21, 22, 23, 24]

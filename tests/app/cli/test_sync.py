@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 
 from tracker.errors import SessionError
 from tracker.footage import sound, start_times
@@ -44,8 +44,7 @@ def test_offset_of_an_existing_session(run, session):
 def test_sound_writes_what_is_clear_only_when_asked(run, heard):
     session, (first, second, last) = heard
     before = (session / "session.toml").read_text()
-    status, out, _ = run("sync", session, "--sound")
-    assert status == 0
+    out = output_of(run("sync", session, "--sound"))
     assert f"{second}: offset" in out
     assert "not clear, so not taken" in out
     assert "nothing written" in out
@@ -89,8 +88,7 @@ def time_code(text):
 def test_time_codes(run, timed):
     session, codes = timed
     name = list(codes)[1]
-    status, out, _ = run("sync", session, "--timecode")
-    assert status == 0
+    out = output_of(run("sync", session, "--timecode"))
     assert f"{name}: offset 3.000 frames, clear" in out
     assert "note: the time code of all cameras pairs frames (" in out
     assert "nothing written; say --apply" in out

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from command_line import SAMPLE, WITH_POSE, assert_refused, stored
+from command_line import SAMPLE, WITH_POSE, assert_refused, output_of, stored
 
 
 @pytest.fixture
@@ -16,8 +16,7 @@ def placed(run, session):
 @pytest.mark.slow
 def test_track_by_voxels(run, placed):
     words = ("track", placed, "--frames", "20:23", "--method", "voxel", "--voxel-size", "50", "--sizes", "frozen")
-    status, out, _ = run(*words, "--json")
-    assert status == 0
+    out = output_of(run(*words, "--json"))
     assert json.loads(out)["frames"] == 3
     poses = stored(placed)
     assert {poses[k].settings["method"] for k in (21, 22)} == {"voxel"}
@@ -48,8 +47,7 @@ def test_init_by_voxels_refuses_sizes_that_show_no_limbs(run, session):
 
 def test_people_are_not_searched_with_one_camera(run, tmp_path):
     words = ("new", tmp_path / "s", "--calibration", SAMPLE / "calibration.toml", "--videos", SAMPLE / "FRONT.mp4")
-    status, out, _ = run(*words)
-    assert status == 0
+    out = output_of(run(*words))
     assert "note: one camera shows no depth" in out
     expected = ["two cameras or more to find people", "'FRONT' alone", "by hand, or set it from known joints"]
     for method in ("voxels", "axis", "auto"):

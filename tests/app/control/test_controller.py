@@ -13,15 +13,13 @@ from tracker.estimation.search.best_first import SearchSettings
 from tracker.session.store.annotation_store import AnnotationStore
 
 
-def test_a_fresh_session_shows_a_draft_that_is_not_stored(opened):
-    controller = opened()
+def test_a_fresh_session_shows_a_draft_that_is_not_stored(controller):
     assert controller.state.people[0].source is None
     assert controller.state.undo is None
     assert controller.stored_poses.timeline() == {}
 
 
-def test_a_drag_is_one_entry_and_ends_at_the_pointer(opened):
-    controller = opened()
+def test_a_drag_is_one_entry_and_ends_at_the_pointer(controller):
     target = pixel_of(controller, "left_wrist") + np.array([25.0, -15.0])
     drag(controller, "left_wrist", (25.0, -15.0))
     np.testing.assert_allclose(pixel_of(controller, "left_wrist"), target, atol=1.0)
@@ -33,16 +31,14 @@ def test_a_drag_is_one_entry_and_ends_at_the_pointer(opened):
     assert controller.state.people[0].source is None
 
 
-def test_the_cost_follows_a_drag(opened):
-    controller = opened()
+def test_the_cost_follows_a_drag(controller):
     before = controller.state.cost_px
     drag(controller, "torso", (120.0, 0.0))
     assert controller.state.cost_px > before
     assert len(controller.state.view_costs_px) == 4
 
 
-def test_a_hand_that_holds_still_sees_what_the_pose_costs(opened):
-    controller = opened()
+def test_a_hand_that_holds_still_sees_what_the_pose_costs(controller):
     before = controller.state.cost_px
     start = pixel_of(controller, "torso")
     controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
@@ -56,16 +52,14 @@ def test_a_hand_that_holds_still_sees_what_the_pose_costs(opened):
     assert controller.state.cost_px == before
 
 
-def test_the_cost_of_what_has_been_let_go_is_not_touched(opened):
-    controller = opened()
+def test_the_cost_of_what_has_been_let_go_is_not_touched(controller):
     drag(controller, "torso", (120.0, 0.0))
     controller.session_state.set(cost_px=1.4)  # as a tracker knows it
     time.sleep(0.1)
     assert controller.state.cost_px == 1.4
 
 
-def test_a_cancelled_drag_leaves_nothing(opened):
-    controller = opened()
+def test_a_cancelled_drag_leaves_nothing(controller):
     values = controller.state.poses[0]
     start = pixel_of(controller, "torso")
     controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
@@ -91,8 +85,7 @@ def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
     assert controller.state.people[0].source is None
 
 
-def test_another_page_cannot_move_what_this_one_holds(opened):
-    controller = opened()
+def test_another_page_cannot_move_what_this_one_holds(controller):
     start = pixel_of(controller, "torso")
     controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
     values = controller.state.poses[0]
@@ -117,8 +110,7 @@ def test_restart_shows_the_same_pose_and_history(opened):
     assert controller.state.redo is None
 
 
-def test_undo_goes_to_the_frame_it_is_about(opened):
-    controller = opened()
+def test_undo_goes_to_the_frame_it_is_about(controller):
     drag(controller, "torso", (10.0, 5.0))
     controller.navigation.seek(7)
     assert controller.state.people[0].source is None  # a draft: the pose of the nearest frame
@@ -127,8 +119,7 @@ def test_undo_goes_to_the_frame_it_is_about(opened):
     assert controller.stored_poses.timeline(1)[0] is None
 
 
-def test_a_slider_is_one_entry_however_often_it_moves(opened):
-    controller = opened()
+def test_a_slider_is_one_entry_however_often_it_moves(controller):
     model = controller.models[0]
     dof = model.dof_names.index("left_shoulder.abduction")
     for value in (0.1, 0.2, 9.0):
@@ -139,8 +130,7 @@ def test_a_slider_is_one_entry_however_often_it_moves(opened):
     assert controller.state.undo is None
 
 
-def test_values_nobody_touched_keep_their_source(opened, session):
-    controller = opened()
+def test_values_nobody_touched_keep_their_source(session, controller):
     drag(controller, "torso", (10.0, 0.0))
     controller.search.step()
     wait_for(lambda: controller.state.search.evaluations and not controller.state.search.running)
@@ -153,8 +143,7 @@ def test_values_nobody_touched_keep_their_source(opened, session):
     assert set(sources[:5]) <= {"manual", "searched"}
 
 
-def test_stepping_a_search(opened):
-    controller = opened()
+def test_stepping_a_search(controller):
     seen = []
     controller.subscribe(lambda state: seen.append(state.search))
     controller.search.step()
@@ -168,8 +157,7 @@ def test_stepping_a_search(opened):
     assert controller.state.undo == "search, frame 0"
 
 
-def test_a_search_to_its_end_lowers_the_cost_and_is_one_entry(opened):
-    controller = opened()
+def test_a_search_to_its_end_lowers_the_cost_and_is_one_entry(controller):
     before = controller.state.cost_px
     controller.search.set_settings(TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=4)))
     controller.search.run()
@@ -182,8 +170,7 @@ def test_a_search_to_its_end_lowers_the_cost_and_is_one_entry(opened):
     assert controller.state.undo is None
 
 
-def test_a_stopped_search_keeps_the_best_so_far_on_disk(opened, session):
-    controller = opened()
+def test_a_stopped_search_keeps_the_best_so_far_on_disk(session, controller):
     controller.search.run()
     wait_for(lambda: controller.state.search.evaluations > 30)
     controller.activities.stop()
@@ -199,8 +186,7 @@ def test_a_stopped_search_keeps_the_best_so_far_on_disk(opened, session):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("interruption", ["seek", "drag", "undo", "set"])
-def test_whatever_a_hand_does_stops_a_running_search(opened, interruption):
-    controller = opened()
+def test_whatever_a_hand_does_stops_a_running_search(interruption, controller):
     drag(controller, "torso", (4.0, 4.0))
     controller.search.run()
     wait_for(lambda: controller.state.search.evaluations > 15)
@@ -216,16 +202,14 @@ def test_whatever_a_hand_does_stops_a_running_search(opened, interruption):
     assert controller.state.poses[0] is values  # no late step
 
 
-def test_seeking_out_of_range_stays_within(opened):
-    controller = opened()
+def test_seeking_out_of_range_stays_within(controller):
     controller.navigation.seek(10_000)
     assert controller.state.frame == controller.session.n_frames - 1
     controller.navigation.seek(-5)
     assert controller.state.frame == 0
 
 
-def test_nothing_is_lost_when_the_disk_is_full(opened, monkeypatch):
-    controller = opened()
+def test_nothing_is_lost_when_the_disk_is_full(monkeypatch, controller):
     real = AnnotationStore.commit
 
     def full(*_, **__):
@@ -243,8 +227,7 @@ def test_nothing_is_lost_when_the_disk_is_full(opened, monkeypatch):
     assert controller.state.poses[0][0] == values[0]
 
 
-def test_many_hands_at_once_leave_one_consistent_state(opened):
-    controller = opened()
+def test_many_hands_at_once_leave_one_consistent_state(controller):
 
     def nudge(dof):
         for value in np.linspace(0.0, 0.4, 8):

@@ -12,8 +12,7 @@ from tracker.body.limbs import limbs
 VIEW = View(frozenset(("alternatives",)), (1, 0, 1, 1))
 
 
-def test_each_alternative_has_a_path_in_each_view_in_its_order(opened):
-    controller = opened()
+def test_each_alternative_has_a_path_in_each_view_in_its_order(controller):
     state, model = controller.state, controller.models[0]
     values = state.poses[0]
     arm = next(x for x in limbs(model) if x.name == "left_forearm")

@@ -19,11 +19,6 @@ def kinds_of(paths, kind, camera=0):
     return [p for p in paths if p.kind == kind and p.camera == camera]
 
 
-@pytest.fixture
-def controller(opened):
-    return opened()
-
-
 def view_of(*layers, **changes):
     return View(**{"layers": frozenset(layers), "reductions": (1, 1, 1, 1)} | changes)
 

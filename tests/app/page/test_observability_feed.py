@@ -2,17 +2,10 @@
 
 from dataclasses import replace
 
-import pytest
-
 from app.page.feeds.observability import LAYER, ObservabilityFeed, observability
 from app.state.page_view import View
 
 SHOWN, HIDDEN = View(frozenset({"joints", LAYER}), (1.0,)), View(frozenset({"joints"}), (1.0,))
-
-
-@pytest.fixture
-def controller(opened):
-    return opened()
 
 
 def test_only_a_page_that_shows_the_layer_receives_it_and_once_for_a_pose(controller):

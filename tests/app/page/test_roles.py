@@ -76,8 +76,7 @@ def test_bodies_cameras_and_floor_are_the_hosts(message):
     assert not allowed("annotate", message)
 
 
-async def test_a_link_without_a_name_watches_the_host(opened):
-    controller = opened()
+async def test_a_link_without_a_name_watches_the_host(controller):
     async with visiting(controller, role="review") as page:
         session = await page.hear("session")
         assert (session["role"], session["has_place"]) == ("look", False)

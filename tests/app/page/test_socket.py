@@ -18,6 +18,12 @@ def controller(placed):
     return placed
 
 
+@pytest.fixture
+async def page(controller):
+    async with visiting(controller) as page:
+        yield page
+
+
 def curves_of(message):
     """Frames and curves by name of the plot and the curve."""
     frames = np.frombuffer(message["payload"], "<u4", message["count"])
@@ -28,80 +34,76 @@ def curves_of(message):
 
 
 @pytest.mark.slow
-async def test_a_page_is_told_all_when_it_connects(controller):
-    async with visiting(controller) as page:
-        session = await page.hear("session")
-        assert session["people"][0]["parts"][0] == "torso"
-        state = await page.hear("state")
-        assert (state["frame"], state["source"], state["status"], state["part_costs_px"]) == (2, "manual", "", [])
-        assert state["track"]["first"] is None
-        assert state["follow"]
-        timeline = await page.hear("timeline")
-        assert timeline["replace"]
-        assert timeline["cells"].keys() == {"2"}
-        assert not [m for m in page.told if m["type"] == "curves"]  # only for those who ask
+async def test_a_page_is_told_all_when_it_connects(page):
+    session = await page.hear("session")
+    assert session["people"][0]["parts"][0] == "torso"
+    state = await page.hear("state")
+    assert (state["frame"], state["source"], state["status"], state["part_costs_px"]) == (2, "manual", "", [])
+    assert state["track"]["first"] is None
+    assert state["follow"]
+    timeline = await page.hear("timeline")
+    assert timeline["replace"]
+    assert timeline["cells"].keys() == {"2"}
+    assert not [m for m in page.told if m["type"] == "curves"]  # only for those who ask
 
 
 @pytest.mark.slow
-async def test_a_run_is_watched_frame_by_frame(controller, tracker):
-    async with visiting(controller) as page:
-        await page.hear("timeline")
-        await page.send("track", action="forward", until=6)
-        await page.hear("state", lambda m: m["track"]["running"] and m["track"]["total"] == 4)
-        tracker.let_go(2)
-        state = await page.hear("state", lambda m: m["frame"] == 4)
-        assert (state["status"], state["remark"]) == ("doubtful", "left arm relocated")
-        assert state["part_costs_px"] == [0.5] * 9 + [None]
-        assert state["view_costs_px"] == [1.0, None, 2.0, 3.0]
-        await page.hear("overlay", lambda m: m["frame"] == 4)
-        for camera in range(4):
-            image = await page.hear("image", lambda m: m["frame"] == 4)
-            assert image["camera"] == camera
-        tracker.let_go(2)
-        await page.hear("state", lambda m: m["track"]["message"].startswith("done"))
-        cells = {k: c for m in page.told if m["type"] == "timeline" for k, c in m["cells"].items()}
-        cells |= (await page.hear("timeline", lambda m: "6" in m["cells"]))["cells"] if "6" not in cells else {}
-        assert cells["4"]["status"] == "doubtful"
-        assert cells["4"]["remark"] == "left arm relocated"
+async def test_a_run_is_watched_frame_by_frame(tracker, page):
+    await page.hear("timeline")
+    await page.send("track", action="forward", until=6)
+    await page.hear("state", lambda m: m["track"]["running"] and m["track"]["total"] == 4)
+    tracker.let_go(2)
+    state = await page.hear("state", lambda m: m["frame"] == 4)
+    assert (state["status"], state["remark"]) == ("doubtful", "left arm relocated")
+    assert state["part_costs_px"] == [0.5] * 9 + [None]
+    assert state["view_costs_px"] == [1.0, None, 2.0, 3.0]
+    await page.hear("overlay", lambda m: m["frame"] == 4)
+    for camera in range(4):
+        image = await page.hear("image", lambda m: m["frame"] == 4)
+        assert image["camera"] == camera
+    tracker.let_go(2)
+    await page.hear("state", lambda m: m["track"]["message"].startswith("done"))
+    cells = {k: c for m in page.told if m["type"] == "timeline" for k, c in m["cells"].items()}
+    cells |= (await page.hear("timeline", lambda m: "6" in m["cells"]))["cells"] if "6" not in cells else {}
+    assert cells["4"]["status"] == "doubtful"
+    assert cells["4"]["remark"] == "left arm relocated"
 
 
 @pytest.mark.slow
-async def test_images_come_though_the_tracker_is_ahead_by_then(controller, tracker):
+async def test_images_come_though_the_tracker_is_ahead_by_then(controller, tracker, page):
     """A tracker that is faster than the pictures must not leave the panes without any."""
-    async with visiting(controller) as page:
-        await page.hear("timeline")
-        image = controller.frames.image
+    await page.hear("timeline")
+    image = controller.frames.image
 
-        def overtaken(*args):
-            tracker.let_go(1)
-            return image(*args)
-
-        controller.frames.image = overtaken
-        await page.send("track", action="forward", until=None)
+    def overtaken(*args):
         tracker.let_go(1)
-        frames = [(await page.hear("image"))["frame"] for _ in range(8)]
-        assert len(set(frames)) >= 2
+        return image(*args)
+
+    controller.frames.image = overtaken
+    await page.send("track", action="forward", until=None)
+    tracker.let_go(1)
+    frames = [(await page.hear("image"))["frame"] for _ in range(8)]
+    assert len(set(frames)) >= 2
 
 
-async def test_pause_go_on_follow_and_stop(controller, tracker):
-    async with visiting(controller) as page:
-        await page.hear("timeline")
-        await page.send("track", action="forward", until=None)
-        tracker.let_go(2)
-        await page.hear("state", lambda m: m["track"]["at"] == 4)
-        await page.send("seek", frame=3)
-        await page.hear("state", lambda m: m["frame"] == 3 and not m["follow"])
-        await page.send("follow", follow=True)
-        await page.hear("state", lambda m: m["frame"] == 4 and m["follow"])
-        going = asyncio.create_task(go_on_slowly(tracker))
-        await page.send("track", action="pause")
-        state = await page.hear("state", lambda m: not m["track"]["running"])
-        assert state["track"]["first"] == 3
-        await page.send("track", action="resume")
-        await page.hear("state", lambda m: m["track"]["running"])
-        await page.send("track", action="stop")
-        await page.hear("state", lambda m: m["track"]["message"].startswith("stopped"))
-        going.cancel()
+async def test_pause_go_on_follow_and_stop(tracker, page):
+    await page.hear("timeline")
+    await page.send("track", action="forward", until=None)
+    tracker.let_go(2)
+    await page.hear("state", lambda m: m["track"]["at"] == 4)
+    await page.send("seek", frame=3)
+    await page.hear("state", lambda m: m["frame"] == 3 and not m["follow"])
+    await page.send("follow", follow=True)
+    await page.hear("state", lambda m: m["frame"] == 4 and m["follow"])
+    going = asyncio.create_task(go_on_slowly(tracker))
+    await page.send("track", action="pause")
+    state = await page.hear("state", lambda m: not m["track"]["running"])
+    assert state["track"]["first"] == 3
+    await page.send("track", action="resume")
+    await page.hear("state", lambda m: m["track"]["running"])
+    await page.send("track", action="stop")
+    await page.hear("state", lambda m: m["track"]["message"].startswith("stopped"))
+    going.cancel()
 
 
 async def go_on_slowly(tracker):
@@ -137,50 +139,48 @@ async def test_a_tracker_that_fails_is_a_notice_once(controller, tracker):
 
 
 @pytest.mark.slow
-async def test_curves_come_whole_and_then_as_they_change(controller, tracker):
-    async with visiting(controller) as page:
-        await page.hear("timeline")
-        await page.send("curves", group="torso")
+async def test_curves_come_whole_and_then_as_they_change(controller, tracker, page):
+    await page.hear("timeline")
+    await page.send("curves", group="torso")
+    message = await page.hear("curves")
+    assert (message["replace"], message["group"], message["person"]) == (True, "torso", 0)
+    frames, curves = curves_of(message)
+    assert frames == [2]
+    assert curves["Position", "x"][0] == pytest.approx(100 * controller.state.poses[0][0], abs=1e-3)
+    await page.send("track", action="forward", until=4)
+    tracker.let_go(2)
+    seen = {}
+    while 4 not in seen:
         message = await page.hear("curves")
-        assert (message["replace"], message["group"], message["person"]) == (True, "torso", 0)
+        assert not message["replace"]
         frames, curves = curves_of(message)
-        assert frames == [2]
-        assert curves["Position", "x"][0] == pytest.approx(100 * controller.state.poses[0][0], abs=1e-3)
-        await page.send("track", action="forward", until=4)
-        tracker.let_go(2)
-        seen = {}
-        while 4 not in seen:
-            message = await page.hear("curves")
-            assert not message["replace"]
-            frames, curves = curves_of(message)
-            seen |= dict(zip(frames, curves["Position", "x"], strict=True))
-        assert 2 not in seen
-        assert seen[4] - seen[3] == pytest.approx(1.0, abs=1e-3)  # the fake walks a centimetre a frame
-        await page.send("undo")
-        message = await page.hear("curves")
-        frames, curves = curves_of(message)
-        assert frames == [3, 4]
-        assert np.all(np.isnan(curves["Position", "x"]))
+        seen |= dict(zip(frames, curves["Position", "x"], strict=True))
+    assert 2 not in seen
+    assert seen[4] - seen[3] == pytest.approx(1.0, abs=1e-3)  # the fake walks a centimetre a frame
+    await page.send("undo")
+    message = await page.hear("curves")
+    frames, curves = curves_of(message)
+    assert frames == [3, 4]
+    assert np.all(np.isnan(curves["Position", "x"]))
 
 
-async def test_another_group_replaces_the_first_and_closed_ones_rest(controller):
-    async with visiting(controller) as page:
-        await page.send("curves", group="arms")
-        await page.hear("curves")
-        await page.send("curves", group="cost")
-        message = await page.hear("curves")
-        assert (message["group"], message["replace"]) == ("cost", True)
-        assert message["plots"][0]["labels"] == ["mean", "FRONT", "RIGHT", "BACK", "LEFT"]
-        await page.send("curves", group=None)
-        await page.send("select", person=0, point="head")  # carried out after it
-        await page.hear("state", lambda m: m["point"] == "head")
-        count = len(page.told)
-        drag(controller, "left_knee", (4.0, 0.0))
-        await page.hear("timeline")
-        await asyncio.sleep(0.2)
-        await page.send("select", person=0, point="head")
-        await page.hear("state", lambda m: m["point"] == "head")
-        assert not [m for m in page.told[count:] if m["type"] == "curves"]
+async def test_another_group_replaces_the_first_and_closed_ones_rest(controller, page):
+    await page.send("curves", group="arms")
+    await page.hear("curves")
+    await page.send("curves", group="cost")
+    message = await page.hear("curves")
+    assert (message["group"], message["replace"]) == ("cost", True)
+    assert message["plots"][0]["labels"] == ["mean", "FRONT", "RIGHT", "BACK", "LEFT"]
+    await page.send("curves", group=None)
+    await page.send("select", person=0, point="head")  # carried out after it
+    await page.hear("state", lambda m: m["point"] == "head")
+    count = len(page.told)
+    drag(controller, "left_knee", (4.0, 0.0))
+    await page.hear("timeline")
+    await asyncio.sleep(0.2)
+    await page.send("select", person=0, point="head")
+    await page.hear("state", lambda m: m["point"] == "head")
+    assert not [m for m in page.told[count:] if m["type"] == "curves"]
 
 
 @pytest.mark.slow
@@ -196,40 +196,36 @@ async def test_a_drag_means_the_frame_that_the_hand_saw(controller):
 
 
 @pytest.mark.slow
-async def test_segments_are_sent_when_the_evidence_has_come(controller):
-    async with visiting(controller) as page:
-        await page.hear("timeline")
-        await page.shows("image", "accepted", "rejected")
-        await page.hear("overlay", lambda m: "rejected" in kinds(m))
-        await page.send("seek", frame=30)
-        message = await page.hear("overlay", lambda m: m["frame"] == 30 and "rejected" in kinds(m))
-        assert {p["camera"] for p in message["paths"] if p["kind"] == "accepted"} == {0, 1, 2, 3}
+async def test_segments_are_sent_when_the_evidence_has_come(page):
+    await page.hear("timeline")
+    await page.shows("image", "accepted", "rejected")
+    await page.hear("overlay", lambda m: "rejected" in kinds(m))
+    await page.send("seek", frame=30)
+    message = await page.hear("overlay", lambda m: m["frame"] == 30 and "rejected" in kinds(m))
+    assert {p["camera"] for p in message["paths"] if p["kind"] == "accepted"} == {0, 1, 2, 3}
 
 
 def kinds(message):
     return {p["kind"] for p in message["paths"]}
 
 
-async def test_a_range_is_worked_on_and_told(controller):
-    async with visiting(controller) as page:
-        await page.hear("inconsistent", lambda m: m["frames"] == [])
-        await page.send("seek", frame=6)
-        await page.send("mark", toggle="keyframe")
-        await page.hear("timeline", lambda m: m["cells"].get("6", {}).get("keyframe"))
-        await page.send("range", action="interpolate", first=2, last=6, person=None)
-        cells = (await page.hear("timeline"))["cells"]
-        assert {k: (c["source"], c["reviewed"]) for k, c in cells.items()} == dict.fromkeys(
-            "345", ("interpolated", False)
-        )
-        # The state may be told before the cells, or after.
-        if not any(m["type"] == "state" and m["range"]["message"] == "interpolated 3 frames" for m in page.told):
-            await page.hear("state", lambda m: m["range"]["message"] == "interpolated 3 frames")
-        await page.send("range", action="reviewed", first=3, last=4, person=0)
-        assert set((await page.hear("timeline"))["cells"]) == {"3", "4"}
-        await page.send("range", action="fold", first=3, last=4, person=0)
-        assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
-        await page.send("range", action="interpolate", first=10, last=12, person=None)
-        assert "poses at both ends" in (await page.hear("notice"))["text"]
+async def test_a_range_is_worked_on_and_told(page):
+    await page.hear("inconsistent", lambda m: m["frames"] == [])
+    await page.send("seek", frame=6)
+    await page.send("mark", toggle="keyframe")
+    await page.hear("timeline", lambda m: m["cells"].get("6", {}).get("keyframe"))
+    await page.send("range", action="interpolate", first=2, last=6, person=None)
+    cells = (await page.hear("timeline"))["cells"]
+    assert {k: (c["source"], c["reviewed"]) for k, c in cells.items()} == dict.fromkeys("345", ("interpolated", False))
+    # The state may be told before the cells, or after.
+    if not any(m["type"] == "state" and m["range"]["message"] == "interpolated 3 frames" for m in page.told):
+        await page.hear("state", lambda m: m["range"]["message"] == "interpolated 3 frames")
+    await page.send("range", action="reviewed", first=3, last=4, person=0)
+    assert set((await page.hear("timeline"))["cells"]) == {"3", "4"}
+    await page.send("range", action="fold", first=3, last=4, person=0)
+    assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
+    await page.send("range", action="interpolate", first=10, last=12, person=None)
+    assert "poses at both ends" in (await page.hear("notice"))["text"]
 
 
 @pytest.mark.slow
@@ -379,44 +375,41 @@ async def test_evidence_waits_for_the_pictures(controller):
 
 
 @pytest.mark.slow
-async def test_a_pose_changes_the_part_masks_alone(controller):
-    async with visiting(controller) as page:
-        await page.shows("image", "parts")
-        await page.hear("image", lambda m: m["of"] == 8)
-        count = len(page.told) + 7
-        drag(controller, "left_knee", (4.0, 0.0))
-        await page.hear("image", lambda m: m["of"] == 4)
-        assert {m["layer"] for m in page.told[count:] if m["type"] == "image"} == {"parts"}
+async def test_a_pose_changes_the_part_masks_alone(controller, page):
+    await page.shows("image", "parts")
+    await page.hear("image", lambda m: m["of"] == 8)
+    count = len(page.told) + 7
+    drag(controller, "left_knee", (4.0, 0.0))
+    await page.hear("image", lambda m: m["of"] == 4)
+    assert {m["layer"] for m in page.told[count:] if m["type"] == "image"} == {"parts"}
 
 
 @pytest.mark.slow
-async def test_only_news_is_sent_to_a_page(controller):
-    async with visiting(controller) as page:
-        await page.hear("image", lambda m: m["of"] == 4)
-        await page.shows("image", reductions=(0, 1, 0, 0))
-        overlay = await page.hear("overlay", lambda m: {h["camera"] for h in m["handles"]} == {1})
-        assert overlay["paths"] == []
-        count = len(page.told)
-        await page.shows("image", reductions=(1, 1, 0, 0))
-        image = await page.hear("image", lambda m: m["of"] == 1)
-        assert image["camera"] == 0
-        assert len([m for m in page.told[count:] if m["type"] == "image"]) <= 4  # the rest of the first set
+async def test_only_news_is_sent_to_a_page(page):
+    await page.hear("image", lambda m: m["of"] == 4)
+    await page.shows("image", reductions=(0, 1, 0, 0))
+    overlay = await page.hear("overlay", lambda m: {h["camera"] for h in m["handles"]} == {1})
+    assert overlay["paths"] == []
+    count = len(page.told)
+    await page.shows("image", reductions=(1, 1, 0, 0))
+    image = await page.hear("image", lambda m: m["of"] == 1)
+    assert image["camera"] == 0
+    assert len([m for m in page.told[count:] if m["type"] == "image"]) <= 4  # the rest of the first set
 
 
-async def test_a_page_without_visible_panes_gets_no_view_until_it_shows_one(controller):
-    async with visiting(controller) as page:
-        await page.shows("image", "contours")
-        await page.hear("image")
-        await page.shows("image", "contours", reductions=(0, 0, 0, 0))
-        await page.send("seek", frame=3)
-        await page.hear("state", lambda m: m["frame"] == 3)
-        await page.send("history", limit=1)
-        await page.hear("history")
-        assert not [m for m in page.told if m["type"] in ("image", "overlay") and m["frame"] == 3]
-        await page.shows("image", "contours", reductions=(0, 2, 0, 0))
-        assert (await page.hear("image", lambda m: m["frame"] == 3))["camera"] == 1
-        overlay = next(m for m in page.told if m["type"] == "overlay" and m["frame"] == 3)
-        assert {path["camera"] for path in overlay["paths"]} == {1}
+async def test_a_page_without_visible_panes_gets_no_view_until_it_shows_one(page):
+    await page.shows("image", "contours")
+    await page.hear("image")
+    await page.shows("image", "contours", reductions=(0, 0, 0, 0))
+    await page.send("seek", frame=3)
+    await page.hear("state", lambda m: m["frame"] == 3)
+    await page.send("history", limit=1)
+    await page.hear("history")
+    assert not [m for m in page.told if m["type"] in ("image", "overlay") and m["frame"] == 3]
+    await page.shows("image", "contours", reductions=(0, 2, 0, 0))
+    assert (await page.hear("image", lambda m: m["frame"] == 3))["camera"] == 1
+    overlay = next(m for m in page.told if m["type"] == "overlay" and m["frame"] == 3)
+    assert {path["camera"] for path in overlay["paths"]} == {1}
 
 
 async def test_a_view_that_is_not_understood_is_a_notice(controller, caplog):
@@ -446,19 +439,18 @@ async def test_a_page_connects_again_where_a_person_gets_other_joints(controller
         assert len((await page.hear("state"))["dofs"]) == 38
 
 
-async def test_a_page_asks_for_epipolar_lines_until_it_asks_no_more(controller):
-    async with visiting(controller) as page:
-        await page.hear("timeline")
-        await page.send("epipolar", points=[[0, 320.0, 240.0]])
-        found = await page.hear("epipolar")
-        assert {line["camera"] for line in found["lines"]} == {1, 2, 3}
-        assert found["distance"] is None
-        line = found["lines"][0]
-        middle = [line["camera"], (line["x0"] + line["x1"]) / 2, (line["y0"] + line["y1"]) / 2]
-        await page.send("epipolar", points=[[0, 320.0, 240.0], middle])
-        distance = (await page.hear("epipolar"))["distance"]
-        assert (distance["camera"], distance["px"]) == (middle[0], pytest.approx(0, abs=0.02))
-        await page.send("epipolar", points=[[99, 0.0, 0.0]])
-        assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
-        await page.send("epipolar", points=[])
-        assert (await page.hear("epipolar"))["lines"] == []
+async def test_a_page_asks_for_epipolar_lines_until_it_asks_no_more(page):
+    await page.hear("timeline")
+    await page.send("epipolar", points=[[0, 320.0, 240.0]])
+    found = await page.hear("epipolar")
+    assert {line["camera"] for line in found["lines"]} == {1, 2, 3}
+    assert found["distance"] is None
+    line = found["lines"][0]
+    middle = [line["camera"], (line["x0"] + line["x1"]) / 2, (line["y0"] + line["y1"]) / 2]
+    await page.send("epipolar", points=[[0, 320.0, 240.0], middle])
+    distance = (await page.hear("epipolar"))["distance"]
+    assert (distance["camera"], distance["px"]) == (middle[0], pytest.approx(0, abs=0.02))
+    await page.send("epipolar", points=[[99, 0.0, 0.0]])
+    assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
+    await page.send("epipolar", points=[])
+    assert (await page.hear("epipolar"))["lines"] == []

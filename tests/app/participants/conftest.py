@@ -17,7 +17,13 @@ def people(opened):
 
 
 @pytest.fixture
-def pair(people):
-    """Controllers of anna, the host, and of ben."""
+def anna(people):
+    """The host's controller."""
     people.join("host")
-    return people.host, people.join("annotate", "ben").controller
+    return people.host
+
+
+@pytest.fixture
+def ben(people, anna):
+    """The controller of somebody who joined after anna."""
+    return people.join("annotate", "ben").controller

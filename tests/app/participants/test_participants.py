@@ -18,8 +18,7 @@ def shown(controller):
     return controller.state.poses[0].tolist()
 
 
-def test_each_has_a_frame_and_a_selection_of_their_own(pair):
-    anna, ben = pair
+def test_each_has_a_frame_and_a_selection_of_their_own(anna, ben):
     anna.navigation.seek(3)
     ben.navigation.seek(7)
     ben.navigation.select(0, "head")
@@ -27,13 +26,11 @@ def test_each_has_a_frame_and_a_selection_of_their_own(pair):
     assert (anna.state.point, ben.state.point) == (None, "head")
 
 
-def test_a_newcomer_on_a_frame_with_evidence_sees_its_cost(pair):
-    anna, ben = pair
+def test_a_newcomer_on_a_frame_with_evidence_sees_its_cost(anna, ben):
     assert ben.state.cost_px == anna.state.cost_px is not None
 
 
-def test_others_see_an_edit_on_the_frame_that_they_look_at(pair):
-    anna, ben = pair
+def test_others_see_an_edit_on_the_frame_that_they_look_at(anna, ben):
     ben.navigation.seek(3)
     ben.navigation.select(0, "head")
     anna.navigation.seek(3)
@@ -45,8 +42,7 @@ def test_others_see_an_edit_on_the_frame_that_they_look_at(pair):
     assert 3 in ben.stored_poses.timeline(1)
 
 
-def test_an_edit_elsewhere_leaves_the_shown_pose_as_the_same_object(pair):
-    anna, ben = pair
+def test_an_edit_elsewhere_leaves_the_shown_pose_as_the_same_object(anna, ben):
     drag(ben, "torso", (4.0, 0.0))
     values = ben.state.people[0].values
     anna.navigation.seek(3)
@@ -54,8 +50,7 @@ def test_an_edit_elsewhere_leaves_the_shown_pose_as_the_same_object(pair):
     assert ben.state.people[0].values is values, "nothing is drawn again"
 
 
-def test_a_pose_is_edited_in_turn(pair):
-    anna, ben = pair
+def test_a_pose_is_edited_in_turn(anna, ben):
     start = tuple(pixel_of(anna, "torso"))
     anna.dragging.begin(1, FRONT, 0, "torso", start)
     with pytest.raises(TurnError, match="anna drags on frame 0"):
@@ -72,9 +67,8 @@ def test_a_pose_is_edited_in_turn(pair):
     assert shown(anna) == shown(ben)
 
 
-def test_both_drag_at_once_on_frames_of_their_own(pair):
+def test_both_drag_at_once_on_frames_of_their_own(anna, ben):
     """A drag that lasts adds to its entry although the other has stored one meanwhile; each entry is undone whole."""
-    anna, ben = pair
     ben.navigation.seek(1)
     starts = {}
     for page, who in enumerate((anna, ben)):
@@ -93,8 +87,7 @@ def test_both_drag_at_once_on_frames_of_their_own(pair):
     assert (anna.state.frame, ben.state.frame) == (0, 1)
 
 
-def test_undo_is_of_ones_own(pair):
-    anna, ben = pair
+def test_undo_is_of_ones_own(anna, ben):
     drag(anna, "torso", (4.0, 0.0))
     ben.navigation.seek(1)
     drag(ben, "torso", (5.0, 0.0))
@@ -138,8 +131,7 @@ def test_alone_again_ones_own_entries_are_gone_along(people):
     assert anna.stored_poses.rows(0)[0] == [0, 1, 2]
 
 
-def test_undo_waits_for_a_drag_of_the_same_pose(pair):
-    anna, ben = pair
+def test_undo_waits_for_a_drag_of_the_same_pose(anna, ben):
     drag(ben, "torso", (4.0, 0.0))
     anna.dragging.begin(1, FRONT, 0, "torso", tuple(pixel_of(anna, "torso")))
     with pytest.raises(TurnError, match="anna drags"):
@@ -157,8 +149,7 @@ def test_alone_the_host_undoes_whatever_the_history_holds(people):
     assert people.host.stored_poses.rows(0)[0] == []
 
 
-def test_a_canceled_drag_takes_back_its_checkpoints_only(pair):
-    anna, ben = pair
+def test_a_canceled_drag_takes_back_its_checkpoints_only(anna, ben):
     ben.navigation.seek(1)
     start = pixel_of(anna, "torso")
     anna.dragging.begin(1, FRONT, 0, "torso", tuple(start))
@@ -296,8 +287,7 @@ def _every_frame():
     return FrameChoice(every=1), None, [], False
 
 
-def test_bodies_of_the_host_are_taken_over(pair):
-    anna, ben = pair
+def test_bodies_of_the_host_are_taken_over(anna, ben):
     drag(ben, "torso", (4.0, 0.0))
     ben.navigation.seek(2)
     height = anna.models[0].height_m
@@ -332,8 +322,7 @@ def test_a_run_of_one_leaves_the_others_to_other_frames(people, tracker):
     assert anna.stored_poses.rows(0)[0] == [2, 3, 4, 5, 6]
 
 
-def test_a_verdict_on_a_pose_that_somebody_has_changed_since_is_refused(pair):
-    anna, ben = pair
+def test_a_verdict_on_a_pose_that_somebody_has_changed_since_is_refused(anna, ben):
     anna.annotating.plan(FrameChoice(frames="0"), None, [], each=False)
     drag(anna, "torso", (9.0, 0.0))
     wait_for(lambda: ben.state.annotation.tasks[0].state == "annotated")

@@ -63,8 +63,7 @@ def test_a_stop_reports_what_it_could_not_save(people, tracker):
     assert anna.state.saved
 
 
-def test_a_refused_mark_leaves_nothing_running(pair):
-    anna, ben = pair
+def test_a_refused_mark_leaves_nothing_running(anna, ben):
     drag(anna, "torso", (4.0, 0.0))
     anna.dragging.begin(1, FRONT, 0, "torso", tuple(pixel_of(anna, "torso")))
     with pytest.raises(TurnError, match="anna drags on frame 0"):
@@ -76,8 +75,7 @@ def test_a_refused_mark_leaves_nothing_running(pair):
     assert ben.state.ranges.message == "marked 1 frame"
 
 
-def test_work_on_a_range_that_fails_at_once_leaves_nothing_running(pair, monkeypatch):
-    anna, _ = pair
+def test_work_on_a_range_that_fails_at_once_leaves_nothing_running(monkeypatch, anna):
     drag(anna, "torso", (4.0, 0.0))
 
     def fail(*args):
@@ -93,8 +91,7 @@ def test_work_on_a_range_that_fails_at_once_leaves_nothing_running(pair, monkeyp
     anna.ranges.mark(0, 0, "none")
 
 
-def test_work_on_a_range_has_its_turn(people, pair, monkeypatch):
-    anna, ben = pair
+def test_work_on_a_range_has_its_turn(people, monkeypatch, anna, ben):
     for frame in (2, 8):
         anna.navigation.seek(frame)
         drag(anna, "torso", (4.0, 0.0))

@@ -49,11 +49,6 @@ class Page:
 
 
 @pytest.fixture
-def controller(opened):
-    return opened()
-
-
-@pytest.fixture
 def page(controller):
     page, connect = Page(), []
     server = SimpleNamespace(on_client_connect=connect.append, on_client_disconnect=lambda _: None)

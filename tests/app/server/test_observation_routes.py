@@ -22,6 +22,7 @@ from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.store.records import PoseRecord
 from tracker.session.store.stored_poses import StoredPose
 
+pytestmark = pytest.mark.usefixtures("film_once")
 PLAN, IMPORT, REPORT = "/observations/plan", "/observations/import", "/observations/report"
 COPY = "/copies/open"
 
@@ -29,11 +30,6 @@ COPY = "/copies/open"
 class Nobody:
     async def serve(self, socket, role, name=""):
         pass
-
-
-@pytest.fixture
-def controller(opened, film_once):
-    return opened()
 
 
 @pytest.fixture
@@ -66,6 +62,11 @@ async def serve(controller, tmp_path):
 
 
 @pytest.fixture
+async def post(serve):
+    return (await serve())[0]
+
+
+@pytest.fixture
 def form(controller, tmp_path):
     """The form of files of the person whom the cameras of the session show."""
     session = controller.session
@@ -74,8 +75,7 @@ def form(controller, tmp_path):
     return {"paths": str(folder), "name": "net", "people": [session.people[0].name]}
 
 
-async def test_files_are_described_and_then_stored(controller, serve, form):
-    post, _ = await serve()
+async def test_files_are_described_and_then_stored(controller, form, post):
     assert (await post(IMPORT, {}))[0] == 400  # nothing was read
     status, text = await post(PLAN, form)
     assert status == 200, text
@@ -94,10 +94,9 @@ async def test_files_are_described_and_then_stored(controller, serve, form):
     assert [s.name for s in controller.state.observations.sets] == ["net"]
 
 
-async def test_views_without_points_have_no_confidence(controller, serve, form, tmp_path):
+async def test_views_without_points_have_no_confidence(controller, form, tmp_path, post):
     for path in (tmp_path / "found" / controller.session.camera_names[0]).glob("*.json"):
         path.write_text('{"version": 1.3, "people": []}')
-    post, _ = await serve()
     status, text = await post(PLAN, form)
     assert status == 200, text
     assert "NaN" not in text
@@ -122,15 +121,14 @@ async def test_views_without_points_have_no_confidence(controller, serve, form, 
         ({"format": "pickle"}, "format"),
     ],
 )
-async def test_wrong_forms_are_answered_with_the_reason(controller, serve, form, changes, expected):
-    post, _ = await serve()
+async def test_wrong_forms_are_answered_with_the_reason(controller, form, changes, expected, post):
     status, text = await post(PLAN, form | changes)
     assert (status, expected in text) == (400, True), text
     assert controller.state.observations.plan is None
     assert not (controller.session.folder / "observations").exists()
 
 
-async def test_a_folder_that_cannot_be_looked_through_is_a_reason(serve, form, tmp_path, monkeypatch):
+async def test_a_folder_that_cannot_be_looked_through_is_a_reason(form, tmp_path, monkeypatch, post):
     (tmp_path / "found" / "gone").mkdir()
     real = os.scandir
 
@@ -139,7 +137,6 @@ async def test_a_folder_that_cannot_be_looked_through_is_a_reason(serve, form, t
             raise FileNotFoundError(2, "No such file or directory", str(path))
         return real(path)
 
-    post, _ = await serve()
     with monkeypatch.context() as patch:
         patch.setattr(os, "scandir", scandir)
         status, text = await post(PLAN, form)
@@ -151,8 +148,7 @@ async def test_a_folder_that_cannot_be_looked_through_is_a_reason(serve, form, t
     assert (await post(PLAN, form))[0] == 200, "nothing is held"
 
 
-async def test_a_body_that_is_no_form_or_too_large_is_refused(serve):
-    post, _ = await serve()
+async def test_a_body_that_is_no_form_or_too_large_is_refused(post):
     assert (await post(PLAN, b"no JSON"))[0] == 400
     assert (await post(PLAN, b"[]"))[0] == 400
     status, _ = await post(PLAN, b" " * (4 << 20))
@@ -197,11 +193,10 @@ async def test_the_report_of_a_judgement_is_downloaded(controller, serve, form):
     assert text.count("data:image/jpeg;base64,") == len(controller.session.cameras)
 
 
-async def test_another_copy_is_opened_by_its_path_only_where_paths_may_be_named(controller, serve, session, tmp_path):
+async def test_another_copy_is_opened_by_its_path_where_paths_may_be_named(controller, serve, session, tmp_path, post):
     copy = shutil.copytree(session, tmp_path / "ben")
-    post, _ = await serve("no paths here")
-    assert await post(COPY, {"folder": str(copy)}) == (403, "no paths here")
-    post, _ = await serve()
+    refused, _ = await serve("no paths here")
+    assert await refused(COPY, {"folder": str(copy)}) == (403, "no paths here")
     assert (await post(COPY, {"folder": "ben"}))[0] == 400  # neither from the root nor from the home
     assert (await post(COPY, {"folder": str(copy)}, Origin="http://elsewhere.example"))[0] == 403
     assert controller.state.other_copy is None

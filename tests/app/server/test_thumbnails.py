@@ -17,9 +17,8 @@ from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, correcte
 
 
 @pytest.fixture
-def made(opened, monkeypatch):
+def made(monkeypatch, controller):
     """A controller with a pose on frame 0, its thumbnails, and what has been drawn."""
-    controller = opened()
     drag(controller, "torso", (3.0, 0.0))
     drawn, draw = [], thumbnails.thumbnails.thumbnail
 

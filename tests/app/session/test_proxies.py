@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 import pytest
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 from gestures import wait_for
 
 from app.session import proxies
@@ -17,13 +17,11 @@ from tracker.session.session import load_session
 
 @pytest.mark.slow
 def test_index_makes_a_proxy_of_every_camera(run, session):
-    status, out, _ = run("index", session)
-    assert status == 0
+    out = output_of(run("index", session))
     loaded = load_session(session)
     assert all(p is not None and p.n_frames == loaded.n_frames for p in proxies.proxies(loaded))
     assert f"FRONT {loaded.n_frames}" in out
-    status, out, _ = run("index", session, "--json")
-    assert status == 0
+    out = output_of(run("index", session, "--json"))
     assert '"stopped": false' in out
 
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from bodies import MODELS
-from command_line import assert_refused
+from command_line import assert_refused, output_of
 from stored_motions import filmed, store_motion
 from true_poses import sample_with_poses
 
@@ -44,8 +44,7 @@ def data_of(text):
 
 def test_a_folder_has_a_picture_of_each_view_and_frame(run, couple, tmp_path):
     out = tmp_path / "review"
-    status, text, _ = run("share", couple.folder, "--frames", "1:4", "--out", out)
-    assert status == 0
+    text = output_of(run("share", couple.folder, "--frames", "1:4", "--out", out))
     assert "1:4 in 3 views" in text
     assert sorted(p.name for p in out.iterdir()) == ["data.js", "index.html", "page.css", "page.js", "pictures"]
     data = data_of((out / "data.js").read_text("utf-8"))

@@ -23,6 +23,12 @@ from tracker.session.holder import this_holder
 from tracker.session.lock import LOCK_FILE
 
 
+@pytest.fixture
+def manifest(tmp_path):
+    """A batch of one task."""
+    return make_batch(tmp_path, 1)
+
+
 def gone(**changes):
     """A holder whose process has ended."""
     child = subprocess.Popen(["true"])
@@ -73,8 +79,7 @@ def test_a_task_waits_for_those_before_it_even_if_they_fail(tmp_path):
     assert manifest.claim_next()[0].number == 1
 
 
-def test_the_task_of_a_dead_worker_is_taken_again_with_its_session(tmp_path):
-    manifest = make_batch(tmp_path, 1)
+def test_the_task_of_a_dead_worker_is_taken_again_with_its_session(tmp_path, manifest):
     dead = gone()
     (tmp_path / "claims" / "000000").write_bytes(msgspec.json.encode(dead))
     session = Path(manifest.tasks[0].recording.session)
@@ -88,8 +93,7 @@ def test_the_task_of_a_dead_worker_is_taken_again_with_its_session(tmp_path):
     assert manifest.claim_next() is None
 
 
-def test_a_worker_of_another_machine_is_dead_without_signs_of_life(tmp_path):
-    manifest = make_batch(tmp_path, 1)
+def test_a_worker_of_another_machine_is_dead_without_signs_of_life(tmp_path, manifest):
     path = tmp_path / "claims" / "000000"
     path.write_bytes(msgspec.json.encode(msgspec.structs.replace(this_holder(), host="elsewhere")))
     assert manifest.claim_next() is None
@@ -101,8 +105,7 @@ def test_a_worker_of_another_machine_is_dead_without_signs_of_life(tmp_path):
 @pytest.mark.parametrize(
     "content", [b"", msgspec.json.encode(msgspec.structs.replace(this_holder(), host="elsewhere"))]
 )
-def test_a_claim_with_a_time_to_come_is_of_a_dead_worker(tmp_path, content):
-    manifest = make_batch(tmp_path, 1)
+def test_a_claim_with_a_time_to_come_is_of_a_dead_worker(tmp_path, content, manifest):
     path = tmp_path / "claims" / "000000"
     path.write_bytes(content)
     future = time.time() + 30 * 86400
@@ -111,8 +114,7 @@ def test_a_claim_with_a_time_to_come_is_of_a_dead_worker(tmp_path, content):
     assert manifest.claim_next() is not None
 
 
-def test_a_clock_that_differs_from_that_of_the_folder_counts_nothing(tmp_path, monkeypatch):
-    manifest = make_batch(tmp_path, 1)
+def test_a_clock_that_differs_from_that_of_the_folder_counts_nothing(tmp_path, monkeypatch, manifest):
     (tmp_path / "claims" / "000000").write_bytes(
         msgspec.json.encode(msgspec.structs.replace(this_holder(), host="elsewhere"))
     )
@@ -120,16 +122,14 @@ def test_a_clock_that_differs_from_that_of_the_folder_counts_nothing(tmp_path, m
     assert manifest.state(manifest.tasks[0]) == "running"
 
 
-def test_a_full_disk_leaves_no_claim_without_its_holder(tmp_path):
-    manifest = make_batch(tmp_path, 1)
+def test_a_full_disk_leaves_no_claim_without_its_holder(tmp_path, manifest):
     with full_disk(), pytest.raises(OSError, match="File too large"):
         manifest.claim_next()
     assert [*(tmp_path / "claims").iterdir()] == []
     assert manifest.claim_next() is not None
 
 
-def test_a_result_that_cannot_be_written_is_a_sentence(tmp_path):
-    manifest = make_batch(tmp_path, 1)
+def test_a_result_that_cannot_be_written_is_a_sentence(tmp_path, manifest):
 
     def do(task, folder, progress):
         resource = full_disk()
@@ -146,8 +146,7 @@ def test_a_result_that_cannot_be_written_is_a_sentence(tmp_path):
     assert manifest.result(manifest.tasks[0]) is None
 
 
-def test_the_lock_of_somebody_else_stays(tmp_path):
-    manifest = make_batch(tmp_path, 1)
+def test_the_lock_of_somebody_else_stays(tmp_path, manifest):
     (tmp_path / "claims" / "000000").write_bytes(msgspec.json.encode(gone()))
     session = Path(manifest.tasks[0].recording.session)
     session.mkdir()
@@ -157,17 +156,15 @@ def test_the_lock_of_somebody_else_stays(tmp_path):
     assert (session / LOCK_FILE).exists()
 
 
-def test_a_worker_without_its_claim_writes_no_result(tmp_path):
-    manifest = make_batch(tmp_path, 1)
+def test_a_worker_without_its_claim_writes_no_result(manifest):
     task, held = manifest.claim_next()
     held.path.write_bytes(msgspec.json.encode(this_holder()))
     assert not manifest.finish(task, held, Result("done"))
     assert manifest.result(task) is None
 
 
-def test_signs_of_life_are_shown(tmp_path, monkeypatch):
+def test_signs_of_life_are_shown(monkeypatch, manifest):
     monkeypatch.setattr(claims, "BEAT_S", 0.01)
-    manifest = make_batch(tmp_path, 1)
     _, held = manifest.claim_next()
     os.utime(held.path, (0, 0))
     with held.beating():
@@ -175,8 +172,7 @@ def test_signs_of_life_are_shown(tmp_path, monkeypatch):
     assert held.path.stat().st_mtime > 1
 
 
-def test_a_task_that_kills_its_workers_fails_at_last(tmp_path):
-    manifest = make_batch(tmp_path, 1)
+def test_a_task_that_kills_its_workers_fails_at_last(tmp_path, manifest):
     for _ in range(3):
         manifest.count_attempt(manifest.tasks[0])
     work(tmp_path, do=write_line)

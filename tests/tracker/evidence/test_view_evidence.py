@@ -148,10 +148,14 @@ def test_a_damaged_frame_has_no_edges():
 
 
 @pytest.fixture(scope="module")
-def sample(sample_folder):
-    session = load_session(sample_folder)
+def session(sample_folder):
+    return load_session(sample_folder)
+
+
+@pytest.fixture(scope="module")
+def recording(session):
     with Recording(session.cameras) as recording:
-        yield session, recording
+        yield recording
 
 
 def edge_share(views, masks_px):
@@ -176,8 +180,7 @@ def person_boxes(real_frame, cameras, margin_px=60):
 
 
 @pytest.mark.slow
-def test_the_background_keeps_edges_to_the_person(sample, real_frame):
-    session, recording = sample
+def test_the_background_keeps_edges_to_the_person(real_frame, session, recording):
     boxes = person_boxes(real_frame, [c.camera for c in session.cameras])
     bare = Observer([replace(c, background=None) for c in session.cameras], recording).evidence(25)
     with_background = Observer(session.cameras, recording).evidence(25)
@@ -188,8 +191,7 @@ def test_the_background_keeps_edges_to_the_person(sample, real_frame):
 
 
 @pytest.mark.slow
-def test_masks_go_before_the_background(sample, tmp_path, real_frame):
-    session, recording = sample
+def test_masks_go_before_the_background(tmp_path, real_frame, session, recording):
     cameras = [c.camera for c in session.cameras]
     discs = []
     for c in cameras:
@@ -213,8 +215,7 @@ def test_masks_go_before_the_background(sample, tmp_path, real_frame):
         np.testing.assert_array_equal(a.points_px, b.points_px)
 
 
-def test_unknown_pixels_of_a_mask_show_neither_a_contour_nor_an_outside(sample, tmp_path):
-    session, recording = sample
+def test_unknown_pixels_of_a_mask_show_neither_a_contour_nor_an_outside(tmp_path, session, recording):
     view = WorkingView(session.cameras[0].camera)
     seen = {}
     for name, rows in (("whole", slice(0)), ("before", slice(240, 300))):  # a rail stands before the person
@@ -234,8 +235,7 @@ def test_unknown_pixels_of_a_mask_show_neither_a_contour_nor_an_outside(sample, 
     assert len(seen["before"].points_px) > len(seen["whole"].points_px)  # edges of the rail may be the person's
 
 
-def test_an_empty_mask_says_that_nobody_is_there(sample, tmp_path):
-    session, recording = sample
+def test_an_empty_mask_says_that_nobody_is_there(tmp_path, session, recording):
     first = session.cameras[0]
     cv2.imwrite(str(tmp_path / "000025.png"), np.zeros((480, 640), np.uint8))
     cameras = [replace(first, masks=tmp_path), *session.cameras[1:]]
@@ -243,8 +243,7 @@ def test_an_empty_mask_says_that_nobody_is_there(sample, tmp_path):
     assert [bool(len(v.points_px)) for v in views] == [False, True, True, True]
 
 
-def test_a_background_of_another_size(sample, tmp_path):
-    session, recording = sample
+def test_a_background_of_another_size(tmp_path, session, recording):
     cv2.imwrite(str(tmp_path / "small.png"), np.zeros((24, 32, 3), np.uint8))
     cameras = [replace(session.cameras[0], background=tmp_path / "small.png"), *session.cameras[1:]]
     with pytest.raises(RecordingError, match=r"camera 'FRONT'.*640x480.*32x24"):
@@ -252,8 +251,7 @@ def test_a_background_of_another_size(sample, tmp_path):
 
 
 @pytest.mark.slow
-def test_same_frame_twice_is_the_same(sample):
-    session, recording = sample
+def test_same_frame_twice_is_the_same(session, recording):
     observer = Observer(session.cameras, recording)
     for a, b in zip(observer.evidence(7), observer.evidence(7), strict=True):
         np.testing.assert_array_equal(a.distance, b.distance)
@@ -268,8 +266,7 @@ def test_the_matched_camera_is_the_pinhole_scaled():
 
 
 @pytest.mark.slow
-def test_a_region_shows_what_the_whole_image_shows_there(sample, real_frame):
-    session, recording = sample
+def test_a_region_shows_what_the_whole_image_shows_there(real_frame, session, recording):
     observer = Observer(session.cameras, recording)
     boxes = [
         region_around(c.project(real_frame.model.points_world(real_frame.values)), 60, c.size)
@@ -287,8 +284,7 @@ def test_a_region_shows_what_the_whole_image_shows_there(sample, real_frame):
         assert (part.distance == 0).any()
 
 
-def test_views_can_be_looked_at_in_part_or_whole(sample):
-    session, recording = sample
+def test_views_can_be_looked_at_in_part_or_whole(session, recording):
     observer = Observer(session.cameras, recording)
     views = observer.evidence(3, [(100, 50, 300, 400), None, (-500, -500, -400, -400), (600, 440, 900, 900)])
     assert [v.camera.size for v in views] == [(200, 350), (640, 480), (16, 16), (40, 40)]
@@ -296,8 +292,7 @@ def test_views_can_be_looked_at_in_part_or_whole(sample):
 
 
 @pytest.mark.slow
-def test_settings_say_which_edges_are_found(sample):
-    session, recording = sample
+def test_settings_say_which_edges_are_found(session, recording):
     observer = Observer(session.cameras, recording)
     for settings in (EdgeSettings(foreground=False), EdgeSettings(max_segment_px=None)):
         observer.prefetch(7, [None] * 4, edges=EdgeSettings())  # features of other settings are not used
@@ -310,8 +305,7 @@ def test_settings_say_which_edges_are_found(sample):
                 assert np.count_nonzero(found.distance == 0) > 1.5 * np.count_nonzero(usual.distance == 0)
 
 
-def test_a_frame_read_ahead_is_the_same(sample):
-    session, recording = sample
+def test_a_frame_read_ahead_is_the_same(session, recording):
     observer = Observer(session.cameras, recording)
     expected = observer.evidence(7)
     for k in (5, 6, 7):
@@ -343,8 +337,7 @@ def same_evidence(views, others):
 
 
 @pytest.mark.parametrize("background", [True, False])
-def test_evidence_read_ahead_equals_evidence_read_later(sample, real_frame, monkeypatch, background):
-    session, recording = sample
+def test_evidence_read_ahead_equals_evidence_read_later(real_frame, monkeypatch, background, session, recording):
     cameras = session.cameras if background else [replace(c, background=None) for c in session.cameras]
     observer, linked = Observer(cameras, recording), []
     predicted = [visible_contours(real_frame, c) for c in observer.working_cameras]
@@ -388,8 +381,7 @@ def with_accepted_segments(view, pieces_px, threshold_px=None):
     return with_segments(view, accept_segments(view.samples, pieces_px, threshold_px))
 
 
-def test_only_edges_near_the_prediction_are_accepted(sample, real_frame):
-    session, recording = sample
+def test_only_edges_near_the_prediction_are_accepted(real_frame, session, recording):
     observer = Observer([replace(c, background=None) for c in session.cameras], recording)
     predicted = [visible_contours(real_frame, c) for c in observer.working_cameras]
     for view, pieces in zip(observer.evidence(25), predicted, strict=True):
@@ -411,8 +403,7 @@ def test_only_edges_near_the_prediction_are_accepted(sample, real_frame):
         assert not with_accepted_segments(view, pieces, 0.1).accepted.all()
 
 
-def test_evidence_of_a_region_takes_the_prediction_in_pixels_of_the_whole_image(sample, real_frame):
-    session, recording = sample
+def test_evidence_of_a_region_takes_the_prediction_in_pixels_of_the_whole_image(real_frame, session, recording):
     observer = Observer([replace(c, background=None) for c in session.cameras], recording)
     predicted = [visible_contours(real_frame, c) for c in observer.working_cameras]
     boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
@@ -425,8 +416,7 @@ def test_evidence_of_a_region_takes_the_prediction_in_pixels_of_the_whole_image(
         np.testing.assert_array_equal(once.normals, kept.normals)
 
 
-def test_the_silhouette_and_its_contour_are_evidence(sample, real_frame):
-    session, recording = sample
+def test_the_silhouette_and_its_contour_are_evidence(real_frame, session, recording):
     for view in Observer(session.cameras, recording).evidence(25):
         seen = view.silhouette
         assert seen.inside.shape == view.distance.shape
@@ -442,8 +432,7 @@ def test_the_silhouette_and_its_contour_are_evidence(sample, real_frame):
 
 
 @pytest.mark.slow
-def test_a_broken_background_is_not_trusted(sample, tmp_path):
-    session, recording = sample
+def test_a_broken_background_is_not_trusted(tmp_path, session, recording):
     first = session.cameras[0]
     moved = np.roll(cv2.imread(str(first.background)), 12, axis=1)
     moved[150:400, 350:450] = 255
@@ -456,8 +445,7 @@ def test_a_broken_background_is_not_trusted(sample, tmp_path):
 
 
 @pytest.mark.slow
-def test_exposure_that_changed_is_made_up_for(sample, tmp_path):
-    session, recording = sample
+def test_exposure_that_changed_is_made_up_for(tmp_path, session, recording):
     first = session.cameras[0]
     darker = (0.8 * cv2.imread(str(first.background))).astype(np.uint8)
     cv2.imwrite(str(tmp_path / "darker.png"), darker)

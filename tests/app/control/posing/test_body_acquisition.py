@@ -15,8 +15,7 @@ from tracker.estimation.acquisition.size_parameters import SizeParameters
 
 
 @pytest.fixture
-def posed(opened):
-    controller = opened()
+def posed(controller):
     drag(controller, "left_wrist", (6.0, -9.0))
     return controller
 
@@ -103,8 +102,7 @@ def test_one_at_a_time_and_not_without_a_pose(opened, posed, acquiring):
     wait_for(lambda: not posed.state.acquisition.running)
 
 
-def test_a_person_who_is_nowhere_placed_is_refused(opened):
-    controller = opened()
+def test_a_person_who_is_nowhere_placed_is_refused(controller):
     with pytest.raises(TrackerError, match="place the body on one first"):
         controller.body_acquisition.start(0)
     assert not controller.state.acquisition.running

@@ -31,9 +31,8 @@ def joints(controller, frame):
 
 
 @pytest.fixture
-def posed(opened):
+def posed(controller):
     """Two keyframes, set by hand."""
-    controller = opened()
     for frame in FRAMES:
         controller.navigation.seek(frame)
         drag(controller, "left_wrist", (6.0, -9.0))

@@ -13,8 +13,7 @@ def unseen(controller):
     return encoding.state(controller.session, controller.state).unseen_depth
 
 
-def test_opposite_views_alone_miss_the_depth_until_a_view_across_is_used(opened):
-    controller = opened()
+def test_opposite_views_alone_miss_the_depth_until_a_view_across_is_used(controller):
     drag(controller, "left_wrist", (6.0, -9.0), FRONT)
     assert unseen(controller) is None  # the first placement of all
     drag(controller, "left_wrist", (5.0, 3.0), BACK)
@@ -29,8 +28,7 @@ def test_opposite_views_alone_miss_the_depth_until_a_view_across_is_used(opened)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("change", ["undo", "seek", "fit", "edit"])
-def test_the_note_ends_with_its_pose(opened, change):
-    controller = opened()
+def test_the_note_ends_with_its_pose(change, controller):
     drag(controller, "left_wrist", (6.0, -9.0), FRONT)
     drag(controller, "left_wrist", (5.0, 3.0), BACK)
     assert unseen(controller) is not None

@@ -12,8 +12,7 @@ def dofs_of(controller, *joints):
     return [i for i, name in enumerate(names) if name.partition(".")[0] in joints]
 
 
-def test_a_drag_moves_what_is_not_locked(opened):
-    controller = opened()
+def test_a_drag_moves_what_is_not_locked(controller):
     locked = dofs_of(controller, "left_shoulder")
     controller.pose_edits.set_dof(0, dofs_of(controller, "left_elbow")[0], 1.0)
     controller.dof_locks.set(0, locked, True)
@@ -24,8 +23,7 @@ def test_a_drag_moves_what_is_not_locked(opened):
     assert not np.array_equal(after, before)
 
 
-def test_a_point_whose_limb_is_locked_is_refused(opened):
-    controller = opened()
+def test_a_point_whose_limb_is_locked_is_refused(controller):
     controller.dof_locks.set(0, dofs_of(controller, "left_shoulder", "left_elbow"), True)
     before = controller.state.poses[0]
     with pytest.raises(TrackerError, match="left_wrist with all of that locked"):
@@ -38,8 +36,7 @@ def test_a_point_whose_limb_is_locked_is_refused(opened):
     assert controller.state.undo == "drag left wrist, frame 0"
 
 
-def test_a_locked_body_stays_where_it_is(opened):
-    controller = opened()
+def test_a_locked_body_stays_where_it_is(controller):
     depth = controller.models[0].dof_names.index("torso.x")
     controller.dof_locks.set(0, [depth], True)
     before = controller.state.poses[0]
@@ -48,8 +45,7 @@ def test_a_locked_body_stays_where_it_is(opened):
     assert not np.array_equal(controller.state.poses[0], before)
 
 
-def test_a_locked_number_is_not_set(opened):
-    controller = opened()
+def test_a_locked_number_is_not_set(controller):
     (dof,) = dofs_of(controller, "left_elbow")
     controller.dof_locks.set(0, [dof], True)
     with pytest.raises(TrackerError, match="left elbow extension is locked"):
@@ -57,8 +53,7 @@ def test_a_locked_number_is_not_set(opened):
     assert controller.state.undo is None
 
 
-def test_a_search_leaves_locked_degrees_of_freedom_alone(opened):
-    controller = opened()
+def test_a_search_leaves_locked_degrees_of_freedom_alone(controller):
     drag(controller, "torso", (4.0, 0.0))
     locked = dofs_of(controller, "torso", "neck", "left_shoulder")
     controller.dof_locks.set(0, locked, True)
@@ -83,8 +78,7 @@ def test_a_tracking_run_is_told_what_is_locked(placed, tracker):
     assert set(np.flatnonzero(~free)) == set(locked)
 
 
-def test_with_all_locked_a_search_says_so(opened):
-    controller = opened()
+def test_with_all_locked_a_search_says_so(controller):
     controller.dof_locks.set(0, range(controller.models[0].n_dofs), True)
     with pytest.raises(TrackerError, match="found all of them locked"):
         controller.search.run()

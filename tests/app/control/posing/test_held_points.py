@@ -16,8 +16,7 @@ def world_of(controller, point):
 
 
 @pytest.mark.slow
-def test_a_drag_holds_the_point_it_placed_on_its_frame_until_it_is_released(opened):
-    controller = opened()
+def test_a_drag_holds_the_point_it_placed_on_its_frame_until_it_is_released(controller):
     drag(controller, "left_wrist", (25.0, -25.0))
     drag(controller, "left_wrist", (5.0, 5.0), RIGHT)
     assert controller.state.held == {HeldPoint(0, 0, "left_wrist", camera) for camera in (FRONT, RIGHT)}
@@ -37,8 +36,7 @@ def test_a_drag_holds_the_point_it_placed_on_its_frame_until_it_is_released(open
     assert controller.state.held == frozenset()
 
 
-def test_still_points_and_spines_are_not_held(opened):
-    controller = opened()
+def test_still_points_and_spines_are_not_held(controller):
     controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(pixel_of(controller, "left_wrist")))
     controller.dragging.end(PAGE)
     assert controller.state.held == frozenset()
@@ -48,8 +46,7 @@ def test_still_points_and_spines_are_not_held(opened):
         controller.held_points.set(0, "neck", True)
 
 
-def test_a_point_out_of_reach_says_by_how_much(opened):
-    controller = opened()
+def test_a_point_out_of_reach_says_by_how_much(controller):
     start = pixel_of(controller, "left_wrist")
     controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(start))
     controller.dragging.move(PAGE, tuple(start + np.array([15.0, -15.0])), 1)

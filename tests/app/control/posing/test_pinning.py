@@ -33,8 +33,7 @@ def pins_of(controller):
     return {(p.point, p.camera): tuple(np.round(p.position_px, 6).tolist()) for p in controller.state.pins[0]}
 
 
-def test_a_pin_is_one_entry_and_leaves_the_pose_alone(opened, session):
-    controller = opened()
+def test_a_pin_is_one_entry_and_leaves_the_pose_alone(session, controller):
     values = controller.state.poses[0]
     pin(controller, "left_wrist", (200.25, 150.5))
     assert pins_of(controller) == {("left_wrist", FRONT): (200.25, 150.5)}
@@ -88,8 +87,7 @@ def test_pins_and_their_history_outlast_a_restart(opened):
     assert pins_of(controller)["left_wrist", FRONT] == (230.0, 170.0)
 
 
-def test_pins_are_removed_one_by_one_by_joint_or_all(opened, session):
-    controller = opened()
+def test_pins_are_removed_one_by_one_by_joint_or_all(session, controller):
     for point in ("left_wrist", "head"):
         for camera in (FRONT, RIGHT):
             pin(controller, point, (200.0, 150.0), camera)
@@ -109,8 +107,7 @@ def test_pins_are_removed_one_by_one_by_joint_or_all(opened, session):
 
 
 @pytest.mark.slow
-def test_the_body_follows_a_live_pin_in_one_entry(opened, session):
-    controller = opened()
+def test_the_body_follows_a_live_pin_in_one_entry(session, controller):
     drag(controller, "torso", (4.0, 0.0))
     before = controller.state.people[0]
     start = pixel_of(controller, "left_wrist")
@@ -127,8 +124,7 @@ def test_the_body_follows_a_live_pin_in_one_entry(opened, session):
 
 
 @pytest.mark.slow
-def test_the_end_of_a_live_pin_decides(opened):
-    controller = opened()
+def test_the_end_of_a_live_pin_decides(controller):
     drag(controller, "torso", (4.0, 0.0))
     start = pixel_of(controller, "right_wrist")
     ends = []
@@ -157,8 +153,7 @@ def test_a_cancelled_pin_leaves_nothing(opened, session, monkeypatch, checkpoint
     assert not controller.state.is_pin_held
 
 
-def test_another_page_cannot_move_what_this_one_holds(opened):
-    controller = opened()
+def test_another_page_cannot_move_what_this_one_holds(controller):
     controller.pinning.begin(PAGE, 0, FRONT, 0, "head", (100.0, 100.0), False)
     controller.pinning.move(PAGE + 1, (200.0, 200.0))
     controller.pinning.end(PAGE + 1)
@@ -168,8 +163,7 @@ def test_another_page_cannot_move_what_this_one_holds(opened):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("interruption", ["seek", "drag", "undo", "fit"])
-def test_whatever_comes_in_between_ends_and_saves_the_gesture(opened, session, interruption):
-    controller = opened()
+def test_whatever_comes_in_between_ends_and_saves_the_gesture(session, interruption, controller):
     drag(controller, "torso", (4.0, 0.0))
     controller.pinning.begin(PAGE, 0, FRONT, 0, "head", (100.0, 100.0), False)
     {
@@ -184,16 +178,14 @@ def test_whatever_comes_in_between_ends_and_saves_the_gesture(opened, session, i
     assert ("head", FRONT) not in pins_of(controller) or pins_of(controller)["head", FRONT] == (100.0, 100.0)
 
 
-def test_a_pin_outside_of_the_image_is_refused_kindly(opened):
-    controller = opened()
+def test_a_pin_outside_of_the_image_is_refused_kindly(controller):
     with pytest.raises(TrackerError, match=r"within the 640x480 px of FRONT, found it at \(700, 20\)"):
         pin(controller, "head", (700.0, 20.0))
     pin(controller, "head", (630.0, 20.0), to_px=(700.0, -50.0))  # a drag stops at the border
     assert pins_of(controller)["head", FRONT] == (639.5, -0.5)
 
 
-def test_fit_says_who_determined_what(opened, session):
-    controller = opened()
+def test_fit_says_who_determined_what(session, controller):
     drag(controller, "torso", (4.0, 0.0))
     cost_px = controller.state.cost_px
     for camera in (FRONT, RIGHT):
@@ -214,8 +206,7 @@ def test_fit_says_who_determined_what(opened, session):
     np.testing.assert_array_equal(pose.values, controller.state.poses[0])
 
 
-def test_fit_without_pins_is_to_the_edges(opened):
-    controller = opened()
+def test_fit_without_pins_is_to_the_edges(controller):
     drag(controller, "torso", (4.0, 0.0))
     cost_px = controller.state.cost_px
     controller.pinning.fit(0)
@@ -225,8 +216,7 @@ def test_fit_without_pins_is_to_the_edges(opened):
     assert controller.stored_poses.timeline()[0]["keyframe"]  # a person asked for it
 
 
-def test_fit_without_edges_is_to_the_pins(opened, monkeypatch):
-    controller = opened()
+def test_fit_without_edges_is_to_the_pins(monkeypatch, controller):
     monkeypatch.setattr(controller.frames, "cached_evidence", lambda _: None)
     with pytest.raises(TrackerError, match="no pin on this frame"):
         controller.pinning.fit(0)
@@ -237,8 +227,7 @@ def test_fit_without_edges_is_to_the_pins(opened, monkeypatch):
     assert np.linalg.norm(pixel_of(controller, "left_wrist") - target) < 1
 
 
-def test_fit_leaves_locked_degrees_of_freedom_alone(opened):
-    controller = opened()
+def test_fit_leaves_locked_degrees_of_freedom_alone(controller):
     drag(controller, "torso", (4.0, 0.0))
     locked = [
         i for i, n in enumerate(controller.models[0].dof_names) if n.startswith(("left_shoulder", "root", "right"))

@@ -16,8 +16,7 @@ def world_of(controller, point):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("right_m", "up_m"), [(0.02, 0.0), (0.0, 0.01), (-0.01, -0.02)])
-def test_a_nudge_moves_a_joint_parallel_to_the_image(opened, right_m, up_m):
-    controller = opened()
+def test_a_nudge_moves_a_joint_parallel_to_the_image(right_m, up_m, controller):
     drag(controller, LEFT_WRIST, (25.0, -25.0))
     before = world_of(controller, LEFT_WRIST)
     controller.pose_edits.nudge(0, LEFT_WRIST, FRONT, right_m, up_m)
@@ -26,16 +25,14 @@ def test_a_nudge_moves_a_joint_parallel_to_the_image(opened, right_m, up_m):
     np.testing.assert_allclose(moved, [right_m, -up_m, 0.0], atol=0.002)
 
 
-def test_without_a_joint_the_body_moves(opened):
-    controller = opened()
+def test_without_a_joint_the_body_moves(controller):
     before = controller.models[0].points_world(controller.state.poses[0])
     controller.pose_edits.nudge(0, None, FRONT, 0.05, 0.0)
     moved = controller.models[0].points_world(controller.state.poses[0]) - before
     np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 0.05, atol=1e-6)
 
 
-def test_nudges_in_quick_succession_are_one_entry(opened, monkeypatch):
-    controller = opened()
+def test_nudges_in_quick_succession_are_one_entry(monkeypatch, controller):
     for _ in range(5):
         controller.pose_edits.nudge(0, LEFT_WRIST, FRONT, 0.01, 0.0)
     assert controller.state.undo == "nudge left wrist, frame 0"
@@ -48,8 +45,7 @@ def test_nudges_in_quick_succession_are_one_entry(opened, monkeypatch):
     assert controller.state.undo == "nudge left wrist, frame 0"  # another second, another entry
 
 
-def test_a_degree_of_freedom_turns_by_steps_to_its_limit(opened):
-    controller = opened()
+def test_a_degree_of_freedom_turns_by_steps_to_its_limit(controller):
     model = controller.models[0]
     dof = model.dof_names.index("left_elbow.extension")
     controller.pose_edits.turn(0, dof, 0.1)
@@ -60,15 +56,13 @@ def test_a_degree_of_freedom_turns_by_steps_to_its_limit(opened):
     assert controller.state.undo == "nudge left elbow extension, frame 0"
 
 
-def test_the_hand_means_the_frame_that_it_saw(opened):
-    controller = opened()
+def test_the_hand_means_the_frame_that_it_saw(controller):
     controller.pose_edits.turn(0, 3, 0.1, frame=4)
     assert controller.state.frame == 4
     assert controller.state.undo == "nudge torso abduction, frame 4"
 
 
-def test_mirror_and_back(opened):
-    controller = opened()
+def test_mirror_and_back(controller):
     drag(controller, LEFT_WRIST, (25.0, -25.0))
     before = controller.models[0].points_world(controller.state.poses[0])
     controller.pose_edits.mirror(0)
@@ -81,8 +75,7 @@ def test_mirror_and_back(opened):
     assert controller.state.undo == "drag left wrist, frame 0"
 
 
-def test_a_pose_is_copied_and_locks_hold(opened):
-    controller = opened()
+def test_a_pose_is_copied_and_locks_hold(controller):
     drag(controller, LEFT_WRIST, (25.0, -25.0))
     model, source = controller.models[0], controller.state.poses[0]
     controller.navigation.seek(5)
@@ -97,15 +90,13 @@ def test_a_pose_is_copied_and_locks_hold(opened):
     assert controller.state.undo == "copy frame 0, frame 5"
 
 
-def test_there_must_be_a_pose_to_copy(opened):
-    controller = opened()
+def test_there_must_be_a_pose_to_copy(controller):
     with pytest.raises(TrackerError, match="on frame 3 to copy, found none"):
         controller.pose_edits.copy_from(0, 3)
     assert controller.state.people[0].source is None
 
 
-def test_a_limb_is_reset_alone(opened):
-    controller = opened()
+def test_a_limb_is_reset_alone(controller):
     model = controller.models[0]
     drag(controller, LEFT_WRIST, (25.0, -25.0))
     drag(controller, "left_ankle", (15.0, -15.0))
@@ -117,8 +108,7 @@ def test_a_limb_is_reset_alone(opened):
     assert controller.state.undo == "reset left arm, frame 0"
 
 
-def test_nudging_what_is_locked_says_so(opened):
-    controller = opened()
+def test_nudging_what_is_locked_says_so(controller):
     model = controller.models[0]
     controller.dof_locks.set(0, range(model.n_dofs), True)
     with pytest.raises(TrackerError, match="locked"):
@@ -127,8 +117,7 @@ def test_nudging_what_is_locked_says_so(opened):
         controller.pose_edits.turn(0, model.dof_names.index("left_elbow.extension"), 0.1)
 
 
-def test_numbers_can_be_typed_where_the_joint_is_seen(opened):
-    controller = opened()
+def test_numbers_can_be_typed_where_the_joint_is_seen(controller):
     x = controller.models[0].dof_names.index("torso.x")
     before = pixel_of(controller, "torso")
     controller.pose_edits.set_dof(0, x, controller.state.poses[0][x] + 0.1)

@@ -11,8 +11,7 @@ def seen(controller):
     return controller.session_state.saver.record(0, controller.state.frame).settings.get(SEEN, {})
 
 
-def test_the_end_of_a_drag_is_kept_even_out_of_reach(opened):
-    controller = opened()
+def test_the_end_of_a_drag_is_kept_even_out_of_reach(controller):
     start, far = np.array(pixel_of(controller, "left_wrist", 0)), np.array([300.0, -200.0])
     drag(controller, "left_wrist", tuple(far))
     (point, views), *more = seen(controller).items()
@@ -23,8 +22,7 @@ def test_the_end_of_a_drag_is_kept_even_out_of_reach(opened):
     assert np.abs(np.array(pixel_of(controller, "left_wrist", 0)) - start - far).max() > 20  # out of reach
 
 
-def test_each_point_and_view_has_its_last_place(opened):
-    controller = opened()
+def test_each_point_and_view_has_its_last_place(controller):
     for point, step in (("left_wrist", (6.0, -9.0)), ("right_knee", (5.0, 8.0)), ("left_wrist", (-7.0, 4.0))):
         drag(controller, point, step)
     found = seen(controller)
@@ -35,8 +33,7 @@ def test_each_point_and_view_has_its_last_place(opened):
     assert set(seen(controller)) == {"left_wrist"}
 
 
-def test_turning_or_pushing_places_nothing(opened):
-    controller = opened()
+def test_turning_or_pushing_places_nothing(controller):
     drag(controller, "left_wrist", (6.0, -9.0))
     before = seen(controller)
     at = np.array(pixel_of(controller, "right_wrist", 0))
@@ -46,8 +43,7 @@ def test_turning_or_pushing_places_nothing(opened):
     assert seen(controller) == before
 
 
-def test_an_edit_that_is_no_drag_drops_what_it_moves(opened):
-    controller = opened()
+def test_an_edit_that_is_no_drag_drops_what_it_moves(controller):
     for point in ("left_wrist", "right_knee"):
         drag(controller, point, (6.0, -9.0))
     model = controller.session.people[0].model
@@ -58,8 +54,7 @@ def test_an_edit_that_is_no_drag_drops_what_it_moves(opened):
     assert set(seen(controller)) == {"left_wrist", "right_knee"}
 
 
-def test_fits_know_where_points_were_put(opened):
-    controller = opened()
+def test_fits_know_where_points_were_put(controller):
     put = np.add(pixel_of(controller, "left_wrist", 0), (30.0, -20.0))
     drag(controller, "left_wrist", (30.0, -20.0))
     constraints = controller.session_state.fit_constraints(0)

@@ -11,8 +11,7 @@ from tracker.estimation.chamfer.settings import pose_cost
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["left_shoulder.abduction", "torso.x", "torso.twist"])
-def test_it_is_what_the_cost_says_one_by_one(opened, name):
-    controller = opened()
+def test_it_is_what_the_cost_says_one_by_one(name, controller):
     state, models = controller.state, controller.models
     views = controller.frames.evidence(0)
     dof = models[0].dof_names.index(name)
@@ -33,8 +32,7 @@ def test_it_is_what_the_cost_says_one_by_one(opened, name):
     assert found.current_px == pytest.approx(state.cost_px)
 
 
-def test_it_follows_the_pose_while_a_page_looks(opened):
-    controller = opened()
+def test_it_follows_the_pose_while_a_page_looks(controller):
     drag(controller, "torso", (4.0, 0.0))
     assert controller.state.landscape is None  # nobody looks
     controller.cost_landscape.watch(7, True)
@@ -49,8 +47,7 @@ def test_it_follows_the_pose_while_a_page_looks(opened):
     assert controller.state.landscape.current == pytest.approx(0.5)
 
 
-def test_it_begins_with_the_selected_point_and_follows_it(opened):
-    controller = opened()
+def test_it_begins_with_the_selected_point_and_follows_it(controller):
     names = controller.models[0].dof_names
 
     def shown(joint):
@@ -70,8 +67,7 @@ def test_it_begins_with_the_selected_point_and_follows_it(opened):
     shown("right_knee")
 
 
-def test_a_value_is_set_as_an_edit(opened):
-    controller = opened()
+def test_a_value_is_set_as_an_edit(controller):
     dof = controller.models[0].dof_names.index("left_elbow.extension")
     before = controller.state.poses[0][dof]
     controller.cost_landscape.set_value(0, dof, 0.4)

@@ -18,8 +18,7 @@ def dofs_of(controller):
 
 
 @pytest.mark.slow
-def test_it_is_what_the_score_says_one_by_one(opened):
-    controller = opened()
+def test_it_is_what_the_score_says_one_by_one(controller):
     model, pose, dofs = controller.models[0], controller.state.poses[0], dofs_of(controller)
     views, bodies, settings = controller.frames.evidence(0), (PosedBody(model, pose),), controller.state.settings
     found = cost_map(views, bodies, 0, dofs, settings)
@@ -58,8 +57,7 @@ def test_it_follows_the_pose_while_a_page_looks_and_a_place_is_taken(opened):
     assert controller.state.cost_map is before
 
 
-def test_wrong_degrees_of_freedom_are_refused(opened):
-    controller = opened()
+def test_wrong_degrees_of_freedom_are_refused(controller):
     dofs = dofs_of(controller)
     for wrong in ((dofs[0], dofs[0]), (0, 999), (-1, 2)):
         with pytest.raises(TrackerError, match="expected two different degrees of freedom"):

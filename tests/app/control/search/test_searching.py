@@ -24,8 +24,7 @@ def searched(controller, settings=QUICK):
         return controller.replay.runs()[-1]
 
 
-def test_a_stage_ends_where_the_next_begins_and_goes_on_from_there(opened):
-    controller = opened()
+def test_a_stage_ends_where_the_next_begins_and_goes_on_from_there(controller):
     controller.search.set_settings(QUICK)
     ends = []
     for stage in range(2):
@@ -41,8 +40,7 @@ def test_a_stage_ends_where_the_next_begins_and_goes_on_from_there(opened):
     assert len(controller.replay.runs()) == 1
 
 
-def test_the_speed_is_kept_and_a_change_takes_effect_at_once(opened):
-    controller = opened()
+def test_the_speed_is_kept_and_a_change_takes_effect_at_once(controller):
     controller.search.set_settings(QUICK)
     controller.search.set_speed(0.05)  # one expansion in 20 s
     controller.search.run()
@@ -55,8 +53,7 @@ def test_the_speed_is_kept_and_a_change_takes_effect_at_once(opened):
         controller.search.set_speed(0.0)
 
 
-def test_a_replay_shows_every_step_and_changes_nothing(opened):
-    controller = opened()
+def test_a_replay_shows_every_step_and_changes_nothing(controller):
     run = searched(controller)
     true, undo, version = controller.state.people, controller.state.undo, controller.state.timeline_version
     for step in (-1, 0, len(run.steps) // 2, len(run.steps) - 1):
@@ -76,8 +73,7 @@ def test_a_replay_shows_every_step_and_changes_nothing(opened):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["drag", "seek", "step", "undo"])
-def test_whatever_happens_to_the_frame_ends_the_replay(opened, what):
-    controller = opened()
+def test_whatever_happens_to_the_frame_ends_the_replay(what, controller):
     run = searched(controller)
     controller.replay.show(run.number, 0)
     {
@@ -89,8 +85,7 @@ def test_whatever_happens_to_the_frame_ends_the_replay(opened, what):
     assert controller.state.search_view.replay is None
 
 
-def test_a_run_is_compared_with_one_by_other_settings_and_taken_back(opened):
-    controller = opened()
+def test_a_run_is_compared_with_one_by_other_settings_and_taken_back(controller):
     first = searched(controller)
     controller.search.set_settings(TrackSettings(theta_px=8.0, search=QUICK.search))
     controller.search.run_again()
@@ -115,8 +110,7 @@ def test_a_run_is_compared_with_one_by_other_settings_and_taken_back(opened):
     assert [r.number for r in controller.replay.runs()] == [first.number, second.number]
 
 
-def test_a_candidate_is_previewed_and_taken(opened):
-    controller = opened()
+def test_a_candidate_is_previewed_and_taken(controller):
     run = searched(controller)
     costs = [c.px for c in run.candidates]
     assert costs == sorted(costs)
@@ -134,8 +128,7 @@ def test_a_candidate_is_previewed_and_taken(opened):
         controller.replay.take(run.number, 99)
 
 
-def test_locked_dofs_stay_in_a_second_run_and_in_taken_poses(opened):
-    controller = opened()
+def test_locked_dofs_stay_in_a_second_run_and_in_taken_poses(controller):
     model = controller.models[0]
     dof = model.dof_names.index("left_shoulder.abduction")
     run = searched(controller)
@@ -151,8 +144,7 @@ def test_locked_dofs_stay_in_a_second_run_and_in_taken_poses(opened):
     assert all("left_shoulder.abduction" not in s.group.dofs for s in again.stages)
 
 
-def test_stop_ends_a_paused_search(opened):
-    controller = opened()
+def test_stop_ends_a_paused_search(controller):
     controller.search.set_settings(QUICK)
     controller.search.step()
     wait_for(lambda: controller.state.search.evaluations and not controller.state.search.running)
@@ -169,8 +161,7 @@ def test_stop_ends_a_paused_search(opened):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["discarded", "moved", "sizes"])
-def test_a_comparison_ends_with_its_run(opened, what):
-    controller = opened()
+def test_a_comparison_ends_with_its_run(what, controller):
     run = searched(controller)
     controller.replay.compare(run.number)
     controller.replay.preview(run.number, 0)
@@ -208,8 +199,7 @@ def source_of(controller):
 
 
 @pytest.mark.slow
-def test_the_shown_source_is_the_stored_one(opened):
-    controller = opened()
+def test_the_shown_source_is_the_stored_one(controller):
     drag(controller, "torso", (4.0, 0.0))
     controller.search.set_settings(QUICK)
     controller.dof_locks.set(0, [0], True)  # this value stays as it was placed
@@ -226,9 +216,8 @@ def test_the_shown_source_is_the_stored_one(opened):
     assert source_of(controller) == "fitted"
 
 
-def test_contours_are_fitted_chain_by_chain(opened):
+def test_contours_are_fitted_chain_by_chain(controller):
     """The root comes first; every chain is a stage of the replay, and the run is one entry of the history."""
-    controller = opened()
     controller.search.fit_contours(by_chains=True)
     wait_for(lambda: controller.state.search.message)
     with controller.lock:
@@ -242,9 +231,8 @@ def test_contours_are_fitted_chain_by_chain(opened):
     assert controller.state.search_view.replay.stage == stages[1]
 
 
-def test_contours_are_fitted_iteration_by_iteration(opened):
+def test_contours_are_fitted_iteration_by_iteration(controller):
     """Each iteration lowers the distance of the contours, and is replayed with the contours at the start beside it."""
-    controller = opened()
     controller.search.fit_contours()
     wait_for(lambda: controller.state.search.message)
     with controller.lock:
@@ -266,8 +254,7 @@ def test_contours_are_fitted_iteration_by_iteration(opened):
 
 
 @pytest.mark.slow
-def test_a_search_that_is_forgotten_leaves_nothing_to_the_collector_of_cycles(opened):
-    controller = opened()
+def test_a_search_that_is_forgotten_leaves_nothing_to_the_collector_of_cycles(controller):
     controller.search.set_settings(QUICK)
     gc.collect()
     gc.disable()

@@ -23,8 +23,7 @@ def planned(controller, frames="0,5,9"):
     return controller.annotating
 
 
-def test_a_plan_goes_from_draft_to_verified_and_a_verdict_changes_no_pose(opened):
-    controller = opened()
+def test_a_plan_goes_from_draft_to_verified_and_a_verdict_changes_no_pose(controller):
     annotating = planned(controller)
     assert states(controller) == [(0, "draft", ""), (5, "draft", ""), (9, "draft", "")]
     move(controller)
@@ -42,8 +41,7 @@ def test_a_plan_goes_from_draft_to_verified_and_a_verdict_changes_no_pose(opened
     assert [frame for frame, *_ in states(controller)] == [0, 9]
 
 
-def test_a_verified_pose_that_is_no_keyframe_is_reviewed_and_undo_takes_the_mark_back(opened):
-    controller = opened()
+def test_a_verified_pose_that_is_no_keyframe_is_reviewed_and_undo_takes_the_mark_back(controller):
     move(controller)
     controller.ranges.mark(0, 0, "none")
     annotating = planned(controller)
@@ -57,8 +55,7 @@ def test_a_verified_pose_that_is_no_keyframe_is_reviewed_and_undo_takes_the_mark
     assert not controller.stored_poses.timeline()[0]["reviewed"]
 
 
-def test_impossible_plans_and_decisions_are_refused(opened):
-    controller = opened()
+def test_impossible_plans_and_decisions_are_refused(controller):
     annotating = planned(controller)
     with pytest.raises(TrackerError, match="all of them are planned already"):
         planned(controller)
@@ -74,8 +71,7 @@ def test_impossible_plans_and_decisions_are_refused(opened):
         annotating.comment(0, 0, 99, "x")
 
 
-def test_comments_and_speeds_are_in_the_state(opened):
-    controller = opened()
+def test_comments_and_speeds_are_in_the_state(controller):
     annotating = planned(controller)
     move(controller)
     annotating.comment(0, 0, 0, "hidden")
@@ -93,8 +89,7 @@ def test_the_plan_is_there_after_a_restart(opened):
     wait_for(lambda: len(controller.state.annotation.tasks) == 3)
 
 
-def test_the_next_click_needs_poses_and_then_follows_the_error(opened):
-    controller = opened()
+def test_the_next_click_needs_poses_and_then_follows_the_error(controller):
     controller.proposing.start()
     wait_for(lambda: controller.state.annotation.proposed.number == 1)
     proposed = controller.state.annotation.proposed
@@ -110,8 +105,7 @@ def test_the_next_click_needs_poses_and_then_follows_the_error(opened):
     wait_for(lambda: controller.state.annotation.proposed.after_mm is not None)
 
 
-def test_decisions_of_others_are_seen_with_the_next_change(opened):
-    controller = opened()
+def test_decisions_of_others_are_seen_with_the_next_change(controller):
     planned(controller)
     move(controller)
     store = controller.session_state.saver.store

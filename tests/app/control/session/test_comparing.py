@@ -23,8 +23,7 @@ CONTOURS = View(frozenset({"contours"}), (1, 1, 1, 1), False)
 
 
 @pytest.fixture
-def fitted(opened):
-    controller = opened()
+def fitted(controller):
     drag(controller, "left_wrist", (20.0, 5.0))
     before = controller.state
     controller.pinning.fit(0)
@@ -93,8 +92,7 @@ def test_a_comparison_is_back_with_its_result(fitted):
     assert controller.state.compared is noted
 
 
-def test_a_search_is_compared_with_its_start(opened):
-    controller = opened()
+def test_a_search_is_compared_with_its_start(controller):
     before = controller.state
     controller.search.set_settings(QUICK)
     controller.search.step()
@@ -136,9 +134,8 @@ def test_a_fit_that_leaves_a_pin_is_reported(fitted):
         assert (left is not None and left[:2] == (0, "right wrist") and 0.1 < left[2] < 1.0) == is_left
 
 
-def test_a_joint_is_measured_from_where_it_was_put_and_not_from_where_later_drags_took_it(opened):
+def test_a_joint_is_measured_from_where_it_was_put_and_not_from_where_later_drags_took_it(controller):
     """The elbow that the trunk carried away comes back to its place: nothing is left behind."""
-    controller = opened()
     session_state, model = controller.session_state, controller.models[0]
     drag(controller, "left_elbow", (8.0, 0.0))
     put = controller.state.poses[0]
@@ -189,8 +186,7 @@ def test_costs_that_disagree_are_reported(fitted):
         assert (words in warning) if words else warning == ""
 
 
-def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(opened):
-    controller = opened()
+def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(controller):
     session_state, model = controller.session_state, controller.models[0]
     bent = np.array(controller.state.poses[0])
     bent[model.value_names.index("right_shoulder.abduction")] += 0.2

@@ -26,9 +26,8 @@ def full_disk():
 
 
 @pytest.fixture
-def edited(opened):
+def edited(controller):
     """A controller with five edits on as many frames."""
-    controller = opened()
     for frame in range(5):
         controller.navigation.seek(frame)
         drag(controller, "torso", (5.0 + frame, 0.0))

@@ -19,9 +19,8 @@ RAISED_RAD = 0.4
 
 
 @pytest.fixture
-def both(session, opened, tmp_path):
+def both(session, tmp_path, controller):
     """A controller with keyframes on frames 0 and 1, and the folder of ben's copy, where an arm on frame 1 differs."""
-    controller = opened()
     for frame in (0, 1):
         controller.navigation.seek(frame)
         drag(controller, "torso", (4.0, 0.0))

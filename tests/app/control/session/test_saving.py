@@ -179,8 +179,7 @@ def test_frames_that_a_tracker_has_not_written_yet_are_not_saved(placed, tracker
     assert disk.wrong == []
 
 
-def test_an_edit_that_fails_is_not_saved_until_it_is_written(opened, monkeypatch):
-    controller = opened()
+def test_an_edit_that_fails_is_not_saved_until_it_is_written(monkeypatch, controller):
 
     def full(*_, **__):
         raise SessionError("the disk is full; make room")
@@ -197,8 +196,7 @@ def test_an_edit_that_fails_is_not_saved_until_it_is_written(opened, monkeypatch
     assert disk.wrong == []
 
 
-def test_an_edit_is_kept_while_the_store_can_neither_be_read_nor_written(opened, session, monkeypatch):
-    controller = opened()
+def test_an_edit_is_kept_while_the_store_can_neither_be_read_nor_written(session, monkeypatch, controller):
     drag(controller, "torso", (10.0, 0.0))
 
     def gone(*_, **__):

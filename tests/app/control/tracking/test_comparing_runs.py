@@ -28,9 +28,8 @@ def written(controller, method, turned, status):
 
 
 @pytest.fixture
-def twice(opened):
+def twice(controller):
     """A controller whose range was tracked by two methods, and the poses of both."""
-    controller = opened()
     return controller, written(controller, "chamfer", 0.5, "lost"), written(controller, "contour", 0.8, "good")
 
 
@@ -75,8 +74,7 @@ def test_marks_do_not_count_and_keyframes_stay(twice):
     np.testing.assert_array_equal(controller.stored_poses.on_frame(5)[0].values, before)
 
 
-def test_frames_without_former_poses_are_refused_with_a_reason(opened):
-    controller = opened()
+def test_frames_without_former_poses_are_refused_with_a_reason(controller):
     written(controller, "chamfer", 0.5, "good")
     with pytest.raises(TrackerError, match="frames among 3 to 6 whose pose replaced another, found none"):
         controller.comparing_runs.compare(3, 6)
@@ -112,8 +110,7 @@ def test_a_run_tells_gain_and_harm_and_a_stretch_is_taken_back(twice):
     np.testing.assert_array_equal(controller.stored_poses.on_frame(6)[0].values, after)
 
 
-def test_a_run_over_frames_without_poses_and_keyframes_is_not_compared(opened):
-    controller = opened()
+def test_a_run_over_frames_without_poses_and_keyframes_is_not_compared(controller):
     written(controller, "chamfer", 0.5, "lost")
     controller.comparing_runs._work(RANGE)
     assert controller.state.range_comparison is None

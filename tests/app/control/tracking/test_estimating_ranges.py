@@ -47,9 +47,8 @@ def held(monkeypatch):
 
 
 @pytest.fixture
-def corrected(opened):
+def corrected(controller):
     """A controller whose body is tracked on some frames, one of which is a keyframe by now."""
-    controller = opened()
     put(controller, FRAMES)
     controller.ranges.mark(CORRECTED, CORRECTED, "keyframe")
     return controller

@@ -58,8 +58,7 @@ def begun(controller):
     wait_for(lambda: controller.state.finding.share > 0)
 
 
-def test_one_entry_holds_poses_sizes_and_tracks(opened, found, tracked):
-    controller = opened()
+def test_one_entry_holds_poses_sizes_and_tracks(found, tracked, controller):
     before = controller.models[0].height_m
     begun(controller)
     assert controller.state.finding.stage == "finding first poses"
@@ -94,8 +93,7 @@ def acquired(monkeypatch):
     return go
 
 
-def test_acquired_sizes_belong_to_the_same_entry(opened, found, acquired, tracked):
-    controller = opened()
+def test_acquired_sizes_belong_to_the_same_entry(found, acquired, tracked, controller):
     before = controller.models[0].height_m
     found.set()
     acquired.set()
@@ -114,8 +112,7 @@ def test_acquired_sizes_belong_to_the_same_entry(opened, found, acquired, tracke
     assert controller.session.people[0].model.height_m == pytest.approx(1.05 * 1.1 * before)
 
 
-def test_a_pose_that_was_changed_while_sizes_are_acquired_wins(opened, found, acquired, tracked):
-    controller = opened()
+def test_a_pose_that_was_changed_while_sizes_are_acquired_wins(found, acquired, tracked, controller):
     before = controller.models[0].height_m
     found.set()
     controller.finding.start()
@@ -145,8 +142,7 @@ def test_the_axes_of_the_silhouettes_are_shown_and_kept(opened, found, tracked):
     assert axes.people == (((10.0, 20.0, 30.0, 40.0), (11.0, 20.0, 29.0, 40.0)),)
 
 
-def test_a_stop_changes_nothing(opened, found, tracked):
-    controller = opened()
+def test_a_stop_changes_nothing(found, tracked, controller):
     begun(controller)
     stopper = threading.Thread(target=controller.finding.stop)
     stopper.start()
@@ -158,8 +154,7 @@ def test_a_stop_changes_nothing(opened, found, tracked):
 
 
 @pytest.mark.slow
-def test_a_person_who_was_placed_meanwhile_wins(opened, found, tracked):
-    controller = opened()
+def test_a_person_who_was_placed_meanwhile_wins(found, tracked, controller):
     begun(controller)
     drag(controller, "left_wrist", (6.0, -9.0))
     found.set()
@@ -170,8 +165,7 @@ def test_a_person_who_was_placed_meanwhile_wins(opened, found, tracked):
     assert tracked == []
 
 
-def test_one_at_a_time_and_only_where_somebody_is_missing(opened, found, tracked):
-    controller = opened()
+def test_one_at_a_time_and_only_where_somebody_is_missing(found, tracked, controller):
     begun(controller)
     with pytest.raises(TrackerError, match="no other search for people"):
         controller.finding.start()

@@ -14,9 +14,8 @@ KEY = 10
 
 
 @pytest.fixture
-def steady(opened):
+def steady(controller):
     """A person who moves steadily on frames 0 to 20; frame 10 is a keyframe."""
-    controller = opened()
     saver, model = controller.session_state.saver, controller.session.people[0].model
     pose = np.array(controller.state.poses[0])
     revision = saver.revisions.current(0)

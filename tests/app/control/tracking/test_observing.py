@@ -20,12 +20,8 @@ from tracker.pipeline import chain
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import load_session
 
+pytestmark = pytest.mark.usefixtures("film_once")
 VIEW = View(frozenset(("imported",)), (1, 1, 1, 1))
-
-
-@pytest.fixture
-def controller(opened, film_once):
-    return opened()
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, stored
+from command_line import SAMPLE, output_of, stored
 from gestures import drag, wait_for
 
 from app.drawing.curves import plots_of, samples
@@ -44,8 +44,7 @@ def shown(controller, frame):
 @pytest.mark.parametrize("words", [(), ("--paper",), ("--cameras", "RIGHT", "BACK", "LEFT")])
 def test_each_place_has_the_same_cost_of_a_tracked_pose(run, session, opened, tmp_path, words):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    status, out, _ = run("track", session, "--frames", f"0:{len(FRAMES)}", *words, "--json")
-    assert status == 0
+    out = output_of(run("track", session, "--frames", f"0:{len(FRAMES)}", *words, "--json"))
     table, records, controller = exported(run, session, tmp_path), stored(session), opened()
     top = {k: shown(controller, k) for k in FRAMES}
     rows = {k: [r.cost_px, *r.view_costs_px] for k, r in records.items()}
@@ -59,8 +58,7 @@ def test_each_place_has_the_same_cost_of_a_tracked_pose(run, session, opened, tm
     assert json.loads(out)["mean_cost_px"] == pytest.approx(np.mean([top[k][0] for k in FRAMES[1:]]), abs=0.01)
 
 
-def test_edits_searches_and_replays_end_at_the_cost_of_the_pose(opened):
-    controller = opened()
+def test_edits_searches_and_replays_end_at_the_cost_of_the_pose(controller):
     drag(controller, "left_wrist", (9.0, 0.0))
     dragged = shown(controller, 0)
     controller.search.set_settings(QUICK)

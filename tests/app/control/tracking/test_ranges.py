@@ -11,9 +11,8 @@ from tracker.session.store.annotation_store import AnnotationStore
 
 
 @pytest.fixture
-def two_keys(opened):
+def two_keys(controller):
     """A controller whose body stands on frames 2 and 12."""
-    controller = opened()
     controller.navigation.seek(2)
     drag(controller, "torso", (4.0, 0.0))
     controller.navigation.seek(12)

@@ -132,8 +132,7 @@ def test_a_drag_goes_first(doubted):
     wait_for(lambda: doubted.state.reason is not None, 120)
 
 
-def test_without_a_run_a_sentence_says_what_to_do(opened):
-    controller = opened()
+def test_without_a_run_a_sentence_says_what_to_do(controller):
     controller.reasons.watch(PAGE, True)
     wait_for(lambda: controller.state.reasons.message != "")
     assert controller.state.reasons.message.startswith("Expected a pose of person on frame 0, found none")

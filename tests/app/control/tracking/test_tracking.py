@@ -317,8 +317,7 @@ def test_a_run_writes_no_more_often_than_it_should(placed, tracker, monkeypatch)
     assert len(written) <= 2 + (time.monotonic() - began) / 0.5
 
 
-def test_an_impossible_run_has_a_sentence(opened, tracker):
-    controller = opened()
+def test_an_impossible_run_has_a_sentence(tracker, controller):
     with pytest.raises(TrackerError, match="pose the body"):
         controller.tracking.start(backward=False, until=None)
     drag(controller, "torso", (4.0, 0.0))

@@ -46,8 +46,7 @@ def click_all(controller, places, **options):
         click(controller, place, **options)
 
 
-def test_three_points_in_two_views_give_the_plane(opened):
-    controller = opened()
+def test_three_points_in_two_views_give_the_plane(controller):
     click_all(controller, corners())
     plane = controller.state.floor.picking.plane
     assert plane.normal == pytest.approx(TILT[:, 2], abs=1e-6)
@@ -91,8 +90,7 @@ def test_applied_it_is_kept_turns_who_stands_and_can_be_gone_back_from(opened, s
     assert load_session(session).floor.offset_m == pytest.approx(HEIGHT_M, abs=1e-6)
 
 
-def test_it_is_set_from_the_feet_and_says_so(opened, monkeypatch):
-    controller = opened()
+def test_it_is_set_from_the_feet_and_says_so(monkeypatch, controller):
     with pytest.raises(TrackerError, match="expected poses whose feet show the floor, found none"):
         do(controller, "from_feet")
     found = FeetFloor(GroundPlane(TILT[:, 2], HEIGHT_M), 0.004, 0.31, 12)
@@ -106,8 +104,7 @@ def test_it_is_set_from_the_feet_and_says_so(opened, monkeypatch):
     assert controller.state.floor.plane is None
 
 
-def test_taking_back_goes_through_all_marks(opened):
-    controller = opened()
+def test_taking_back_goes_through_all_marks(controller):
     click_all(controller, corners()[:2])
     for expected in ((2, 1), (2, 0), (1, 1), (1, 0), (1, 0)):
         do(controller, "take_back")
@@ -115,8 +112,7 @@ def test_taking_back_goes_through_all_marks(opened):
         assert (told.point, told.views) == expected
 
 
-def test_a_second_click_in_a_view_takes_the_place_of_the_first(opened):
-    controller = opened()
+def test_a_second_click_in_a_view_takes_the_place_of_the_first(controller):
     do(controller, "begin")
     do(controller, "mark", camera=0, u=3.0, v=4.0)
     click(controller, corners()[0])
@@ -124,8 +120,7 @@ def test_a_second_click_in_a_view_takes_the_place_of_the_first(opened):
     assert controller.state.floor.picking.picks[0].point_world == pytest.approx(corners()[0], abs=1e-6)
 
 
-def test_an_impossible_request_has_a_sentence(opened):
-    controller = opened()
+def test_an_impossible_request_has_a_sentence(controller):
     do(controller, "begin")
     do(controller, "mark", camera=0, u=3.0, v=4.0)
     with pytest.raises(TrackerError, match="second view"):
@@ -142,8 +137,7 @@ def test_an_impossible_request_has_a_sentence(opened):
     assert controller.state.floor.plane is None
 
 
-def test_three_points_on_a_line_are_no_floor(opened):
-    controller = opened()
+def test_three_points_on_a_line_are_no_floor(controller):
     click_all(controller, [[-0.8, 0, 0], [0.1, 0.01, 0], [0.9, 0, 0]])
     told = state_message(controller.session, controller.state).floor
     assert not told.ready
@@ -152,8 +146,7 @@ def test_three_points_on_a_line_are_no_floor(opened):
         do(controller, "apply")
 
 
-def test_the_views_show_lines_of_sight_and_the_plane(opened):
-    controller = opened()
+def test_the_views_show_lines_of_sight_and_the_plane(controller):
     session = controller.session
     do(controller, "begin")
     click(controller, corners()[0], cameras=(0,))

@@ -60,9 +60,8 @@ def lengths(body):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [pytest.param(3, marks=pytest.mark.slow), 4])
-def test_lengths_and_girths_of_another_body_are_found(seed):
+def test_lengths_and_girths_of_another_body_are_found(seed, model):
     person = other_body(seed=seed)
-    model = load_model("gavrila22", 1.7)
     parameters = SizeParameters(model)
     frames = sighted(person, model, range(5), placed=True)
     found = fit_sizes_to_contours(parameters, frames, SizeFitSettings())
@@ -92,18 +91,16 @@ def test_a_stated_height_is_kept_against_contours_of_another():
 
 
 @pytest.mark.slow
-def test_an_own_body_stays_as_it_is():
+def test_an_own_body_stays_as_it_is(model):
     """Contours of the very body, from poses that are off: nothing makes the sizes differ."""
-    model = load_model("gavrila22", 1.7)
     found = fit_sizes_to_contours(SizeParameters(model), sighted(model, model, range(4)), SizeFitSettings())
     assert found.body.height_m == pytest.approx(1.7, rel=0.01)
     assert np.abs(thicknesses(found.body) / thicknesses(model) - 1).max() < 0.03
 
 
 @pytest.mark.slow
-def test_the_time_of_a_late_view_is_heeded():
+def test_the_time_of_a_late_view_is_heeded(model):
     """One of four views shows the body half a frame later: with its velocity the poses come out better."""
-    model = load_model("gavrila22", 1.7)
     speed = np.where(model.dof_is_length, 0.06, 0.12) * np.sign(np.sin(np.arange(model.n_dofs)))
     settings, off = SizeFitSettings(rounds=(Round(("height",), 1.0),)), {}
     for known in (speed, None):
@@ -122,8 +119,7 @@ def test_the_time_of_a_late_view_is_heeded():
     assert off[False] < 0.7 * off[True]
 
 
-def test_frames_whose_errors_are_alike_count_as_fewer():
-    model = load_model("gavrila22", 1.7)
+def test_frames_whose_errors_are_alike_count_as_fewer(model):
     parameters, frame = SizeParameters(model), sighted(model, model, [0])[0]
     kinds = ("height", "build", "length", "girth")
 
@@ -136,8 +132,7 @@ def test_frames_whose_errors_are_alike_count_as_fewer():
     assert height_sigma(4, 0.0) < height_sigma(4, 0.3) < alone
 
 
-def test_unseen_parts_stay_as_uncertain_as_before():
-    model = load_model("gavrila22", 1.7)
+def test_unseen_parts_stay_as_uncertain_as_before(model):
     parameters = SizeParameters(model)
     nothing = [f._replace(views=()) for f in sighted(model, model, range(2))]
     found = fit_sizes_to_contours(parameters, nothing, SizeFitSettings())
@@ -154,8 +149,7 @@ def test_only_the_kinds_of_a_round_change():
     assert np.flatnonzero(found.sizes).tolist() == [parameters.names.index("height")]
 
 
-def test_the_fit_can_be_stopped():
-    model = load_model("gavrila22", 1.7)
+def test_the_fit_can_be_stopped(model):
 
     def stop(share):
         if share > 0:

@@ -15,7 +15,7 @@ from tracker.estimation.acquisition.size_fit import SightedPerson
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.acquisition.two_views import MAX_OFF_RAD, TwoViewSettings, acquire_from_two_views, choose_views
 from tracker.evidence.contours import occluding_contours
-from tracker.formats.model_toml import load_model, parse_model
+from tracker.formats.model_toml import parse_model
 
 ROUND = [camera_at(name, (4 * np.cos(a), 4 * np.sin(a), 0.3))
          for name, a in (("front", 0.1), ("side", np.pi / 2 - 0.05), ("oblique", np.pi / 4))]  # fmt: skip
@@ -68,8 +68,7 @@ def test_a_known_superquadric_is_found():
 
 
 @pytest.mark.slow
-def test_the_girths_of_another_person_are_found():
-    model = load_model("gavrila22", 1.7)
+def test_the_girths_of_another_person_are_found(model):
     parameters = SizeParameters(model)
     sizes = np.random.default_rng(5).normal(size=len(parameters.names)) * parameters.sigmas
     sizes[~parameters.of_kinds("girth")] = 0.0
@@ -86,8 +85,7 @@ def test_the_girths_of_another_person_are_found():
     np.testing.assert_allclose(body.points_world(pose), model.points_world(pose))  # joints stay
 
 
-def test_contours_are_back_projected_to_where_they_arise():
-    model = load_model("gavrila22", 1.7)
+def test_contours_are_back_projected_to_where_they_arise(model):
     body = PosedBody(model, in_posture(model))
     contour = occluding_contours.trace([body], ROUND[0])
     for name in ("head", "left_thigh"):
@@ -98,8 +96,7 @@ def test_contours_are_back_projected_to_where_they_arise():
         np.testing.assert_allclose(ROUND[0].project(points), ROUND[0].project(contour.points_world[own]), atol=1e-3)
 
 
-def test_contours_are_back_projected_at_the_time_of_their_picture():
-    model = load_model("gavrila22", 1.7)
+def test_contours_are_back_projected_at_the_time_of_their_picture(model):
     step = np.zeros(model.n_dofs)
     step[:3] = 0.3, -0.2, 0.1
     body = PosedBody(model, in_posture(model), step)
@@ -113,8 +110,7 @@ def test_contours_are_back_projected_at_the_time_of_their_picture():
         np.testing.assert_allclose(a.points_world, b.points_world)
 
 
-def test_points_belong_to_the_part_that_explains_them():
-    model = load_model("gavrila22", 1.7)
+def test_points_belong_to_the_part_that_explains_them(model):
     body = PosedBody(model, in_posture(model))
     (view,) = own_evidence([body], ROUND[:1])
     points, _ = explained_points(view, [body])
@@ -143,8 +139,7 @@ def turned(model, radians):
     return (PosedBody(model, pose),)
 
 
-def test_views_are_chosen_by_the_heading():
-    model = load_model("gavrila22", 1.7)
+def test_views_are_chosen_by_the_heading(model):
     bodies = {4: turned(model, np.pi / 4), 7: turned(model, 0.0)}
     found = choose_views(ROUND, bodies, 0)
     assert found[:3] == (7, 0, 1)
@@ -154,8 +149,7 @@ def test_views_are_chosen_by_the_heading():
     assert choose_views(ROUND, bodies, 0, ("front", "side"))[:3] == (7, 0, 1)
 
 
-def test_views_that_are_not_near_orthogonal_are_refused():
-    model = load_model("gavrila22", 1.7)
+def test_views_that_are_not_near_orthogonal_are_refused(model):
     upright = {0: turned(model, 0.0)}
     with pytest.raises(TrackerError, match="front and oblique show the person"):
         choose_views(ROUND, upright, 0, ("front", "oblique"))
@@ -179,8 +173,7 @@ class _Staged:
         return self._views
 
 
-def test_an_acquisition_names_its_frame_and_views():
-    model = load_model("gavrila22", 1.7)
+def test_an_acquisition_names_its_frame_and_views(model):
     pose, stages = in_posture(model), []
     settings = TwoViewSettings(search=ChamferSearchSettings(levels=1, passes=1))
     bodies = {3: (PosedBody(model, pose),)}

@@ -51,6 +51,11 @@ def poses(session):
     return [PosedBody(model, model.retract(model.neutral(), move)) for move in moves]
 
 
+@pytest.fixture
+def bodies(session):
+    return poses(session)
+
+
 def observed(session, bodies, offset=OFFSET):
     """Points of a detector that is off by the same vector in the world; the bodies hardly turn."""
     names = BODY_25.points
@@ -154,10 +159,9 @@ def test_untouched_files_leave_as_they_came(session, tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", ["trc", "trc utf-16", "csv", "c3d"])
-def test_a_mended_frame_alone_differs_in_space(session, tmp_path, kind):
+def test_a_mended_frame_alone_differs_in_space(session, tmp_path, kind, bodies):
     if kind in NEEDS:
         pytest.importorskip(NEEDS[kind])
-    bodies = poses(session)
     truth = observed(session, bodies)
     wrong = truth.copy()
     wrong[EDITED] += 0.2
@@ -184,8 +188,7 @@ def test_a_mended_frame_alone_differs_in_space(session, tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", ["openpose", "trc"])
-def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind):
-    bodies = poses(session)
+def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind, bodies):
     path, _ = write_kind(kind, session, tmp_path, observed(session, bodies) + 0.2)
     store(session, bodies, joints=("left_elbow", "right_hip"))
     done = export_like(session, imported(session, path), tmp_path / f"back{path.suffix}", learn_offsets=False)
@@ -200,8 +203,7 @@ def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind):
 
 
 @pytest.mark.parametrize("learn", [True, False])
-def test_offsets_are_learnt_or_plain(session, tmp_path, learn):
-    bodies = poses(session)
+def test_offsets_are_learnt_or_plain(session, tmp_path, learn, bodies):
     truth = observed(session, bodies)
     write_trc(tmp_path / "a.trc", BODY_25.points, truth, 30.0)
     store(session, bodies)
@@ -212,8 +214,7 @@ def test_offsets_are_learnt_or_plain(session, tmp_path, learn):
 
 
 @pytest.mark.parametrize("kind", ["openpose", "dlc csv", "dlc multi"])
-def test_a_mended_frame_alone_differs_in_pictures(session, tmp_path, kind):
-    bodies = poses(session)
+def test_a_mended_frame_alone_differs_in_pictures(session, tmp_path, kind, bodies):
     truth = observed(session, bodies, np.zeros(3))
     path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
     store(session, bodies)
@@ -255,9 +256,8 @@ def numbers_of(path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [*SUFFIXES])
-def test_mended_points_of_hdf5_alone_differ(session, tmp_path, kind):
+def test_mended_points_of_hdf5_alone_differ(session, tmp_path, kind, bodies):
     pytest.importorskip(NEEDS[kind])
-    bodies = poses(session)
     truth = observed(session, bodies, np.zeros(3))
     path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
     store(session, bodies, joints=("left_hip",))
@@ -368,8 +368,7 @@ def test_points_of_other_hdf5_files_are_not_replaced(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])
-def test_mended_points_of_coco_alone_differ(session, tmp_path, kind):
-    bodies = poses(session)
+def test_mended_points_of_coco_alone_differ(session, tmp_path, kind, bodies):
     truth = observed(session, bodies, np.zeros(3))
     path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
     store(session, bodies, joints=("left_hip",))
@@ -395,8 +394,7 @@ def test_mended_points_of_coco_alone_differ(session, tmp_path, kind):
         assert new[knee, 2] == (2 if kind == "coco cameras" else 1)  # a flag, or a confidence
 
 
-def test_mended_points_of_alphapose_alone_differ(session, tmp_path):
-    bodies = poses(session)
+def test_mended_points_of_alphapose_alone_differ(session, tmp_path, bodies):
     write_alphapose(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
     store(session, bodies)
     export_like(session, imported(session, tmp_path / "f"), tmp_path / "back")
@@ -407,8 +405,7 @@ def test_mended_points_of_alphapose_alone_differ(session, tmp_path):
         assert before[EDITED] | {"keypoints": []} == after[EDITED] | {"keypoints": []}
 
 
-def test_other_columns_of_a_table_stay(session, tmp_path):
-    bodies = poses(session)
+def test_other_columns_of_a_table_stay(session, tmp_path, bodies):
     write_eks(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
     store(session, bodies)
     export_like(session, imported(session, tmp_path / "f"), tmp_path / "back")
@@ -420,8 +417,7 @@ def test_other_columns_of_a_table_stay(session, tmp_path):
     assert changed == {"x", "y", "likelihood"}
 
 
-def test_several_files_of_one_picture_are_not_sent_back(session, tmp_path):
-    bodies = poses(session)
+def test_several_files_of_one_picture_are_not_sent_back(session, tmp_path, bodies):
     write_openpose(tmp_path / "k", session.camera_names, seen(session, [observed(session, bodies)]))
     for path in [*(tmp_path / "k").rglob("*.json")]:
         path.with_name(path.name.replace("keypoints", "person2")).write_text('{"people": []}')
@@ -430,8 +426,7 @@ def test_several_files_of_one_picture_are_not_sent_back(session, tmp_path):
         export_like(session, imported(session, tmp_path / "k"), tmp_path / "back")
 
 
-def test_programs_to_which_nothing_is_sent_back(session, tmp_path):
-    bodies = poses(session)
+def test_programs_to_which_nothing_is_sent_back(session, tmp_path, bodies):
     write_sleap_csv(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
     found = imported(session, tmp_path / "f")
     export_like(session, found, tmp_path / "untouched")
@@ -442,8 +437,7 @@ def test_programs_to_which_nothing_is_sent_back(session, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])
-def test_a_person_is_added_to_coco_and_read_again(session, tmp_path, kind):
-    bodies = poses(session)
+def test_a_person_is_added_to_coco_and_read_again(session, tmp_path, kind, bodies):
     path, _ = write_kind(kind, session, tmp_path, observed(session, bodies, np.zeros(3)))
     data = json.loads(path.read_text())
     missing = next(a for a in data["annotations"] if a["image_id"] == N + EDITED + 1)  # the second camera
@@ -459,8 +453,7 @@ def test_a_person_is_added_to_coco_and_read_again(session, tmp_path, kind):
     assert added["id"] > max(a["id"] for a in data["annotations"])
 
 
-def test_a_count_of_points_follows_those_that_are_gone(session, tmp_path):
-    bodies = poses(session)
+def test_a_count_of_points_follows_those_that_are_gone(session, tmp_path, bodies):
     path, _ = write_kind("coco cameras", session, tmp_path, observed(session, bodies, np.zeros(3)))
     data = json.loads(path.read_text())
     for annotation in data["annotations"]:
@@ -476,8 +469,7 @@ def test_a_count_of_points_follows_those_that_are_gone(session, tmp_path):
     assert gone["num_keypoints"] == sum(v > 0 for v in gone["keypoints"][2::3]) < 25
 
 
-def test_a_person_who_was_not_found_is_added(session, tmp_path):
-    bodies = poses(session)
+def test_a_person_who_was_not_found_is_added(session, tmp_path, bodies):
     points = seen(session, [observed(session, bodies, np.zeros(3))])
     points[EDITED, 1] = (np.nan, np.nan, 0)
     path = write_openpose(tmp_path / "k", session.camera_names, points)
@@ -488,8 +480,7 @@ def test_a_person_who_was_not_found_is_added(session, tmp_path):
     assert np.isnan(person.points[0]).tolist() == [True, True, False]  # the nose is no joint of the body
 
 
-def test_nobody_is_added_who_is_not_in_the_picture(session, tmp_path):
-    bodies = poses(session)
+def test_nobody_is_added_who_is_not_in_the_picture(session, tmp_path, bodies):
     points = seen(session, [observed(session, bodies, np.zeros(3))])
     points[EDITED, 1] = (np.nan, np.nan, 0)
     path = write_openpose(tmp_path / "k", session.camera_names, points)
@@ -501,16 +492,14 @@ def test_nobody_is_added_who_is_not_in_the_picture(session, tmp_path):
     assert read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json") == []
 
 
-def test_all_poses(session, tmp_path):
-    bodies = poses(session)
+def test_all_poses(session, tmp_path, bodies):
     write_trc(tmp_path / "a.trc", BODY_25.points, observed(session, bodies), 30.0)
     store(session, bodies)
     done = export_like(session, imported(session, tmp_path / "a.trc"), tmp_path / "b.trc", poses="all")
     assert done.frames == tuple(range(N))
 
 
-def test_choices_of_the_import_hold_on_the_way_back(session, tmp_path):
-    bodies = poses(session)
+def test_choices_of_the_import_hold_on_the_way_back(session, tmp_path, bodies):
     truth = observed(session, bodies, np.zeros(3))
     half = seen(session, [truth]) * [0.5, 0.5, 1] - [0.25, 0.25, 0]
     path = write_openpose(tmp_path / "k", session.camera_names, half[2:])
@@ -522,8 +511,7 @@ def test_choices_of_the_import_hold_on_the_way_back(session, tmp_path):
     assert np.abs(one[:, :2] - other[:, :2]).max() < 0.01
 
 
-def test_axes_and_units_of_the_file(session, tmp_path):
-    bodies = poses(session)
+def test_axes_and_units_of_the_file(session, tmp_path, bodies):
     truth = observed(session, bodies)
     turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # y of the file points up
     write_trc(tmp_path / "a.trc", BODY_25.points, truth @ turn.T, 30.0, units="mm")
@@ -555,8 +543,7 @@ def test_folders_of_equal_names_stay_apart(session, tmp_path):
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
-def test_a_mark_of_the_byte_order_stays(session, tmp_path, encoding):
-    bodies = poses(session)
+def test_a_mark_of_the_byte_order_stays(session, tmp_path, encoding, bodies):
     path, _ = write_kind("openpose", session, tmp_path, observed(session, bodies))
     for file in path.rglob("*.json"):
         file.write_text(file.read_text(), encoding=encoding)
@@ -588,9 +575,8 @@ def test_each_person_has_the_rows_of_their_own_file(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["people", "semicolon", "deeplabcut", "c3d", "easymocap"])
-def test_points_of_other_layouts_are_not_written_back(tmp_path, kind):
+def test_points_of_other_layouts_are_not_written_back(tmp_path, kind, bodies):
     session = make_session(tmp_path / "s", N, people=("ann",))
-    bodies = poses(session)
     truth = observed(session, bodies)
     path = write_joints(kind, tmp_path, BODY_25.points, np.stack([truth, truth][: 1 + (kind in ("people", "c3d"))]))
     observations = imported(session, path, unit_m=1.0)
