@@ -155,8 +155,9 @@ def tracker(monkeypatch):
 
 
 @pytest.fixture
-def placed(tracker, controller):
+def placed(opened, tracker):
     """A controller whose body stands on frame 2."""
+    controller = opened()
     controller.navigation.seek(2)
     drag(controller, "torso", (4.0, 0.0))
     yield controller

@@ -179,12 +179,12 @@ def _tracked(recording: Recording, session: Path) -> dict[str, Result]:
     quadrille("track", session)
     out = {}
     for person, joints in recording.references.items():
-        found = quadrille("evaluate", session, "--reference", joints, "--person", person)
+        result = quadrille("evaluate", session, "--reference", joints, "--person", person)
         at = load_session(session)
         model = next(p.model for p in at.people if p.name == person)
         stored = read_stored_poses(at.annotations_path, person, model)
         costs = [s.record.cost_px for s in stored.values() if s.record.cost_px is not None]
-        out[person] = Result(found["mpjpe_mm"], found["lost_frames"], float(np.mean(costs)))
+        out[person] = Result(result["mpjpe_mm"], result["lost_frames"], float(np.mean(costs)))
     return out
 
 

@@ -199,13 +199,13 @@ def repaired(at: Path) -> list[dict[str, Any]]:
     out = list[dict[str, Any]]()
     for _ in range(MAX_ROUNDS):
         try:
-            found = quadrille("check", at, "--apply")
+            result = quadrille("check", at, "--apply")
         except SystemExit as refused:
             print(refused, flush=True)
             break
-        if not found["named"]:
+        if not result["named"]:
             break
-        out.append(found)
+        out.append(result)
         tracked(at)
     return out
 
@@ -401,8 +401,8 @@ def change(data: Path, folder: Path) -> Measured:
         at = tracked(
             started(replace(footage, folders={**footage.folders, camera: turned}), folder / f"change {i}", body)
         )
-        found = quadrille("check", at)
-        said = [f"{c['name']} since {c['since_frame']}" for c in found["cameras"] if c["kind"] is not None]
+        result = quadrille("check", at)
+        said = [f"{c['name']} since {c['since_frame']}" for c in result["cameras"] if c["kind"] is not None]
         rows[f"{name.replace('_', ' ')}, {camera} since {since}"] = [f"{angles}", ", ".join(said) or "none"]
         print([*rows.items()][-1], flush=True)
     said = conditions(

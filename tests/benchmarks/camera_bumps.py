@@ -225,8 +225,8 @@ def _kept(
         recording, body, bodies, bump, right = trial
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             at = tracked(started(recording, Path(scratch) / recording.name, calibration, bodies))
-            found = judged(at, recording.name, body, bump, right)
-        result.write_text(json.dumps(found._asdict()), "utf-8")
+            judgement = judged(at, recording.name, body, bump, right)
+        result.write_text(json.dumps(judgement._asdict()), "utf-8")
     return Judged(**json.loads(result.read_text("utf-8")))
 
 

@@ -13,9 +13,7 @@ from collections.abc import AsyncGenerator
 
 import numpy as np
 from playwright.async_api import Page
-from sample_page import ROOT, opened_page, sample_page
-
-from page_driver import handle_of, to_client  # isort: skip  (found by sample_page)
+from sample_page import ROOT, drag_latencies, opened_page, sample_page
 
 MOVES, INTERVAL_S = 300, 1 / 30
 
@@ -37,24 +35,10 @@ async def floor_page() -> AsyncGenerator[Page, None]:
     await program.wait()
 
 
-async def measure(page: Page, joint: str) -> list[float]:
-    """Latencies of the moves of a drag of a joint, ms."""
-    x, y = await to_client(page, 0, *await handle_of(page, 0, joint))
-    await page.mouse.move(x, y)
-    await page.mouse.down()
-    for k in range(MOVES):
-        await page.mouse.move(x + 40 * np.sin(k / 12), y - 20 + 30 * np.cos(k / 9))
-        await asyncio.sleep(INTERVAL_S)
-    await page.mouse.up()
-    await asyncio.sleep(1)
-    latencies: list[float] = await page.evaluate("quadrille.latencies")
-    return latencies
-
-
 async def main() -> None:
     for name, opened, joint in (("program", sample_page, "left_wrist"), ("floor", floor_page, "l_wrist")):
         async with opened() as page:
-            latencies = await measure(page, joint)
+            latencies = await drag_latencies(page, joint, MOVES, INTERVAL_S)
         median, p95 = np.percentile(latencies, [50, 95])
         largest = max(latencies)
         print(f"{name}: {len(latencies)} moves, median {median:.0f} ms, p95 {p95:.0f} ms, largest {largest:.0f} ms")

@@ -96,8 +96,8 @@ def keypoint_row(folder: Path, height_m: float | None, has_lenses: bool) -> list
     """Calibrate the cameras of a recording by key points, and return a row of the table."""
     paths, given, observations, unknown = _recording(folder)
     lenses = [given[name] for name in paths] if has_lenses else unknown
-    found = calibrate_by_person(observations, lenses, height_m, has_lenses)
-    return recording_row(folder, found, height_m, has_lenses)
+    calibration = calibrate_by_person(observations, lenses, height_m, has_lenses)
+    return recording_row(folder, calibration, height_m, has_lenses)
 
 
 def _recording(folder: Path) -> tuple[dict[str, Path], dict[str, Camera], ObservationSet, list[Camera]]:
@@ -140,17 +140,17 @@ def simulated_row(n_rigs: int, n_cameras: int, arc: float, has_lenses: bool) -> 
         cameras, points = rig(n_cameras, arc), dancing(20, seed)
         lenses = cameras if has_lenses else blanks(cameras)
         try:
-            found = calibrate_by_person(observed(cameras, points, seed=seed), lenses, has_lenses=has_lenses)
+            calibration = calibrate_by_person(observed(cameras, points, seed=seed), lenses, has_lenses=has_lenses)
         except CalibrationError:
             refused += 1
             continue
-        joints = found.world.joints_world
+        joints = calibration.world.joints_world
         known = np.isfinite(joints).all(axis=-1)
-        scale = compared(found.cameras, cameras, joints[known], points[known]).scale
-        scaled = [replace(c, T_world_camera=_scaled(c.T_world_camera, scale)) for c in found.cameras]
+        scale = compared(calibration.cameras, cameras, joints[known], points[known]).scale
+        scaled = [replace(c, T_world_camera=_scaled(c.T_world_camera, scale)) for c in calibration.cameras]
         true = rms_error_m(cameras, scaled, points.reshape(-1, 3)[::7])
-        inside.append(scale * found.volume.low_m <= true <= scale * found.volume.high_m)
-        ratios.append(true / scale / found.volume.expected_m)
+        inside.append(scale * calibration.volume.low_m <= true <= scale * calibration.volume.high_m)
+        ratios.append(true / scale / calibration.volume.expected_m)
         true_mm.append(1000 * true)
         print(n_cameras, has_lenses, seed, f"{true_mm[-1]:.1f} {ratios[-1]:.2f} {inside[-1]}", flush=True)
     if not inside:
@@ -190,7 +190,7 @@ def alone_row(scene: str, has_lenses: bool) -> list[str]:
     for person, seed in product(PEOPLE_ALONE, range(FIRST_SEED, FIRST_SEED + N_SEEDS)):
         cameras, (joints, heights) = make_cameras(4, (640, 480), seed), acted(scene, N_ALONE, seed, person=person)
         try:
-            found = calibrate_by_person(
+            calibration = calibrate_by_person(
                 detected(cameras, joints, seed),
                 cameras if has_lenses else blanks(cameras),
                 *heights.values(),
@@ -201,10 +201,10 @@ def alone_row(scene: str, has_lenses: bool) -> list[str]:
             print(scene, person, seed, has_lenses, f"refused: {str(error).split(';')[0]}", flush=True)
             continue
         true = joints.reshape(-1, 3)[np.isfinite(joints).all(axis=-1).ravel()]
-        off = compared(found.cameras, cameras, reprojected(cameras, found.cameras, true)[0], true)
+        off = compared(calibration.cameras, cameras, reprojected(cameras, calibration.cameras, true)[0], true)
         joints_mm.append(np.sqrt(np.mean(np.sort(off.joints_mm)[: int(TRIMMED * len(true))] ** 2)))
-        expected_mm.append(1000 * found.volume.expected_m)
-        n_outside += off.scale * 1000 * found.volume.high_m < joints_mm[-1]
+        expected_mm.append(1000 * calibration.volume.expected_m)
+        n_outside += off.scale * 1000 * calibration.volume.high_m < joints_mm[-1]
         n_reversed += off.rotations_deg.max() > 90
         print(scene, person, seed, has_lenses, f"{joints_mm[-1]:.1f} {expected_mm[-1]:.1f}", flush=True)
     errors = [f"{np.median(mm):.1f} (to {np.max(mm):.1f})" if mm else "-" for mm in (joints_mm, expected_mm)]

@@ -22,10 +22,10 @@ from pathlib import Path
 import aiohttp
 import numpy as np
 from playwright.async_api import Browser, Page, async_playwright
-from sample_page import ROOT
+from sample_page import ROOT, drag_latencies
 
 from chromium import FLAGS, chromium_path  # isort: skip  (found by sample_page)
-from page_driver import handle_of, shows, to_client  # isort: skip
+from page_driver import shows  # isort: skip
 from program import READY, WITHOUT_3D, Program  # isort: skip
 
 ROUNDS, MOVES, INTERVAL_S = 4, 150, 1 / 30
@@ -42,21 +42,6 @@ async def opened(browser: Browser, address: str, name: str) -> Page:
     await page.goto(address)
     await shows(page, READY, 120)
     return page
-
-
-async def dragged(page: Page) -> list[float]:
-    """Latencies of the moves of a drag, ms."""
-    await page.evaluate("quadrille.latencies.length = 0")
-    x, y = await to_client(page, 0, *await handle_of(page, 0, "left_wrist"))
-    await page.mouse.move(x, y)
-    await page.mouse.down()
-    for k in range(MOVES):
-        await page.mouse.move(x + 30 * np.sin(k / 12), y - 20 + 20 * np.cos(k / 9))
-        await asyncio.sleep(INTERVAL_S)
-    await page.mouse.up()
-    await asyncio.sleep(1)
-    found: list[float] = await page.evaluate("quadrille.latencies")
-    return found
 
 
 async def apart(address: str) -> tuple[list[float], list[float]]:
@@ -91,12 +76,12 @@ async def in_browsers(
         await ben.keyboard.press("Shift+Space")  # loops
         for _ in range(ROUNDS):
             spent = ProcessorTime(**roots)
-            alone += await dragged(anna)
+            alone += await drag_latencies(anna, "left_wrist", MOVES, INTERVAL_S)
             print(f"alone, cores: {spent}")
             await ben.keyboard.press("Space")
             await asyncio.sleep(1)
             spent = ProcessorTime(**roots)
-            beside += await dragged(anna)
+            beside += await drag_latencies(anna, "left_wrist", MOVES, INTERVAL_S)
             print(f"while the other plays, cores: {spent}")
             await ben.keyboard.press("Space")
             await asyncio.sleep(1)

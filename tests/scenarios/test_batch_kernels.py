@@ -46,14 +46,14 @@ def test_two_hundred_short_tasks_compile_each_kernel_once(lab, tmp_path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     words = [sys.executable, "-m", "app", "batch", str(lab / "plan.toml"), "--workers", "2", "--json"]
     done = subprocess.run(words, capture_output=True, text=True, env=environment)
-    found = json.loads(done.stdout)
-    assert found["totals"]["done"] == N_TASKS
+    report = json.loads(done.stdout)
+    assert report["totals"]["done"] == N_TASKS
     kernels = compiled(cache)
     assert len(kernels) > 20
     began = min((lab / "plan_batch" / "attempts").iterdir(), key=lambda path: path.stat().st_mtime_ns)
     late = {name for name, time in kernels.items() if time > began.stat().st_mtime_ns}
     assert not late, "a worker compiled what the batch had compiled before its first task"
-    cpu_s = sorted(r["cpu_seconds"] for r in found["recordings"])
+    cpu_s = sorted(r["cpu_seconds"] for r in report["recordings"])
     print(
         f"{len(kernels)} kernels; processor time of tasks: median {cpu_s[N_TASKS // 2]:.2f} s, most {cpu_s[-1]:.2f} s"
     )

@@ -84,8 +84,8 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
 
     def poses():
         estimator = estimator_of(gavrila, views, expected, TrackSettings())
-        found = estimator.estimate([0, 1])
-        return np.array([*(b.values for b in estimator.bodies), *(found[p].covariance.sum(axis=1) for p in (0, 1))])
+        estimate = estimator.estimate([0, 1])
+        return np.array([*(b.values for b in estimator.bodies), *(estimate[p].covariance.sum(axis=1) for p in (0, 1))])
 
     monkeypatch.setattr(
         "tracker.estimation.by_frame.frame_estimator.search_limbs", lambda *a: searched.append(a) or search_limbs(*a)

@@ -1,12 +1,10 @@
 """Mutated text files: each is read or refused by one sentence, quickly and in little memory."""
 
-import json
 import pickle
 import random
 import re
 import socket
 import time
-import tomllib
 import traceback
 import warnings
 from dataclasses import replace
@@ -17,7 +15,7 @@ import numpy as np
 import pytest
 from calibration_files import WRITERS, colmap, easymocap, rig_for, wildtrack
 from memory import memory_mb
-from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
+from mutation import json_bytes, mutated
 from rigs import cameras, looking
 
 from tracker.calibration.boards.board_description import read_board
@@ -150,17 +148,6 @@ KINDS = {
 """For each kind: name of the file, examples, what reads it, and the full number of cases."""
 
 
-def mutated(rng, name, examples, others):
-    """One file, mutated once to four times."""
-    data = rng.choice(examples)
-    if name.endswith((".toml", ".json")) and rng.random() < 0.5:
-        tree = tomllib.loads(data.decode()) if name.endswith(".toml") else json.loads(data)
-        return (toml_bytes if name.endswith(".toml") else json_bytes)(mutate_tree(rng, tree))
-    for _ in range(rng.choice((1, 1, 1, 1, 2, 4))):
-        data = mutate_bytes(rng, data, others) or b" "
-    return data
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_mutated_files_are_read_or_refused(kind, tmp_path, cases, report, monkeypatch):
     name, examples, read, full = KINDS[kind]
@@ -179,7 +166,7 @@ def test_mutated_files_are_read_or_refused(kind, tmp_path, cases, report, monkey
     Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here
     before = memory_mb("VmRSS")
     for case in range(n):
-        data = mutated(rng, name, examples, others)
+        data = mutated(rng, name, rng.choice(examples), others)
         path = tmp_path / name
         path.write_bytes(data)
         start = time.thread_time()

@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+import tomllib
 
 import tomli_w
 
@@ -114,3 +115,13 @@ def _holders(tree):
         yield tree
         for value in tree.values() if isinstance(tree, dict) else tree:
             yield from _holders(value)
+
+
+def mutated(rng, name, data, others):
+    """Change a file once to four times; `others` are files to splice in."""
+    if name.endswith((".toml", ".json")) and rng.random() < 0.5:
+        tree = tomllib.loads(data.decode()) if name.endswith(".toml") else json.loads(data)
+        return (toml_bytes if name.endswith(".toml") else json_bytes)(mutate_tree(rng, tree))
+    for _ in range(rng.choice((1, 1, 1, 1, 2, 4))):
+        data = mutate_bytes(rng, data, others) or b" "
+    return data

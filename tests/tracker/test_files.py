@@ -1,8 +1,7 @@
 """Walks through folders that a user names."""
 
-import os
-
 import pytest
+from unreadable_folders import refuse_folders
 
 from tracker import files
 from tracker.errors import FormatError
@@ -46,14 +45,7 @@ def test_a_walk_ends_at_each_bound(folder, monkeypatch, limits, match):
 
 
 def test_a_folder_that_cannot_be_read_is_named_or_passed_over(folder, monkeypatch):
-    real = os.scandir
-
-    def scandir(path):
-        if str(path).endswith("/b"):
-            raise PermissionError(13, "Permission denied")
-        return real(path)
-
-    monkeypatch.setattr(files.os, "scandir", scandir)
+    refuse_folders(monkeypatch, "/b")
     with pytest.raises(FormatError, match=r"/a/b cannot be \(Permission denied\)"):
         below(folder)
     assert below(folder, passes_unreadable=True) == ["a", "a/b", "a/y.json"]

@@ -6,7 +6,7 @@ import signal
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, WITH_POSE, assert_refused, output_of, stored
+from command_line import SAMPLE, assert_refused, output_of, stored
 
 from tracker.estimation.acquisition import size_fit
 from tracker.estimation.acquisition.chamfer_search import ChamferSearchSettings
@@ -19,13 +19,6 @@ KEYS = {
     "voxels", "segments", "swings_deg", "notes",
 }  # fmt: skip
 """Those that docs/acquisition.md lists."""
-
-
-@pytest.fixture
-def placed(run, session):
-    """The sample with the known pose of one frame."""
-    assert run("init", session, *WITH_POSE, "--frame", "20", "--json")[0] == 0
-    return session
 
 
 @pytest.fixture
@@ -52,22 +45,26 @@ def test_an_acquired_body_goes_to_the_next_session(run, placed, quick, tmp_path)
     body = tmp_path / "ann.toml"
     words = ("acquire", placed, "--frames", "20:23", "--n-frames", "2", "--out", body, "--json")
     status, out, err = run(*words)
-    found = json.loads(out)
+    report = json.loads(out)
     assert (status, err) == (0, "")
-    assert found.keys() == KEYS
-    assert found["sizes"][0].keys() == {"name", "before_m", "after_m", "sigma_m"}
-    assert found["segments"][0].keys() == {"name", "length_m", "sigma_m"}
-    assert found["swings_deg"].keys() == {"shoulder", "elbow", "hip", "knee"}
-    assert found["notes"] == []  # the joints of frame 20 are known
-    assert (found["person"], len(found["frames"]), found["views"]) == ("person", 2, ["FRONT", "RIGHT", "BACK", "LEFT"])
+    assert report.keys() == KEYS
+    assert report["sizes"][0].keys() == {"name", "before_m", "after_m", "sigma_m"}
+    assert report["segments"][0].keys() == {"name", "length_m", "sigma_m"}
+    assert report["swings_deg"].keys() == {"shoulder", "elbow", "hip", "knee"}
+    assert report["notes"] == []  # the joints of frame 20 are known
+    assert (report["person"], len(report["frames"]), report["views"]) == (
+        "person",
+        2,
+        ["FRONT", "RIGHT", "BACK", "LEFT"],
+    )
     acquired = load_session(placed).people[0].model
-    assert body.read_text() == found["model"] == format_model(acquired)
-    assert found["height_m"] == acquired.height_m
+    assert body.read_text() == report["model"] == format_model(acquired)
+    assert report["height_m"] == acquired.height_m
     for name, more in (("s2", ("--people", "ann", "--model", f"ann={body}")), ("s3", ("--person-model", body))):
         second = tmp_path / name
         assert new_session(run, second, *more)[0] == 0
         (person,) = load_session(second).people
-        assert format_model(person.model) == found["model"]
+        assert format_model(person.model) == report["model"]
     assert run("init", second, "--joints", SAMPLE / "truth.trc", "--frame", "20")[0] == 0
     status, out, _ = run("track", second, "--frames", "20:22", "--json")
     assert (status, json.loads(out)["frames"]) == (0, 2)
@@ -116,11 +113,11 @@ def test_the_paper_s_way_names_its_views(run, placed, monkeypatch):
 def test_voxels_before_the_contours(run, placed, quick):
     words = ("acquire", placed, "--method", "voxels", "--frames", "20:23", "--n-frames", "2")
     status, out, err = run(*words, "--json", "--dry-run")
-    found = json.loads(out)
-    assert (status, err, found.keys()) == (0, "", KEYS)
-    assert found["voxels"].keys() == {"height_m", "overlap_before", "overlap_after"}
-    assert 0 < found["voxels"]["overlap_before"] < 1
-    assert found["evaluations"] > 2
+    report = json.loads(out)
+    assert (status, err, report.keys()) == (0, "", KEYS)
+    assert report["voxels"].keys() == {"height_m", "overlap_before", "overlap_after"}
+    assert 0 < report["voxels"]["overlap_before"] < 1
+    assert report["evaluations"] > 2
     before = format_model(load_session(placed).people[0].model)
     status, out, _ = run(*words, "--voxels-only", "--json")
     alone = json.loads(out)

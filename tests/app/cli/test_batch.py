@@ -128,13 +128,13 @@ def test_ended_work_is_not_checked(run, ended):
 def test_the_table_puts_failures_first_and_opens_at_the_worst_frame(run, ended):
     status, out, _ = run("batch", ended, "--table", "--json")
     assert status == 1
-    found = json.loads(out)
-    failed, done = found["recordings"]
+    report = json.loads(out)
+    failed, done = report["recordings"]
     assert (failed["name"], done["name"]) == ("b", "a")
     assert failed["error"].startswith("expected footage, found none; ")
     assert "relink" in failed["error"]
     assert (done["poses"], done["contradiction"]) == (4, "camera 'C' seems off")
-    assert found["totals"]["done"] == found["totals"]["failed"] == 1
+    assert report["totals"]["done"] == report["totals"]["failed"] == 1
     text = run("batch", ended, "--table")[1]
     assert "1 done, 1 failed" in text
     assert done["open"] in text

@@ -96,8 +96,8 @@ def test_all_problems_are_listed_before_anything_is_written(lab, run, way):
     for words in filter(None, WRONG.values()):
         assert sum(words.format(lab) in line for line in said) == 1, words
     assert not (lab / "plan_batch").exists()
-    found = json.loads(run("batch", lab / "plan.toml", "--check", "--json")[1])
-    assert len(found["problems"]) == len(WRONG) - 1
+    report = json.loads(run("batch", lab / "plan.toml", "--check", "--json")[1])
+    assert len(report["problems"]) == len(WRONG) - 1
 
 
 def test_a_sound_plan_is_checked_and_nothing_is_written(lab, run):

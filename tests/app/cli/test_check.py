@@ -45,15 +45,15 @@ def test_a_turned_camera_is_named_corrected_and_undone(run, posed):
     turn(posed, "LEFT", 1.0)
     wrong = (posed / "calibration.toml").read_text()
     status, out, _ = run("check", posed, "--json", "--apply", "--max-frames", "8")
-    found = json.loads(out)
-    assert (status, found["named"], found["applied"], found["outdated_sizes"]) == (0, ["LEFT"], ["LEFT"], [])
-    left = next(c for c in found["cameras"] if c["name"] == "LEFT")
+    report = json.loads(out)
+    assert (status, report["named"], report["applied"], report["outdated_sizes"]) == (0, ["LEFT"], ["LEFT"], [])
+    left = next(c for c in report["cameras"] if c["name"] == "LEFT")
     # Somebody who stays in one place looks the same from a camera that was turned and from one that was moved.
     assert left["kind"] in ("rotation", "position")
     assert left["misfit_px"] > 5
     assert left["sigma"]["rotation_deg"][1] > 0
     assert left["since_frame"] is None
-    assert found["explained"]["held_out_better"] > 0.8 * found["explained"]["held_out_frames"]
+    assert report["explained"]["held_out_better"] > 0.8 * report["explained"]["held_out_frames"]
     assert (posed / "calibration.toml").read_text() != wrong
     with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
         assert store.history(1)[0].label == "calibration of LEFT corrected"

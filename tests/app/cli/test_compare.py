@@ -70,8 +70,8 @@ def test_known_bias_limits_and_icc_come_back(run, apart):
     folder, work, known = apart
     status, out, err = run("compare", folder / "ann", folder / "ben", "--json")
     assert (status, err) == (0, "")
-    found = json.loads(out)
-    elbow = found["joints"]["left_elbow"]
+    report = json.loads(out)
+    elbow = report["joints"]["left_elbow"]
     assert np.linalg.norm(known.mean(axis=0)) > 0.9 * BIAS_M
     off = np.linalg.norm(np.subtract(elbow["bias_mm"], 1000 * known.mean(axis=0)))
     assert off < 0.1 * 1000 * BIAS_M
@@ -83,15 +83,15 @@ def test_known_bias_limits_and_icc_come_back(run, apart):
     places = places.transpose(1, 0, 2)
     assert elbow["icc"] == pytest.approx(covariance_icc(places), abs=1e-6)
     assert elbow["icc_by_axis"] == pytest.approx([covariance_icc(places[..., [i]]) for i in range(3)], abs=1e-6)
-    assert (elbow["n"], found["n"], set(found["joints"])) == (N, N, set(JOINTS))
+    assert (elbow["n"], report["n"], set(report["joints"])) == (N, N, set(JOINTS))
 
     dof = MODEL.dof_names.index("left_elbow.extension")
     angles = np.degrees([[p[MODEL.dof_value[dof]] for p in work[name]] for name in ("ann", "ben")])
-    angle = found["angles"]["left_elbow.extension"]
+    angle = report["angles"]["left_elbow.extension"]
     assert angle["icc"] == pytest.approx(covariance_icc(angles.T[..., None]), abs=1e-6)
     assert angle["bias_deg"] == pytest.approx((angles[1] - angles[0]).mean(), abs=1e-6)
     assert angle["icc_interval"][0] < angle["icc"] < angle["icc_interval"][1]
-    assert set(found["annotators"]) == {"ann", "ben"}
+    assert set(report["annotators"]) == {"ann", "ben"}
 
 
 def test_the_consensus_has_less_error_than_either(run, apart):
@@ -108,9 +108,9 @@ def test_the_consensus_has_less_error_than_either(run, apart):
     assert np.allclose(table.points, np.mean(annotated, axis=0), atol=1e-6)
     of_consensus, *errors = (np.linalg.norm(x - truth, axis=-1).mean() for x in (table.points, *annotated))
     assert of_consensus < min(errors)
-    found = json.loads(run("evaluate", folder / "ann", "--reference", path, "--json")[1])
+    report = json.loads(run("evaluate", folder / "ann", "--reference", path, "--json")[1])
     own = json.loads(run("compare", folder / "ann", folder / "ben", "--json")[1])["annotators"]["ann"]["joints"]
-    assert found["per_joint_mm"]["left_elbow"] == pytest.approx(own["left_elbow"]["mean_mm"], rel=1e-4)
+    assert report["per_joint_mm"]["left_elbow"] == pytest.approx(own["left_elbow"]["mean_mm"], rel=1e-4)
     assert_refused(run("compare", folder / "ann", folder / "ben", "--consensus", path), ["--consensus at a path"])
 
 
@@ -158,19 +158,19 @@ def test_keyframes_or_all_poses_of_one_or_more_people_and_annotators(run, tmp_pa
         annotate(tmp_path / name, person, tracked, body, keyframe=False)
         annotate(tmp_path / name, person, {k: tracked[k] for k in (2, 5)}, body)
     three = [tmp_path / name for name in "abc"]
-    found = json.loads(run("compare", *three, "--report", tmp_path / "r.html", "--json")[1])
-    a, b = found["joints"]["left_knee"]["annotators"]
+    report = json.loads(run("compare", *three, "--report", tmp_path / "r.html", "--json")[1])
+    a, b = report["joints"]["left_knee"]["annotators"]
     assert f"left knee ({a}, {b})" in (tmp_path / "r.html").read_text("utf-8")
-    assert (found["n"], set(found["people"]), len(found["pairs"])) == (4, {"ann", "bob"}, 3)
-    assert found["people"]["bob"]["joints"]["neck"]["n"] == 2
-    assert set(found["joints"]["neck"]["annotators"]) < set("abc")
+    assert (report["n"], set(report["people"]), len(report["pairs"])) == (4, {"ann", "bob"}, 3)
+    assert report["people"]["bob"]["joints"]["neck"]["n"] == 2
+    assert set(report["joints"]["neck"]["annotators"]) < set("abc")
     assert_refused(
         run("compare", *three, "--consensus", tmp_path / "c.trc"), ["one person with --consensus, found ann, bob"]
     )
-    found = json.loads(run("compare", *three[:2], "--poses", "all", "--person", "bob", "--json")[1])
-    assert found["n"] == 8
-    assert "people" not in found
-    assert {d["person"] for d in found["worst"]} == {"bob"}
+    report = json.loads(run("compare", *three[:2], "--poses", "all", "--person", "bob", "--json")[1])
+    assert report["n"] == 8
+    assert "people" not in report
+    assert {d["person"] for d in report["worst"]} == {"bob"}
 
 
 def test_bodies_may_differ(run, tmp_path):
@@ -179,13 +179,13 @@ def test_bodies_may_differ(run, tmp_path):
     annotate(tmp_path / "a", "ann", dict(enumerate(POSES[:4])))
     taller = MODEL.with_height(1.1 * MODEL.height_m)
     annotate(tmp_path / "b", "ann", dict(enumerate(POSES[:4])), taller)
-    found = json.loads(run("compare", tmp_path / "a", tmp_path / "b", "--json")[1])
-    assert found["notes"] == ["the bodies of 'ann' have different sizes, and distances of joints include them"]
-    assert found["joints"]["left_wrist"]["mean_distance_mm"] > 10
-    assert all(a["bias_deg"] == 0 for a in found["angles"].values())
+    report = json.loads(run("compare", tmp_path / "a", tmp_path / "b", "--json")[1])
+    assert report["notes"] == ["the bodies of 'ann' have different sizes, and distances of joints include them"]
+    assert report["joints"]["left_wrist"]["mean_distance_mm"] > 10
+    assert all(a["bias_deg"] == 0 for a in report["angles"].values())
     annotate(tmp_path / "b", "ann", dict(enumerate(random_poses(MODELS["gavrila34"], 4, 1))), MODELS["gavrila34"])
-    found = json.loads(run("compare", tmp_path / "a", tmp_path / "b", "--json")[1])
-    assert (found["angles"], len(found["notes"])) == ({}, 2)
+    report = json.loads(run("compare", tmp_path / "a", tmp_path / "b", "--json")[1])
+    assert (report["angles"], len(report["notes"])) == ({}, 2)
 
 
 def test_sessions_of_other_recordings_are_refused(run, tmp_path):

@@ -31,10 +31,10 @@ def couple(tmp_path):
 
 
 def test_each_person_has_a_file_of_the_name(run, couple, tmp_path):
-    found = json.loads(output_of(run("export", couple, "--format", "trc", "--out", tmp_path / "m.trc", "--json")))
-    assert found["files"] == [str(tmp_path / f"m_{name}.trc") for name in ("ann", "bob")]
-    assert (found["frames"], found["missing"], found["lost"]) == ([0, 8], 2, 1)
-    assert found["provenance"] == [str(tmp_path / f"m_{name}.trc.provenance.json") for name in ("ann", "bob")]
+    report = json.loads(output_of(run("export", couple, "--format", "trc", "--out", tmp_path / "m.trc", "--json")))
+    assert report["files"] == [str(tmp_path / f"m_{name}.trc") for name in ("ann", "bob")]
+    assert (report["frames"], report["missing"], report["lost"]) == ([0, 8], 2, 1)
+    assert report["provenance"] == [str(tmp_path / f"m_{name}.trc.provenance.json") for name in ("ann", "bob")]
     out = output_of(run("export", couple, "--out", tmp_path / "m.mot", "--person", "bob", "--skip-lost"))
     assert (tmp_path / "m.osim").is_file()
     lines = out.splitlines()
@@ -110,10 +110,10 @@ def test_splits_of_several_sessions(run, lab, tmp_path):
     split = ("--split", "1:0:1", "run_session=test", "walk_session=train")
     assert "ann is in train and test; --split NAME=SPLIT moves a recording" in run(*words, *split)[1]
     status, text, _ = run(*words, *split, "--overwrite", "--distinct-people", "--json")
-    found = json.loads(text)
-    assert (status, found["shared_people"]) == (0, [])
-    assert found["splits"] == {"train": ["walk_session"], "validation": [], "test": ["run_session"]}
-    assert [(r["split"], r["missing"]) for r in found["recordings"]] == [("train", 0), ("test", 1)]
+    report = json.loads(text)
+    assert (status, report["shared_people"]) == (0, [])
+    assert report["splits"] == {"train": ["walk_session"], "validation": [], "test": ["run_session"]}
+    assert [(r["split"], r["missing"]) for r in report["recordings"]] == [("train", 0), ("test", 1)]
 
 
 def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):

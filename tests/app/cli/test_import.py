@@ -36,9 +36,9 @@ def test_import_shows_what_it_found(run, session, keypoints):
 
 
 def test_import_and_info_and_back(run, session, keypoints, tmp_path):
-    found = json.loads(output_of(run("import", session.folder, keypoints, "--as", "mp", "--json")))
-    assert (found["stored"], found["skeleton"], found["matched"], found["problems"]) == (True, "BODY_25", 18, [])
-    assert found["views"][1]["frames"] == [0, 5]
+    report = json.loads(output_of(run("import", session.folder, keypoints, "--as", "mp", "--json")))
+    assert (report["stored"], report["skeleton"], report["matched"], report["problems"]) == (True, "BODY_25", 18, [])
+    assert report["views"][1]["frames"] == [0, 5]
     status, out, _ = run("info", session.folder, "--no-check")
     assert "  observations mp: 25 key points of ann in 6 frames, openpose" in out
     status, out, _ = run("export", session.folder, "--like", "mp", "--out", tmp_path / "back")

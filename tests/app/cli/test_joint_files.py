@@ -62,8 +62,8 @@ def test_init_says_where_the_file_begins(run, session, tmp_path):
     path = written(tmp_path / "a.trc", list(range(20, 40)))
     _, out, _ = run("init", session, "--joints", path, "--frame", "25")
     assert "note: the first row of the file, Frame# 20 at 0.800 s, is frame 20" in out
-    found = json.loads(run("init", session, "--joints", path, "--frame", "25", "--json")[1])
-    assert found["notes"] == ["the first row of the file, Frame# 20 at 0.800 s, is frame 20"]
+    report = json.loads(run("init", session, "--joints", path, "--frame", "25", "--json")[1])
+    assert report["notes"] == ["the first row of the file, Frame# 20 at 0.800 s, is frame 20"]
     expected = ["expected a row of frame 45", "frames 20 to 39", "Frame# 20 at 0.800 s, is frame 20"]
     assert_refused(run("init", session, "--joints", path, "--frame", "45"), expected)
 
@@ -83,10 +83,10 @@ def test_a_contradiction_is_asked_about_and_decided(run, session, tmp_path):
         assert_refused(run(*words), expected)
     assert run("init", session, "--joints", path, "--frame", 25, "--first-frame", 20)[0] == 0
     assert joints_of_frame(session, 25) == pytest.approx(true_wrist(25), abs=1e-6)
-    found = json.loads(run("evaluate", session, "--reference", path, "--first-frame", 20, "--json")[1])
-    assert found["mpjpe_mm"] < 60
+    report = json.loads(run("evaluate", session, "--reference", path, "--first-frame", 20, "--json")[1])
+    assert report["mpjpe_mm"] < 60
     shifted = json.loads(run("evaluate", session, "--reference", path, "--first-frame", 10, "--json")[1])
-    assert shifted["mpjpe_mm"] > found["mpjpe_mm"]
+    assert shifted["mpjpe_mm"] > report["mpjpe_mm"]
 
 
 @pytest.mark.slow
@@ -118,10 +118,10 @@ def test_an_exported_range_comes_back_to_its_frames(run, session, tmp_path):
     out = run("export", session, "--format", "trc", "--out", tmp_path / "a.trc", "--frames", "20:23")[1]
     assert "Frame# counts from 1: frame 20 of the session is Frame# 21" in out
     status, out, _ = run("evaluate", session, "--reference", tmp_path / "a.trc", "--json")
-    found = json.loads(out)
-    assert (status, found["frames"], found["missing_reference_values"]) == (0, 3, 0)
-    assert found["mpjpe_mm"] < 1e-3
-    assert found["notes"] == ["the first row of the file, Frame# 21 at 0.800 s, is frame 20"]
+    report = json.loads(out)
+    assert (status, report["frames"], report["missing_reference_values"]) == (0, 3, 0)
+    assert report["mpjpe_mm"] < 1e-3
+    assert report["notes"] == ["the first row of the file, Frame# 21 at 0.800 s, is frame 20"]
 
 
 @pytest.mark.slow
@@ -136,8 +136,8 @@ def test_evaluate_lists_lost_frames(run, session, tmp_path):
     assert "7 frames, 2 missing, 5 lost" in out
     assert "lost: frames 3 to 7; the worst is " in out
     assert "where the left wrist is off by " in out
-    found = json.loads(run("evaluate", session, "--reference", tmp_path / "a.trc", "--stride", 1, "--json")[1])
-    assert found["lost_frame_numbers"] == [3, 4, 5, 6, 7]
+    report = json.loads(run("evaluate", session, "--reference", tmp_path / "a.trc", "--stride", 1, "--json")[1])
+    assert report["lost_frame_numbers"] == [3, 4, 5, 6, 7]
     assert "lost: frames" not in run("evaluate", session, "--reference", TRUTH, "--frames", "2:6")[1]
 
 
@@ -145,5 +145,5 @@ def test_evaluate_lists_lost_frames(run, session, tmp_path):
 def test_lost_frames_without_any_pose(run, session):
     run("init", session, "--joints", TRUTH, "--frame", 8)
     at = load_target(session, None, several=False)
-    found = evaluate(at, read_reference(TRUTH, at.session, 0), "6:9", "none", stride=1)
-    assert "lost: frames 6 to 7, none of which has a pose" in _format(found)
+    evaluation = evaluate(at, read_reference(TRUTH, at.session, 0), "6:9", "none", stride=1)
+    assert "lost: frames 6 to 7, none of which has a pose" in _format(evaluation)

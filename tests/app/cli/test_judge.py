@@ -57,15 +57,15 @@ def imported(run, session, tmp_path, monkeypatch, film_once):
 
 
 def test_exchanged_legs_come_first(run, imported):
-    found = json.loads(output_of(run("judge", imported, "--of", "net", "--json")))
-    assert [f["frame"] for f in found["frames"]] == list(FRAMES)
-    assert {(d["frame"], d["limb"]) for d in found["worst"][:4]} == {
+    report = json.loads(output_of(run("judge", imported, "--of", "net", "--json")))
+    assert [f["frame"] for f in report["frames"]] == list(FRAMES)
+    assert {(d["frame"], d["limb"]) for d in report["worst"][:4]} == {
         (k, f"{side} leg") for k in EXCHANGED for side in ("left", "right")
     }
-    assert all(d["reason"] == "legs exchanged" and d["probability_off"] > 0.99 for d in found["worst"][:4])
-    assert found["worst"][4]["probability_off"] < 0.5
-    assert found["people"]["person"]["share_in_order"] == pytest.approx(1 - 2 / len(FRAMES))
-    arm = next(f for f in found["frames"] if f["frame"] == 14)["limbs"]["left arm"]
+    assert all(d["reason"] == "legs exchanged" and d["probability_off"] > 0.99 for d in report["worst"][:4])
+    assert report["worst"][4]["probability_off"] < 0.5
+    assert report["people"]["person"]["share_in_order"] == pytest.approx(1 - 2 / len(FRAMES))
+    arm = next(f for f in report["frames"] if f["frame"] == 14)["limbs"]["left arm"]
     assert set(arm) == {"probability_off", "distance_mm", "reason"}
 
 

@@ -50,9 +50,9 @@ def test_next_names_frame_limb_and_view(run, session):
 
 def test_next_says_where_nothing_is_left_that_pays(run, session):
     pose(session, "left arm", 24, 0.006)
-    found = json.loads(run("next", session, "--json")[1])
-    assert (found["frame"], found["view"], found["expected_gain_mm"], found["next"]) == (None, None, 0.0, [])
-    assert found["reason"] == "nothing is left that pays"
+    report = json.loads(run("next", session, "--json")[1])
+    assert (report["frame"], report["view"], report["expected_gain_mm"], report["next"]) == (None, None, 0.0, [])
+    assert report["reason"] == "nothing is left that pays"
     assert run("next", session)[1].startswith("nothing is left that pays: expected error ")
 
 
@@ -71,8 +71,8 @@ def test_only_stretches_whose_keyframes_changed_are_tracked_again(run, session):
         assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", k)[0] == 0
 
     def tracked(*options):
-        found = json.loads(output_of(run("track", session, "--between-keyframes", "--json", *options)))
-        return [(s["first"], s["last"], s["people"]) for s in found["stretches"]], found["runs"]
+        report = json.loads(output_of(run("track", session, "--between-keyframes", "--json", *options)))
+        return [(s["first"], s["last"], s["people"]) for s in report["stretches"]], report["runs"]
 
     for k in (20, 23, 26):
         set_keyframe(k)

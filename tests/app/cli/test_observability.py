@@ -3,29 +3,22 @@
 import json
 
 import pytest
-from command_line import WITH_POSE, assert_refused
-
-
-@pytest.fixture
-def placed(run, session):
-    """The sample with the known pose of one frame."""
-    assert run("init", session, *WITH_POSE, "--frame", "20", "--json")[0] == 0
-    return session
+from command_line import assert_refused
 
 
 @pytest.mark.slow
 def test_one_frame_and_another_camera(run, placed):
     status, out, err = run("observability", placed, "--frame", "20", "--another-camera", "--json")
-    found = json.loads(out)
+    report = json.loads(out)
     assert (status, err) == (0, "")
-    assert found.keys() == {"person", "frames", "rank", "dofs", "another_camera"}
-    assert (found["frames"], found["rank"]) == ([20], len(found["dofs"]))
-    dofs = {d["name"]: d for d in found["dofs"]}
+    assert report.keys() == {"person", "frames", "rank", "dofs", "another_camera"}
+    assert (report["frames"], report["rank"]) == ([20], len(report["dofs"]))
+    dofs = {d["name"]: d for d in report["dofs"]}
     assert dofs["torso.x"]["unit"] == "m"
     assert dofs["torso.x"]["sigma"] < 0.05
     assert dofs["left_elbow.extension"]["sentence"].startswith("extension of the left elbow: ")
     assert dofs["left_elbow.extension"]["best_view"] in ("FRONT", "RIGHT", "BACK", "LEFT")
-    best, *_, last = found["another_camera"]
+    best, *_, last = report["another_camera"]
     assert best["mean_after_deg"] < last["mean_after_deg"] < best["mean_before_deg"]
 
 

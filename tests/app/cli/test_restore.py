@@ -30,12 +30,12 @@ def test_a_damaged_store_goes_back_to_its_backup(run, edited):
     refused = run("info", edited)
     assert_refused(refused, ["annotations.sqlite are damaged", "person, frame 4", f"run 'quadrille restore {edited}'"])
     status, out, _ = run("restore", edited, "--json")
-    found = json.loads(out)
+    report = json.loads(out)
     assert status == 0
-    assert "frame 4" in found["damage"]
-    assert found["backup"] in found["backups"]
+    assert "frame 4" in report["damage"]
+    assert report["backup"] in report["backups"]
     assert list(stored(edited)) == [3]
-    with closing(sqlite3.connect(found["kept"])) as db:
+    with closing(sqlite3.connect(report["kept"])) as db:
         assert db.execute("SELECT frame FROM poses ORDER BY frame").fetchall() == [(3,), (5,)]
         assert db.execute("SELECT frame FROM pose_changes ORDER BY frame").fetchall() == [(4,), (6,)]
 

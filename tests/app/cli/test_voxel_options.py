@@ -3,14 +3,7 @@
 import json
 
 import pytest
-from command_line import SAMPLE, WITH_POSE, assert_refused, output_of, stored
-
-
-@pytest.fixture
-def placed(run, session):
-    """The sample with the known pose of one frame."""
-    assert run("init", session, *WITH_POSE, "--frame", "20", "--json")[0] == 0
-    return session
+from command_line import SAMPLE, assert_refused, output_of, stored
 
 
 @pytest.mark.slow

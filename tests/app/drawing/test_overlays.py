@@ -161,11 +161,11 @@ def test_a_joint_behind_another_person_says_by_whom_it_is_hidden(couple):
     state = replace(state, people=(ShownPose(ann, "manual"), ShownPose(bob, "manual")))
     alone = joint_handles.handles(couple.session, replace(state, people=(state.people[0], couple.state.people[1])), [0])
     visible = {h.point for h in alone if h.person == 0 and h.visible}
-    found = joint_handles.handles(couple.session, state, [0])
-    assert {h.hidden_by for h in found if h.person == 0 and h.point in visible and not h.visible} == {1}
-    assert [h for h in found if h.person == 0 and h.point in visible and not h.visible]
-    assert {h.hidden_by for h in found if h.person == 1} == {None}
-    assert {h.hidden_by for h in found if h.visible} == {None}
+    handles = joint_handles.handles(couple.session, state, [0])
+    assert {h.hidden_by for h in handles if h.person == 0 and h.point in visible and not h.visible} == {1}
+    assert [h for h in handles if h.person == 0 and h.point in visible and not h.visible]
+    assert {h.hidden_by for h in handles if h.person == 1} == {None}
+    assert {h.hidden_by for h in handles if h.visible} == {None}
 
 
 def test_joints_are_tested_once_against_each_body_in_the_visible_views(couple, monkeypatch):
@@ -177,7 +177,11 @@ def test_joints_are_tested_once_against_each_body_in_the_visible_views(couple, m
     behind = values.copy()
     behind[:3] += 0.6 * cameras[0].T_world_camera[:3, 2]  # of the first in this view
     state = replace(couple.state, people=(ShownPose(values, "manual"), ShownPose(behind, "manual")))
-    found = joint_handles.handles(couple.session, state, {0, 2})
+    handles = joint_handles.handles(couple.session, state, {0, 2})
     assert sorted(tested) == sorted(2 * [names[0], names[2]])
-    assert {h.camera for h in found} == {0, 2}
-    assert {(h.person, h.hidden_by) for h in found if h.camera == 0 and not h.visible} >= {(0, None), (1, None), (1, 0)}
+    assert {h.camera for h in handles} == {0, 2}
+    assert {(h.person, h.hidden_by) for h in handles if h.camera == 0 and not h.visible} >= {
+        (0, None),
+        (1, None),
+        (1, 0),
+    }

@@ -31,8 +31,8 @@ def late(session):
 
 
 def places(session, state):
-    found = joint_handles.handles(session, state, range(len(session.cameras)))
-    return {i: np.array([(h.u, h.v) for h in found if h.camera == i]) for i in range(len(session.cameras))}
+    handles = joint_handles.handles(session, state, range(len(session.cameras)))
+    return {i: np.array([(h.u, h.v) for h in handles if h.camera == i]) for i in range(len(session.cameras))}
 
 
 def test_joints_are_drawn_where_the_picture_shows_them(late):

@@ -109,25 +109,27 @@ def test_long_footage_costs_what_short_costs(gavrila, monkeypatch, n_frames):
 
 class TestPrediction:
     def test_it_goes_on_as_the_poses_before(self, gavrila, stored):
-        found = prediction(gavrila, stored, 30, PredictSettings(order=1, window=3), backward=False)
-        assert found.values == pytest.approx(stored.at(30))
-        assert found.why == "from frames 27 to 29"
+        predicted = prediction(gavrila, stored, 30, PredictSettings(order=1, window=3), backward=False)
+        assert predicted.values == pytest.approx(stored.at(30))
+        assert predicted.why == "from frames 27 to 29"
 
     def test_backward_it_goes_on_as_those_after(self, gavrila, stored):
-        found = prediction(gavrila, stored, 30, PredictSettings(order=1, window=3), backward=True)
-        assert found.values == pytest.approx(stored.at(30))
-        assert found.why == "from frames 31 to 33"
+        predicted = prediction(gavrila, stored, 30, PredictSettings(order=1, window=3), backward=True)
+        assert predicted.values == pytest.approx(stored.at(30))
+        assert predicted.why == "from frames 31 to 33"
 
     def test_only_poses_that_follow_one_another_count(self, gavrila):
-        found = prediction(gavrila, Stored(gavrila, [3, 4, 6]), 7, PredictSettings(order=1, window=4), backward=False)
-        assert found.values == pytest.approx(Stored(gavrila, []).at(6))
-        assert found.why == "from frame 6"
+        predicted = prediction(
+            gavrila, Stored(gavrila, [3, 4, 6]), 7, PredictSettings(order=1, window=4), backward=False
+        )
+        assert predicted.values == pytest.approx(Stored(gavrila, []).at(6))
+        assert predicted.why == "from frame 6"
 
     @pytest.mark.parametrize(
         ("frame", "backward", "why"), [(0, False, "before"), (99, True, "after"), (7, False, "before")]
     )
     def test_it_says_why_there_is_none(self, gavrila, frame, backward, why):
         stored = Stored(gavrila, [2, 3, 98, 99])
-        found = prediction(gavrila, stored, frame, PredictSettings(), backward)
-        assert found.values is None
-        assert why in found.why
+        predicted = prediction(gavrila, stored, frame, PredictSettings(), backward)
+        assert predicted.values is None
+        assert why in predicted.why

@@ -7,6 +7,7 @@ import shutil
 import cv2
 import numpy as np
 import pytest
+from unreadable_folders import refuse_folders
 
 from tracker.session.session import load_session
 
@@ -26,15 +27,15 @@ async def test_a_folder_is_listed_without_what_cannot_be_read(folders, serve):
     (walk / "gone.mp4").symlink_to(walk / "nothing.mp4")
     (walk / ".hidden.mp4").touch()
     client = await serve()
-    found = json.loads((await client.get(f"/sessions/folder?path={walk}/../walk/"))[1])
-    assert (found["folder"], found["parent"], found["is_cut_off"]) == (str(walk), str(walk.parent), False)
-    kinds = {e["name"]: e["kind"] for e in found["entries"]}
+    report = json.loads((await client.get(f"/sessions/folder?path={walk}/../walk/"))[1])
+    assert (report["folder"], report["parent"], report["is_cut_off"]) == (str(walk), str(walk.parent), False)
+    kinds = {e["name"]: e["kind"] for e in report["entries"]}
     assert kinds["FRONT.mp4"] == "video"
     assert kinds["calibration.toml"] == "file"
     assert next(iter(kinds)) == "background"  # folders first
     assert not {"pipe.mp4", "gone.mp4", ".hidden.mp4"} & kinds.keys()
     above = json.loads((await client.get(f"/sessions/folder?path={walk}/FRONT.mp4"))[1])
-    assert above["entries"] == found["entries"]
+    assert above["entries"] == report["entries"]
     sessions = json.loads((await client.get(f"/sessions/folder?path={walk.parent}"))[1])["entries"]
     assert "session" in {e["kind"] for e in sessions}
     for text in ("relative", "%00", f"{walk}/nothing/x", "~nobody-of-this-name"):
@@ -67,17 +68,19 @@ async def test_a_survey_says_how_cameras_stand_and_which_have_footage(folders, s
     (walk / "LEFT.mp4").rename(walk / "gopro7.mp4")
     chosen = {"calibration": form["calibration"], "footage": form["footage"], "up": "z", "units": None}
     status, text = await client.open(chosen, "/sessions/survey")
-    found = json.loads(text)
-    assert (status, found["cameras"]) == (200, ["FRONT", "RIGHT", "BACK", "LEFT"])
-    assert found["assigned"] == {n: str(walk / f"{n}.mp4") for n in ("FRONT", "RIGHT", "BACK")}
-    assert "gopro7.mp4" in {f["name"] for f in found["footage"]}
-    assert np.shape(found["rig"]["centers"]) == np.shape(found["rig"]["axes"]) == (4, 3)
-    assert len(found["rig"]["heights_m"]) == 4
-    assert found["rig"]["sentence"].startswith("The cameras stand")
-    assert found["problems"] == []
-    found = json.loads((await client.open(chosen | {"calibration": str(walk / "session.toml")}, "/sessions/survey"))[1])
-    assert (found["cameras"], found["rig"], len(found["problems"])) == ([], None, 1)
-    assert len(found["footage"]) >= 4
+    report = json.loads(text)
+    assert (status, report["cameras"]) == (200, ["FRONT", "RIGHT", "BACK", "LEFT"])
+    assert report["assigned"] == {n: str(walk / f"{n}.mp4") for n in ("FRONT", "RIGHT", "BACK")}
+    assert "gopro7.mp4" in {f["name"] for f in report["footage"]}
+    assert np.shape(report["rig"]["centers"]) == np.shape(report["rig"]["axes"]) == (4, 3)
+    assert len(report["rig"]["heights_m"]) == 4
+    assert report["rig"]["sentence"].startswith("The cameras stand")
+    assert report["problems"] == []
+    report = json.loads(
+        (await client.open(chosen | {"calibration": str(walk / "session.toml")}, "/sessions/survey"))[1]
+    )
+    assert (report["cameras"], report["rig"], len(report["problems"])) == ([], None, 1)
+    assert len(report["footage"]) >= 4
     assert json.loads((await client.open({}, "/sessions/survey"))[1])["problems"] == []
     status, text = await client.open({"up": "q"}, "/sessions/survey")
     assert status == 400
@@ -85,15 +88,8 @@ async def test_a_survey_says_how_cameras_stand_and_which_have_footage(folders, s
 
 async def test_a_folder_inside_the_footage_that_cannot_be_read_is_a_problem(serve, form, tmp_path, monkeypatch):
     (tmp_path / "footage" / "private").mkdir(parents=True)
-    real = os.scandir
-
-    def scandir(path):
-        if str(path).endswith("private"):
-            raise PermissionError(13, "Permission denied", str(path))
-        return real(path)
-
     client = await serve()
-    monkeypatch.setattr(os, "scandir", scandir)
+    refuse_folders(monkeypatch, "private")
     status, text = await client.open({"footage": str(tmp_path / "footage"), "up": "z"}, "/sessions/survey")
     assert (status, "private cannot be (Permission denied)" in text) == (200, True), text
 
@@ -183,8 +179,8 @@ async def test_a_calibration_of_a_file_for_each_camera_is_given_by_these_files(f
             (walk / name).write_text(json.dumps({camera.name: stated}))
     files = [f"cam {camera.name}.json" for camera in cameras]
     for text in (f"{walk}/{'; '.join(files)}", f"{';'.join(f' {walk}/{name} ' for name in files)};"):
-        found = json.loads((await client.open({"calibration": text}, "/sessions/survey"))[1])
-        assert (found["cameras"], found["problems"]) == (["FRONT", "RIGHT", "BACK"], [])
+        report = json.loads((await client.open({"calibration": text}, "/sessions/survey"))[1])
+        assert (report["cameras"], report["problems"]) == (["FRONT", "RIGHT", "BACK"], [])
     alone = json.loads((await client.open({"calibration": f"{walk}/cam;RIGHT.json"}, "/sessions/survey"))[1])
     assert alone["cameras"] == ["RIGHT"]  # a name with a semicolon
     lines = await client.make(form | {"calibration": f"{walk}/{'; '.join(files)}"})
@@ -209,11 +205,11 @@ async def test_poses_of_another_convention_are_named_as_a_choice_of_the_form(fol
         entries[camera.camera.name] = {"K": K.tolist(), "R": T[:3, :3].tolist(), "t": T[:3, 3].tolist()}
     (folders[0] / "inverse.json").write_text(json.dumps(entries))
     chosen = {"calibration": str(folders[0] / "inverse.json"), "footage": form["footage"]}
-    found = json.loads((await client.open(chosen, "/sessions/survey"))[1])
-    assert (found["rig"], "choose camera-to-world as Poses" in found["problems"][0]) == (None, True), found
-    found = json.loads((await client.open(chosen | {"poses": "camera-to-world"}, "/sessions/survey"))[1])
+    report = json.loads((await client.open(chosen, "/sessions/survey"))[1])
+    assert (report["rig"], "choose camera-to-world as Poses" in report["problems"][0]) == (None, True), report
+    report = json.loads((await client.open(chosen | {"poses": "camera-to-world"}, "/sessions/survey"))[1])
     right = json.loads((await client.open({"calibration": form["calibration"]}, "/sessions/survey"))[1])
-    assert found["problems"] == []
-    np.testing.assert_allclose(found["rig"]["distances_m"], right["rig"]["distances_m"], atol=2e-3)
+    assert report["problems"] == []
+    np.testing.assert_allclose(report["rig"]["distances_m"], right["rig"]["distances_m"], atol=2e-3)
     lines = await client.make(form | chosen | {"poses": "camera-to-world"})
     assert "made" in lines[-1], lines

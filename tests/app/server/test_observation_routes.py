@@ -2,13 +2,13 @@
 
 import json
 import math
-import os
 import shutil
 
 import aiohttp
 import pytest
 from observed_people import seen, true_motion, write_openpose
 from serving import listening
+from unreadable_folders import refuse_folders
 
 from app.server import server
 from app.server.access import Access
@@ -79,9 +79,9 @@ async def test_files_are_described_and_then_stored(controller, form, post):
     assert (await post(IMPORT, {}))[0] == 400  # nothing was read
     status, text = await post(PLAN, form)
     assert status == 200, text
-    found = json.loads(text)
-    assert (found["name"], found["format"], found["problems"]) == ("net", "openpose", [])
-    assert [v["view"] for v in found["views"]] == list(controller.session.camera_names)
+    report = json.loads(text)
+    assert (report["name"], report["format"], report["problems"]) == ("net", "openpose", [])
+    assert [v["view"] for v in report["views"]] == list(controller.session.camera_names)
     assert not (controller.session.folder / "observations").exists()
     assert await post(IMPORT, {}) == (200, '{"stored": true}')
     assert [s.name for s in controller.state.observations.sets] == ["net"]
@@ -130,15 +130,8 @@ async def test_wrong_forms_are_answered_with_the_reason(controller, form, change
 
 async def test_a_folder_that_cannot_be_looked_through_is_a_reason(form, tmp_path, monkeypatch, post):
     (tmp_path / "found" / "gone").mkdir()
-    real = os.scandir
-
-    def scandir(path):
-        if str(path).endswith("gone"):
-            raise FileNotFoundError(2, "No such file or directory", str(path))
-        return real(path)
-
     with monkeypatch.context() as patch:
-        patch.setattr(os, "scandir", scandir)
+        refuse_folders(patch, "gone", FileNotFoundError(2, "No such file or directory"))
         status, text = await post(PLAN, form)
     assert (status, "gone cannot be (No such file or directory)" in text) == (400, True), text
     with monkeypatch.context() as patch:

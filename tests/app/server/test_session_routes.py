@@ -97,13 +97,13 @@ async def test_foreign_requests_and_public_pages_open_nothing(folders, serve):
 async def test_paths_are_completed(folders, serve):
     client = await serve()
     parent = folders[0].parent
-    found = json.loads((await client.get(f"/sessions/paths?text={parent}/"))[1])
-    assert [(one["path"], one["is_session"]) for one in found] == [
+    report = json.loads((await client.get(f"/sessions/paths?text={parent}/"))[1])
+    assert [(one["path"], one["is_session"]) for one in report] == [
         (f"{parent}/dance/", True),
         (f"{parent}/walk/", True),
     ]
-    found = json.loads((await client.get(f"/sessions/paths?text={parent}/WA"))[1])
-    assert [one["path"] for one in found] == [f"{parent}/walk/"]
+    report = json.loads((await client.get(f"/sessions/paths?text={parent}/WA"))[1])
+    assert [one["path"] for one in report] == [f"{parent}/walk/"]
     for text in ("relative", "", f"{parent}/nothing/x", "%00"):
         assert json.loads((await client.get(f"/sessions/paths?text={text}"))[1]) == []
 

@@ -145,9 +145,9 @@ def test_exchanged_footage_of_a_fisheye_is_named(session):
             return [frames[nearest][i] for i in self.order]
 
     assert find_exchange(loaded.cameras, Frames((0, 1, 2, 3))) is None
-    found = find_exchange(loaded.cameras, Frames((3, 1, 2, 0)))
-    assert found is not None
-    assert set(found.cameras) == {"FRONT", "LEFT"}
+    exchange = find_exchange(loaded.cameras, Frames((3, 1, 2, 0)))
+    assert exchange is not None
+    assert set(exchange.cameras) == {"FRONT", "LEFT"}
 
 
 @pytest.mark.slow

@@ -14,10 +14,16 @@ def compiled(kernels):
     """The program under test does not wait for its kernels."""
 
 
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A copy of the sample."""
+    return shutil.copytree(SAMPLE, tmp_path_factory.mktemp("live") / "session")
+
+
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def program(tmp_path_factory):
-    """The program on a copy of the sample, for all tests of a module that make none of their own."""
-    async with started(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("live") / "session")) as running:
+async def program(folder):
+    """The program on a folder, for all tests of a module that start none of their own."""
+    async with started(folder) as running:
         yield running
 
 

@@ -1,12 +1,9 @@
 """The real program: frames are planned, annotated, verified and rejected in the page, and a restart keeps that."""
 
-import shutil
 from contextlib import closing
 
 import pytest
-import pytest_asyncio
 from page_driver import dragging, shows
-from program import ROOT, started
 
 from tracker.annotation.comments import read_comments
 from tracker.annotation.plan import read_tasks
@@ -16,18 +13,6 @@ from tracker.session.store.annotation_store import AnnotationStore
 pytestmark = pytest.mark.slow
 
 COUNTER = "document.querySelector('.plan-counter b').textContent"
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A copy of the sample."""
-    return shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", tmp_path_factory.mktemp("plan") / "session")
-
-
-@pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def program(folder):
-    async with started(folder) as running:
-        yield running
 
 
 async def at(page, frame):

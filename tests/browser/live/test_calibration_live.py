@@ -8,7 +8,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from page_driver import shows, state_of
+from page_driver import go_to, shows, state_of
 from program import ROOT, started, visited
 
 from tracker.footage.recording import Recording
@@ -94,18 +94,12 @@ async def gap_px(page, border, camera, kind="model"):
     return float(np.median(np.linalg.norm(border[:, None] - drawn, axis=2).min(axis=1)))
 
 
-async def at_frame(page, frame):
-    await page.locator("#frame").fill(str(frame))
-    await page.keyboard.press("Enter")
-    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 30)
-
-
 async def checked(page):
     """Open the panel on a frame and check the cameras."""
     await page.evaluate(SECTION)
     await page.reload()
     await shows(page, "window.quadrille?.state.overlay", 60)
-    await at_frame(page, FRAME)
+    await go_to(page, FRAME)
     await page.get_by_role("button", name="Check the cameras").click()
     await shows(page, "quadrille.state.calibration.is_checked", 120)
 
@@ -119,7 +113,7 @@ async def previewed(page):
 async def tracked_again(page):
     await page.get_by_role("button", name="Track again").click()
     await shows(page, "!quadrille.state.state.track.running && quadrille.state.state.undo.startsWith('track')", 120)
-    await at_frame(page, FRAME)
+    await go_to(page, FRAME)
     await shows(page, f"quadrille.state.timeline[{FRAME}].source === 'tracked'", 20)
 
 
@@ -134,7 +128,7 @@ async def healthy_gap_px(browser, folder):
     session = tracked_copy(folder, lambda s: s)
     async with started(folder) as program, visited(browser, program.address) as page:
         await shows(page, "window.quadrille?.state.overlay", 60)
-        await at_frame(page, FRAME)
+        await go_to(page, FRAME)
         return await gap_px(page, silhouette_px(session, LEFT, FRAME), LEFT)
 
 

@@ -6,8 +6,8 @@ import shutil
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import handle_of, shows, state_of
-from program import ROOT, started, visited
+from page_driver import go_to, handle_of, shows, state_of
+from program import ROOT, visited
 
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
@@ -20,9 +20,9 @@ START = 8
 """The arms are on their way up."""
 
 
-@pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def program(tmp_path_factory):
-    """The program on a copy of the sample whose body a person has put in place on one frame."""
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A copy of the sample whose body a person has put in place on one frame."""
     folder = shutil.copytree(SAMPLE, tmp_path_factory.mktemp("tracking") / "session")
     session = load_session(folder)
     model = session.people[0].model
@@ -32,8 +32,7 @@ async def program(tmp_path_factory):
     pose = PoseRecord(truth.values[START], ("manual",) * len(model.value_names), revision, keyframe=True)
     store.commit("place", [PoseChange("person", START, pose)])
     store.close()
-    async with started(folder) as running:
-        yield running
+    return folder
 
 
 @pytest_asyncio.fixture(loop_scope="session")
@@ -62,12 +61,6 @@ async def said(page, expression, timeout_s=60.0):
     async with asyncio.timeout(timeout_s):
         while not await page.evaluate(expression):
             await asyncio.sleep(0.005)
-
-
-async def go_to(page, frame):
-    await page.locator("#frame").fill(str(frame))
-    await page.keyboard.press("Enter")
-    await shows(page, FOLLOWED.format(frame), 60)
 
 
 async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):

@@ -6,7 +6,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import dragging, shows, state_of
+from page_driver import dragging, go_to, shows, state_of
 from program import ROOT, started, visited
 from run_with_doubt import store_run
 
@@ -18,12 +18,6 @@ async def live(browser, tmp_path):
     folder = shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", tmp_path / "session")
     async with started(folder) as program, visited(browser, program.address) as page:
         yield page, folder
-
-
-async def go_to(page, frame):
-    await page.locator("#frame").fill(str(frame))
-    await page.keyboard.press("Enter")
-    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 30)
 
 
 @pytest.mark.slow

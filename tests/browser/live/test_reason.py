@@ -5,7 +5,7 @@ import shutil
 import pytest
 import pytest_asyncio
 from page_driver import shows, state_of
-from program import ROOT, started, visited
+from program import ROOT, visited
 from run_with_doubt import WRONG_FRAME, store_run
 
 pytestmark = pytest.mark.slow
@@ -16,13 +16,12 @@ GHOSTS = "quadrille.state.overlay.paths.filter(({ kind, count }) => kind === 'al
 WORST = ".reason-table td.is-worst"
 
 
-@pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def program(tmp_path_factory):
-    """The program on a tracked copy of the sample, with an arm that is wrong on one frame."""
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A tracked copy of the sample, with an arm that is wrong on one frame."""
     folder = shutil.copytree(SAMPLE, tmp_path_factory.mktemp("reason") / "session")
     store_run(folder)
-    async with started(folder) as running:
-        yield running
+    return folder
 
 
 @pytest_asyncio.fixture(loop_scope="session")

@@ -1,12 +1,11 @@
 """The real program with two people: each page has its own frame and undo, sees the other, and edits in turn."""
 
-import shutil
 from contextlib import asynccontextmanager, closing
 
 import pytest
 import pytest_asyncio
 from page_driver import OPENED, dragging, go_to, shows
-from program import ROOT, WITHOUT_3D, started
+from program import WITHOUT_3D, started
 
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
@@ -14,12 +13,6 @@ from tracker.session.store.annotation_store import AnnotationStore
 pytestmark = pytest.mark.slow
 
 OTHERS = "document.querySelectorAll('#participant-chips .participant-chip').length"
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A copy of the sample."""
-    return shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", tmp_path_factory.mktemp("pair") / "session")
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")

@@ -56,8 +56,8 @@ def recording(session, unsure=("right arm",), on=STRETCH, lost=0.0, n=N, keyfram
 
 
 def test_the_middle_of_a_stretch_on_which_a_limb_is_unsure_comes_first(session):
-    found = propose(session, [recording(session)])
-    (click,) = found.clicks
+    proposals = propose(session, [recording(session)])
+    (click,) = proposals.clicks
     assert (click.frame, click.limb, click.person) == (24, "right arm", 0)
     assert STRETCH[0] <= click.frames[0] < 24 < click.frames[1] <= STRETCH[-1]
     assert click.now_mm == pytest.approx(1000 * float(mean_errors(np.array(UNSURE_M**2), np.array(0.0))))
@@ -67,8 +67,8 @@ def test_the_middle_of_a_stretch_on_which_a_limb_is_unsure_comes_first(session):
     assert set(click.views) <= {*names}
     first, last = click.frames
     assert click.reason.startswith(f"right arm, frames {first} to {last}, seen best in {click.views[0]}: ")
-    assert 0 < click.gain_mm < found.error_mm - found.best_mm
-    assert found.interval_mm[0] < found.error_mm < found.interval_mm[1]
+    assert 0 < click.gain_mm < proposals.error_mm - proposals.best_mm
+    assert proposals.interval_mm[0] < proposals.error_mm < proposals.interval_mm[1]
 
 
 def test_odds_of_a_lost_limb_count_as_the_error_of_a_lost_limb(session):
@@ -93,16 +93,16 @@ def test_an_action_carries_no_further_than_the_next_keyframe(session):
 
 def test_proposals_in_a_row_never_repeat_and_gain_less_and_less(session):
     poses = recording(session, ("right arm", "left leg"), range(2, 38), lost=0.3)
-    found = propose(session, [poses], 12)
-    assert len(found.clicks) > 3
-    assert len({(c.frame, c.limb) for c in found.clicks}) == len(found.clicks)
-    assert sum(c.gain_mm for c in found.clicks) <= found.error_mm - found.best_mm + 1e-6
+    proposals = propose(session, [poses], 12)
+    assert len(proposals.clicks) > 3
+    assert len({(c.frame, c.limb) for c in proposals.clicks}) == len(proposals.clicks)
+    assert sum(c.gain_mm for c in proposals.clicks) <= proposals.error_mm - proposals.best_mm + 1e-6
 
 
 def test_nothing_pays_where_a_hand_is_no_better(session):
-    found = propose(session, [recording(session, ())], 3)
-    assert found.clicks == ()
-    assert found.best_mm == pytest.approx(found.error_mm)
+    proposals = propose(session, [recording(session, ())], 3)
+    assert proposals.clicks == ()
+    assert proposals.best_mm == pytest.approx(proposals.error_mm)
     clumsy = HandSettings(sigma_px=60.0)
     assert propose(session, [recording(session)], 3, clumsy).clicks == ()
     with pytest.raises(SessionError, match="expected poses to improve, found none"):

@@ -150,54 +150,54 @@ def test_twist_counts_only_where_it_shows(model):
     for bend, expected in ((0, 0.0), (19, None), (21, None), (90, None)):
         true = pose(model, left_elbow__extension=bend)
         estimate = pose(model, left_elbow__extension=bend, left_shoulder__twist=30)
-        found = compared(model, {0: estimate}, {0: true})
+        comparison = compared(model, {0: estimate}, {0: true})
         # The forearm's axis swings around the upper arm's by the twist: 2 asin(sin(bend) sin(15)).
         swing = np.degrees(2 * np.arcsin(np.sin(np.radians(bend)) * np.sin(np.radians(15))))
         wanted = (swing if bend < 20 else 60.0) / n_parts
-        assert found.axis_error_deg == pytest.approx(wanted if expected is None else expected, abs=1e-9)
-        assert found.long_axis_error_deg == pytest.approx(swing / n_parts, abs=1e-9)
-        assert found.angle_error_deg["left_shoulder.twist"] == pytest.approx(30)
-        assert found.angle_error_deg["left_elbow.extension"] == pytest.approx(0)
-        assert "torso.x" not in found.angle_error_deg
+        assert comparison.axis_error_deg == pytest.approx(wanted if expected is None else expected, abs=1e-9)
+        assert comparison.long_axis_error_deg == pytest.approx(swing / n_parts, abs=1e-9)
+        assert comparison.angle_error_deg["left_shoulder.twist"] == pytest.approx(30)
+        assert comparison.angle_error_deg["left_elbow.extension"] == pytest.approx(0)
+        assert "torso.x" not in comparison.angle_error_deg
 
 
 def test_body_turn_counts_whole_for_trunk_and_head(model):
     # Turning about the vertical leaves all limbs' hanging axes as they are.
-    found = compared(model, {0: pose(model, torso__twist=40)}, {0: pose(model)})
-    assert found.axis_error_deg == pytest.approx(2 * 40 / len(model.parts))
-    assert found.per_part_axis_deg["torso"] == pytest.approx(40)
-    assert found.per_part_axis_deg["left_calf"] == pytest.approx(0)
+    comparison = compared(model, {0: pose(model, torso__twist=40)}, {0: pose(model)})
+    assert comparison.axis_error_deg == pytest.approx(2 * 40 / len(model.parts))
+    assert comparison.per_part_axis_deg["torso"] == pytest.approx(40)
+    assert comparison.per_part_axis_deg["left_calf"] == pytest.approx(0)
 
 
 def test_the_worst_frame(model):
     raised = {3: pose(model), 4: pose(model, left_hip__elevation=30), 5: pose(model, left_hip__elevation=10)}
-    found = compared(model, raised, dict.fromkeys((3, 4, 5), pose(model)), range(9))
+    comparison = compared(model, raised, dict.fromkeys((3, 4, 5), pose(model)), range(9))
     n = len(model.parts)
-    assert found.axis_error_deg == pytest.approx(2 * 40 / n / 3)
-    assert (found.worst_axis_error_deg, found.worst_axis_frame) == (pytest.approx(2 * 30 / n), 4)
+    assert comparison.axis_error_deg == pytest.approx(2 * 40 / n / 3)
+    assert (comparison.worst_axis_error_deg, comparison.worst_axis_frame) == (pytest.approx(2 * 30 / n), 4)
 
 
 def test_angles_go_the_shorter_way_round(model):
-    found = compared(model, {0: pose(model, torso__twist=179)}, {0: pose(model, torso__twist=-179)})
-    assert found.angle_error_deg["torso.twist"] == pytest.approx(2)
+    comparison = compared(model, {0: pose(model, torso__twist=179)}, {0: pose(model, torso__twist=-179)})
+    assert comparison.angle_error_deg["torso.twist"] == pytest.approx(2)
 
 
 def test_body_size_does_not_matter_to_angles(model):
     other = load_model("gavrila22", 1.5)
-    found = compared(other, {3: pose(other, left_hip__elevation=10)}, {3: pose(model)}, range(9), model)
-    assert found.axis_error_deg == pytest.approx(2 * 10 / len(model.parts))  # thigh and calf
-    assert found.angle_error_deg["left_hip.elevation"] == pytest.approx(10)
+    comparison = compared(other, {3: pose(other, left_hip__elevation=10)}, {3: pose(model)}, range(9), model)
+    assert comparison.axis_error_deg == pytest.approx(2 * 10 / len(model.parts))  # thigh and calf
+    assert comparison.angle_error_deg["left_hip.elevation"] == pytest.approx(10)
 
 
 def test_bodies_of_other_parts_are_compared_by_the_names_of_parts(model):
     bending = load_model("gavrila34", 1.6)
     estimate = pose(bending, waist__elevation=20, left_elbow__extension=70)
-    found = compared(bending, {0: estimate}, {0: pose(model, left_elbow__extension=60)}, true_model=model)
-    assert sorted(found.per_part_axis_deg) == sorted(model.part_index)  # no pelvis, no collars
+    comparison = compared(bending, {0: estimate}, {0: pose(model, left_elbow__extension=60)}, true_model=model)
+    assert sorted(comparison.per_part_axis_deg) == sorted(model.part_index)  # no pelvis, no collars
     # Below the waist all is turned by 20 degrees; the trunk of the one is the chest of the other.
     expected = dict.fromkeys(("left_thigh", "left_calf", "right_thigh", "right_calf"), 20.0) | {"left_forearm": 10.0}
-    assert found.per_part_axis_deg == pytest.approx({n: expected.get(n, 0.0) for n in model.part_index}, abs=1e-9)
-    assert found.angle_error_deg is None
+    assert comparison.per_part_axis_deg == pytest.approx({n: expected.get(n, 0.0) for n in model.part_index}, abs=1e-9)
+    assert comparison.angle_error_deg is None
 
 
 def test_no_frame_in_common(model):

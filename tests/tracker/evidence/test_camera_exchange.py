@@ -58,11 +58,11 @@ def test_the_right_assignment_passes(frames):
 @pytest.mark.parametrize(("pair", "side"), [((0, 3), True), ((1, 2), False)])
 def test_exchanged_footage_is_named(frames, pair, side):
     order, sources = exchanged(*pair, side=side)
-    found = find_exchange(sources, Frames(frames, order))
-    assert found is not None
-    assert set(found.cameras) == {NAMES[i] for i in pair}
-    assert found.exchanged_coverage > found.coverage + 0.1
-    assert "seems to be exchanged" in found.text
+    exchange = find_exchange(sources, Frames(frames, order))
+    assert exchange is not None
+    assert set(exchange.cameras) == {NAMES[i] for i in pair}
+    assert exchange.exchanged_coverage > exchange.coverage + 0.1
+    assert "seems to be exchanged" in exchange.text
 
 
 @pytest.mark.slow
@@ -93,7 +93,7 @@ def test_recordings(data_folder, name):
         replace(b, footage=a.footage, background=a.background),
     ]
     with Recording([*files, *sources[2:]]) as recording:
-        found = find_exchange([*files, *sources[2:]], recording)
-    assert found is not None
+        exchange = find_exchange([*files, *sources[2:]], recording)
+    assert exchange is not None
     # In a square the exchange across is the same arrangement, turned.
-    assert set(found.cameras) in ({e.name for e in entries[:2]}, {e.name for e in entries[2:]})
+    assert set(exchange.cameras) in ({e.name for e in entries[:2]}, {e.name for e in entries[2:]})

@@ -61,17 +61,17 @@ def test_objects_of_one_picture(several):
     ],
 )
 def test_times_in_names(names, times):
-    found = picture_numbers(names)
-    assert found.numbers is None
-    assert "and no number that rises by one" in found.reason
+    numbers = picture_numbers(names)
+    assert numbers.numbers is None
+    assert "and no number that rises by one" in numbers.reason
     times = [k * 0.033367 for k in range(91)] if times is None else times
-    assert [t - found.times[0] for t in found.times] == pytest.approx(times, abs=1e-3)
+    assert [t - numbers.times[0] for t in numbers.times] == pytest.approx(times, abs=1e-3)
 
 
 def test_a_time_beside_the_number_is_kept():
-    found = picture_numbers([f"{k:04d}_1698000{17 + k // 4:03d}.{250 * (k % 4):03d}" for k in range(12)])
-    assert found.numbers == tuple(range(12))
-    assert found.times == tuple(1698000017 + k / 4 for k in range(12))
+    numbers = picture_numbers([f"{k:04d}_1698000{17 + k // 4:03d}.{250 * (k % 4):03d}" for k in range(12)])
+    assert numbers.numbers == tuple(range(12))
+    assert numbers.times == tuple(1698000017 + k / 4 for k in range(12))
 
 
 @pytest.mark.parametrize(
@@ -86,9 +86,9 @@ def test_a_time_beside_the_number_is_kept():
     ],
 )
 def test_doubt_is_named_with_its_readings(names, reason):
-    found = picture_numbers(names)
-    assert (found.numbers, found.times) == (None, None)
-    assert reason in found.reason
+    numbers = picture_numbers(names)
+    assert (numbers.numbers, numbers.times) == (None, None)
+    assert reason in numbers.reason
 
 
 @pytest.mark.parametrize("names", [["mask_12"], ["a_" + 5000 * "9"], ["²_1", "²_2"], ["", "1"]])
@@ -102,12 +102,12 @@ def test_one_file():
 
 @given(st.lists(st.text("0129_-. aFé²١", max_size=12), min_size=1, max_size=8, unique=True), st.booleans())
 def test_any_names(names, may_repeat):
-    found = picture_numbers(names, may_repeat)
-    assert (found.numbers is None) == bool(found.reason)
-    for values in (found.numbers, found.times):
+    numbers = picture_numbers(names, may_repeat)
+    assert (numbers.numbers is None) == bool(numbers.reason)
+    for values in (numbers.numbers, numbers.times):
         assert values is None or len(values) == len(names)
-    if found.numbers is not None and not may_repeat:
-        assert len(set(found.numbers)) == len(names)
+    if numbers.numbers is not None and not may_repeat:
+        assert len(set(numbers.numbers)) == len(names)
 
 
 @pytest.mark.parametrize("width", [3, 6, 9])

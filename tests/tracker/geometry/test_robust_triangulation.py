@@ -22,9 +22,9 @@ def triangulated(views, points):
 def test_exact_points_through_a_lens(rig):
     session, views = rig
     truth = walking(20)
-    found = triangulated(views, seen(session, [truth])[:, :, 0])
-    assert np.abs(found.points_world - truth).max() < 1e-6
-    assert found.is_inlier.all()
+    triangulation = triangulated(views, seen(session, [truth])[:, :, 0])
+    assert np.abs(triangulation.points_world - truth).max() < 1e-6
+    assert triangulation.is_inlier.all()
 
 
 def test_an_outlier_in_one_view_does_not_pull(rig):
@@ -32,10 +32,10 @@ def test_an_outlier_in_one_view_does_not_pull(rig):
     truth = walking(20)
     points = seen(session, [truth], noise_px=0.5)[:, :, 0]
     points[5:9, 2, 4, :2] += (90.0, -60.0)
-    found = triangulated(views, points)
-    assert np.linalg.norm(found.points_world - truth, axis=-1).max() < 0.02
-    assert not found.is_inlier[5:9, 2, 4].any()
-    assert found.is_inlier[5:9, :2, 4].all()
+    triangulation = triangulated(views, points)
+    assert np.linalg.norm(triangulation.points_world - truth, axis=-1).max() < 0.02
+    assert not triangulation.is_inlier[5:9, 2, 4].any()
+    assert triangulation.is_inlier[5:9, :2, 4].all()
 
 
 def test_two_against_two_views_are_decided_by_the_motion(rig):
@@ -46,18 +46,18 @@ def test_two_against_two_views_are_decided_by_the_motion(rig):
     for v in (2, 3):
         points[8:11, v, 4, :2] = session.cameras[v].camera.project(elsewhere[8:11])
     points[8:11, 2:, 4, 2] = 0.95  # the wrong ones are the more confident
-    found = triangulated(views, points)
-    assert np.linalg.norm(found.points_world - truth, axis=-1)[:, 4].max() < 0.01
+    triangulation = triangulated(views, points)
+    assert np.linalg.norm(triangulation.points_world - truth, axis=-1)[:, 4].max() < 0.01
 
 
 def test_one_view_gives_no_point(rig):
     session, views = rig
     points = seen(session, [walking(20)])[:, :, 0]
     points[3, 1:, 7] = (np.nan, np.nan, 0.0)
-    found = triangulated(views, points)
-    assert np.isnan(found.points_world[3, 7]).all()
-    assert np.isnan(found.covariances[3, 7]).all()
-    assert np.isfinite(np.delete(found.points_world[3], 7, axis=0)).all()
+    triangulation = triangulated(views, points)
+    assert np.isnan(triangulation.points_world[3, 7]).all()
+    assert np.isnan(triangulation.covariances[3, 7]).all()
+    assert np.isfinite(np.delete(triangulation.points_world[3], 7, axis=0)).all()
 
 
 def test_a_point_that_ends_beside_a_camera_spoils_no_other(tmp_path):
@@ -75,9 +75,9 @@ def test_covariances_are_as_large_as_the_errors(rig):
     truth = walking(20)
     errors, variances = [], []
     for seed in range(4):
-        found = triangulated(views, seen(session, [truth], 2.0, seed)[:, :, 0])
-        errors.append(((found.points_world - truth) ** 2).sum(axis=-1))
-        variances.append(np.trace(found.covariances, axis1=-2, axis2=-1))
+        triangulation = triangulated(views, seen(session, [truth], 2.0, seed)[:, :, 0])
+        errors.append(((triangulation.points_world - truth) ** 2).sum(axis=-1))
+        variances.append(np.trace(triangulation.covariances, axis1=-2, axis2=-1))
     assert 0.7 < np.mean(errors) / np.mean(variances) < 1.4
 
 

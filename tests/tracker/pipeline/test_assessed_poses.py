@@ -38,20 +38,20 @@ def assessed(model, remark="", **known):
 def test_status_by_the_covariance_of_the_solve(gavrila, apart_m, status, remark):
     errors = np.zeros((len(gavrila.point_names), 3, 3))
     errors[gavrila.point_names.index("left_wrist")] = np.diag([apart_m**2, 0, 0])
-    found = assessed(gavrila, errors_m2=errors)
-    assert (found.status, found.remark) == (status, remark)
+    assessment = assessed(gavrila, errors_m2=errors)
+    assert (assessment.status, assessment.remark) == (status, remark)
     shared = assessed(gavrila).errors[0]
     assert np.trace(shared) > 0  # of what all views share
-    np.testing.assert_allclose(found.errors, errors + shared)
+    np.testing.assert_allclose(assessment.errors, errors + shared)
 
 
 @pytest.mark.parametrize(("mass", "status"), [(0.02, "good"), (0.3, "doubtful"), (0.9, "lost")])
 def test_status_by_the_mass_of_paths(gavrila, mass, status):
-    found = assessed(gavrila, elsewhere=at_limb(gavrila, mass))
+    assessment = assessed(gavrila, elsewhere=at_limb(gavrila, mass))
     reason = f"left arm uncertain: elsewhere on {100 * mass:.0f}% of the likely paths"
-    assert (found.status, found.remark) == (status, "" if status == "good" else reason)
+    assert (assessment.status, assessment.remark) == (status, "" if status == "good" else reason)
     off = at_limb(gavrila, True)
-    assert max(found.limbs_lost) == found.limbs_lost[int(off.argmax())]
+    assert max(assessment.limbs_lost) == assessment.limbs_lost[int(off.argmax())]
 
 
 @pytest.mark.parametrize(
@@ -66,17 +66,17 @@ def test_status_by_the_mass_of_paths(gavrila, mass, status):
 )
 def test_status_by_the_colors_of_the_run(gavrila, nats, is_searched, status):
     """They count less against limbs that were searched."""
-    found = assessed(
+    assessment = assessed(
         gavrila, by_colors=at_limb(gavrila, nats, rest=-20.0), is_searched=is_searched,
         against=("left hand elsewhere in A",) * len(limbs(gavrila)),
     )  # fmt: skip
-    assert found.status == status
-    assert found.remark == ("" if status == "good" else "left arm uncertain: left hand elsewhere in A")
+    assert assessment.status == status
+    assert assessment.remark == ("" if status == "good" else "left arm uncertain: left hand elsewhere in A")
 
 
 def test_a_limb_that_fewer_than_two_views_show_is_doubtful(gavrila):
-    found = assessed(gavrila, is_shown=at_limb(gavrila, False, rest=True))
-    assert (found.status, found.remark) == ("doubtful", "left arm uncertain: fewer than two views show it")
+    assessment = assessed(gavrila, is_shown=at_limb(gavrila, False, rest=True))
+    assert (assessment.status, assessment.remark) == ("doubtful", "left arm uncertain: fewer than two views show it")
     lost = assessed(gavrila, is_shown=at_limb(gavrila, False, rest=True), elsewhere=at_limb(gavrila, 0.9))
     assert lost.status == "lost"
 
@@ -93,12 +93,17 @@ def test_the_head_is_not_searched():
 
 def test_the_worst_of_all_counts_and_the_reason_is_of_the_limb_that_it_speaks_against(gavrila):
     by_colors = np.maximum(*(at_limb(gavrila, 9.0, name, -20.0) for name in ("left_forearm", "right_calf")))
-    found = assessed(
+    assessment = assessed(
         gavrila, elsewhere=at_limb(gavrila, 0.97), by_colors=by_colors,
         against=("colours",) * len(limbs(gavrila)),
     )  # fmt: skip
-    assert (found.status, found.remark) == ("lost", "left arm uncertain: elsewhere on 97% of the likely paths")
-    assert sorted(found.limbs_lost)[-2] == found.limbs_lost[[x.name for x in limbs(gavrila)].index("right_calf")]
+    assert (assessment.status, assessment.remark) == (
+        "lost",
+        "left arm uncertain: elsewhere on 97% of the likely paths",
+    )
+    assert (
+        sorted(assessment.limbs_lost)[-2] == assessment.limbs_lost[[x.name for x in limbs(gavrila)].index("right_calf")]
+    )
 
 
 def test_other_poses_take_the_place_of_earlier_remarks_and_notes_stay(gavrila):
@@ -107,8 +112,11 @@ def test_other_poses_take_the_place_of_earlier_remarks_and_notes_stay(gavrila):
     remark = "right leg may be elsewhere, left leg uncertain, tracked back from frame 9"
     assert assessed(gavrila, remark).remark == "tracked back from frame 9"
     others = (Hypothesis(PosedBody(gavrila, other), cost=0.5),)
-    found = assessed(gavrila, remark, others=others, elsewhere=at_limb(gavrila, 0.4))
-    assert (found.status, found.remark) == ("doubtful", "tracked back from frame 9, left arm may be elsewhere")
+    assessment = assessed(gavrila, remark, others=others, elsewhere=at_limb(gavrila, 0.4))
+    assert (assessment.status, assessment.remark) == (
+        "doubtful",
+        "tracked back from frame 9, left arm may be elsewhere",
+    )
 
 
 def test_the_row_of_an_estimate_has_its_pose_and_costs_and_the_history_of_the_pose_before(gavrila):

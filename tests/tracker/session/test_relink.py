@@ -1,6 +1,5 @@
 """Moved footage gets its new place; other footage is refused, and nothing is written then."""
 
-import os
 import shutil
 import unicodedata
 from contextlib import closing
@@ -10,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from clips import SIZE, encode
+from unreadable_folders import refuse_folders
 
 from tracker import files
 from tracker.errors import RecordingError, Remedy, SessionError
@@ -85,14 +85,7 @@ def test_everything_is_found_by_a_search(room):
 def test_a_search_is_bounded_and_passes_over_what_nobody_may_read(room, monkeypatch):
     moved(room)
     (room / "disk" / "lost+found").mkdir()
-    real = os.scandir
-
-    def scandir(path):
-        if str(path).endswith("lost+found"):
-            raise PermissionError(13, "Permission denied", str(path))
-        return real(path)
-
-    monkeypatch.setattr(os, "scandir", scandir)
+    refuse_folders(monkeypatch, "lost+found")
     with monkeypatch.context() as patch:
         patch.setattr(files, "LIMITS", files.WalkLimits(entries=3))
         refuse(room, SessionError, "at most 3 files and folders in .*disk", Places(search=[room / "disk"]))

@@ -1,10 +1,8 @@
 """Back and forth along the history, by one entry or many, also after a restart; and edits that cannot be written."""
 
-import resource
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
+from full_disks import full_disk
 from gestures import drag
 
 from tracker.errors import SessionError
@@ -12,17 +10,6 @@ from tracker.errors import SessionError
 
 def labels(controller, limit=100):
     return [(e.label, e.undone) for e in controller.history.entries(limit)]
-
-
-@contextmanager
-def full_disk():
-    """Let no file grow, as a full disk does; what is there can be read."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.fixture
@@ -62,7 +49,7 @@ def test_the_history_lives_on_after_a_restart(edited, opened):
 
 @pytest.mark.slow
 def test_an_edit_on_a_full_disk_is_shown_and_saved_by_hand(edited, opened):
-    with full_disk():
+    with full_disk(0):
         edited.navigation.seek(6)
         drag(edited, "torso", (30.0, 0.0))
         moved = edited.state.poses[0]
@@ -98,7 +85,7 @@ def test_a_gesture_that_goes_on_after_the_disk_has_room_is_one_entry(edited):
         edited.pinning.move(1, (210.0, 205.0))
         edited.pinning.end(1)
     before = len(edited.history.entries(100))
-    with full_disk():
+    with full_disk(0):
         edited.pinning.begin(1, 7, 0, 0, "left_wrist", pixel, True)
         edited.pinning.move(1, (220.0, 210.0))
     edited.pinning.move(1, (230.0, 215.0))

@@ -43,19 +43,19 @@ def test_it_lies_under_people_who_stand_about(stands):
         {k: stands(*rng.uniform(-1, 1, 2), rng.uniform(-3, 3), NOISE_M * rng.standard_normal()) for k in range(n)}
         for n in (9, 4)
     ]
-    found = floor_from_feet(people)
-    assert off_deg(found) < 3 * found.tilt_deg < 3.0
-    assert found.plane.offset_m == pytest.approx(HEIGHT_M, abs=2 * NOISE_M)
-    assert found.spread_m < 2 * NOISE_M
-    assert found.n_places >= 9
+    floor = floor_from_feet(people)
+    assert off_deg(floor) < 3 * floor.tilt_deg < 3.0
+    assert floor.plane.offset_m == pytest.approx(HEIGHT_M, abs=2 * NOISE_M)
+    assert floor.spread_m < 2 * NOISE_M
+    assert floor.n_places >= 9
 
 
 def test_frames_in_the_air_do_not_count(stands):
     about = [(x, y, 0.7 * x) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)]
     person = {k: stands(*place, raised=0.25 * (k % 3 == 1)) for k, place in enumerate(about)}
-    found = floor_from_feet([person])
-    assert off_deg(found) < 0.1
-    assert found.plane.offset_m == pytest.approx(HEIGHT_M, abs=0.002)
+    floor = floor_from_feet([person])
+    assert off_deg(floor) < 0.1
+    assert floor.plane.offset_m == pytest.approx(HEIGHT_M, abs=0.002)
 
 
 def test_a_row_of_steps_shows_no_plane(stands):

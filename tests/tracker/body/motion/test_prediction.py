@@ -36,8 +36,8 @@ def motion(order, n, seed):
 @given(seed=st.integers(0, 10_000))
 def test_motion_of_the_order_is_foretold_exactly(order, window, seed):
     poses = motion(order, 8, seed)
-    found = predict(GAVRILA, list(poses[:-1]), unbounded(order, window))
-    np.testing.assert_allclose(found, poses[-1], atol=1e-9)
+    predicted = predict(GAVRILA, list(poses[:-1]), unbounded(order, window))
+    np.testing.assert_allclose(predicted, poses[-1], atol=1e-9)
 
 
 def test_only_the_window_counts():
@@ -101,9 +101,9 @@ def test_a_turn_through_half_a_circle_goes_on(order, way):
     assert FREE[twist]
     poses = np.tile(GAVRILA.neutral(), (4, 1))
     poses[:, twist] = way * np.radians([165, 175, -175, -165])
-    found = predict(GAVRILA, list(poses[:3]), PredictSettings(order, 3))
-    assert np.remainder(found[twist] - poses[3, twist] + np.pi, 2 * np.pi) - np.pi == pytest.approx(0, abs=1e-9)
-    np.testing.assert_allclose(np.delete(found, twist), np.delete(poses[3], twist), atol=1e-12)
+    predicted = predict(GAVRILA, list(poses[:3]), PredictSettings(order, 3))
+    assert np.remainder(predicted[twist] - poses[3, twist] + np.pi, 2 * np.pi) - np.pi == pytest.approx(0, abs=1e-9)
+    np.testing.assert_allclose(np.delete(predicted, twist), np.delete(poses[3], twist), atol=1e-12)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -116,10 +116,10 @@ def test_a_ball_turns_on(order):
         poses.append(poses[-1].copy())
         poses[-1][root] = rigid.quaternion_multiply(poses[-2][root], rigid.quaternion_exp(turn))
     for k in range(3, 20):
-        found = predict(BALL_MODEL, poses[:k], unbounded(order))
-        step = BALL_MODEL.difference(found, poses[k])
+        predicted = predict(BALL_MODEL, poses[:k], unbounded(order))
+        step = BALL_MODEL.difference(predicted, poses[k])
         np.testing.assert_allclose(step, 0, atol=1e-9, err_msg=str(k))
-        assert np.linalg.norm(found[root]) == pytest.approx(1)
+        assert np.linalg.norm(predicted[root]) == pytest.approx(1)
 
 
 def test_a_ball_is_bounded_and_held_in_its_cone():

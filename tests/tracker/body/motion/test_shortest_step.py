@@ -83,5 +83,5 @@ def test_an_arm_between_two_sets_of_angles_stays_in_its_place():
 
 
 def test_a_flip_is_not_predicted_as_a_turn():
-    found = predict(BODY, [posed(other(LOWERED)), posed(LOWERED), posed(LOWERED)], PredictSettings(1, 3))
-    same_place(BODY, found, posed(LOWERED))
+    predicted = predict(BODY, [posed(other(LOWERED)), posed(LOWERED), posed(LOWERED)], PredictSettings(1, 3))
+    same_place(BODY, predicted, posed(LOWERED))

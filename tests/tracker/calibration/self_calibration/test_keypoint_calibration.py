@@ -26,19 +26,19 @@ def center_errors_m(found, true, points):
 @pytest.mark.slow
 def test_cameras_and_focal_lengths_are_found_from_nothing():
     cameras, points = rig(), dancing(12)
-    found = calibrate_by_person(observed(cameras, points), blanks(cameras), STATURE_M)
-    scale, errors, R = joint_errors_m(found, points)
+    calibration = calibrate_by_person(observed(cameras, points), blanks(cameras), STATURE_M)
+    scale, errors, R = joint_errors_m(calibration, points)
     assert scale == pytest.approx(1.0, abs=0.03)
     assert np.median(errors) < 0.035  # 3 px are 24 mm at 4 m
-    assert center_errors_m(found, cameras, points).max() < 0.15
-    focal = np.array([c.K[0, 0] for c in found.cameras])
-    assert np.all(np.abs(np.log(focal / FOCAL_PX)) < 3 * found.adjusted.fit.focal_sigmas)
+    assert center_errors_m(calibration, cameras, points).max() < 0.15
+    focal = np.array([c.K[0, 0] for c in calibration.cameras])
+    assert np.all(np.abs(np.log(focal / FOCAL_PX)) < 3 * calibration.adjusted.fit.focal_sigmas)
     assert np.degrees(np.arccos(R[2, 2])) < 6
-    assert found.world.joints_world[..., 2][np.isfinite(found.world.joints_world[..., 2])].min() > -0.25
-    assert found.adjusted.sigma_px == pytest.approx(3.0, rel=0.15)
-    assert 0.001 < found.volume.low_m < found.volume.expected_m < found.volume.high_m < 0.02
-    assert 2 < np.median(found.held_out.px) < 4
-    assert any("one focal length for pictures of one size" in note for note in found.notes)
+    assert calibration.world.joints_world[..., 2][np.isfinite(calibration.world.joints_world[..., 2])].min() > -0.25
+    assert calibration.adjusted.sigma_px == pytest.approx(3.0, rel=0.15)
+    assert 0.001 < calibration.volume.low_m < calibration.volume.expected_m < calibration.volume.high_m < 0.02
+    assert 2 < np.median(calibration.held_out.px) < 4
+    assert any("one focal length for pictures of one size" in note for note in calibration.notes)
 
 
 @pytest.mark.slow
@@ -50,20 +50,20 @@ def test_gross_errors_and_exchanged_sides_have_no_influence():
     px, known = observations.points.points_px[:, :, 0].copy(), observations.points.confidence[:, :, 0].copy()
     observations.points.points_px[:, :, 0] = with_sides_exchanged(px, SIDES, is_exchanged)
     observations.points.confidence[:, :, 0] = with_sides_exchanged(known, SIDES, is_exchanged)
-    found = calibrate_by_person(observations, cameras, STATURE_M, has_lenses=True)
-    assert np.median(joint_errors_m(found, points)[1]) < 0.035
-    assert center_errors_m(found, cameras, points).max() < 0.1
-    mended = np.linalg.norm(found.seen.px[4:8, 1] - px[4:8, 1], axis=-1)
+    calibration = calibrate_by_person(observations, cameras, STATURE_M, has_lenses=True)
+    assert np.median(joint_errors_m(calibration, points)[1]) < 0.035
+    assert center_errors_m(calibration, cameras, points).max() < 0.1
+    mended = np.linalg.norm(calibration.seen.px[4:8, 1] - px[4:8, 1], axis=-1)
     assert np.nanmean(mended < 1) > 0.8
 
 
 @pytest.mark.slow
 def test_two_cameras_with_lenses_suffice_and_without_are_refused():
     cameras, points = rig(2, arc=1.2), dancing(12)
-    found = calibrate_by_person(observed(cameras, points), cameras, None, has_lenses=True)
-    assert found.cameras[0].K[0, 0] == FOCAL_PX
-    assert joint_errors_m(found, points)[0] == pytest.approx(1.70 / 1.75, abs=0.03)
-    assert found.notes[0].startswith("no height was given: the scale is that of a person of 1.75 m")
+    calibration = calibrate_by_person(observed(cameras, points), cameras, None, has_lenses=True)
+    assert calibration.cameras[0].K[0, 0] == FOCAL_PX
+    assert joint_errors_m(calibration, points)[0] == pytest.approx(1.70 / 1.75, abs=0.03)
+    assert calibration.notes[0].startswith("no height was given: the scale is that of a person of 1.75 m")
     with pytest.raises(CalibrationError, match="two alone hardly tell their focal lengths"):
         calibrate_by_person(observed(cameras, points), blanks(cameras), STATURE_M)
 
@@ -123,9 +123,9 @@ def test_doubtful_joints_and_means_of_joints_do_not_count():
 def test_exact_key_points_calibrate_with_the_error_of_rounding(has_lenses):
     cameras, points = rig(), dancing(30)
     lenses = cameras if has_lenses else blanks(cameras)
-    found = calibrate_by_person(observed(cameras, points, 0.0, 0.0), lenses, STATURE_M, has_lenses)
-    assert center_errors_m(found, cameras, points).max() < 1e-3
-    assert found.volume.expected_m > 1e-5
+    calibration = calibrate_by_person(observed(cameras, points, 0.0, 0.0), lenses, STATURE_M, has_lenses)
+    assert center_errors_m(calibration, cameras, points).max() < 1e-3
+    assert calibration.volume.expected_m > 1e-5
 
 
 @pytest.mark.slow
@@ -162,5 +162,5 @@ def test_views_that_lag_are_named_and_others_are_not():
 def test_exact_key_points_of_joints_that_stand_still_calibrate():
     cameras, points = rig(), dancing(12)
     points[:, ::2] = points[0, ::2]
-    found = calibrate_by_person(observed(cameras, points, 0.0, 0.0), blanks(cameras), STATURE_M)
-    assert center_errors_m(found, cameras, points).max() < 1e-3
+    calibration = calibrate_by_person(observed(cameras, points, 0.0, 0.0), blanks(cameras), STATURE_M)
+    assert center_errors_m(calibration, cameras, points).max() < 1e-3

@@ -59,26 +59,26 @@ def test_the_reversal_of_reversed_cameras_is_chosen():
     wrong = reversed_in_depth(true, joints, None)
     own, others = misfits([true.adjusted, wrong.adjusted], joints)
     assert others > own + 100
-    found = compared([wrong], joints, None)
-    assert found.rivals == ()
-    for a, b in zip(found.chosen.adjusted.cameras, true.adjusted.cameras, strict=True):
+    comparison = compared([wrong], joints, None)
+    assert comparison.rivals == ()
+    for a, b in zip(comparison.chosen.adjusted.cameras, true.adjusted.cameras, strict=True):
         np.testing.assert_allclose(a.T_world_camera[:3, :3], b.T_world_camera[:3, :3], atol=0.02)
 
 
 @pytest.mark.slow
 def test_equal_solutions_are_no_rivals_and_the_first_is_chosen():
     true, joints = adjusted(distant(1))
-    found = compared([true, Solution(true.adjusted, Gauge(1, 2))], joints, None)
-    assert found.chosen is true
-    assert found.rivals == ()
+    comparison = compared([true, Solution(true.adjusted, Gauge(1, 2))], joints, None)
+    assert comparison.chosen is true
+    assert comparison.rivals == ()
 
 
 @pytest.mark.slow
 def test_both_solutions_of_distant_cameras_are_rivals():
     true, joints = adjusted(distant(32))
-    found = compared([true], joints, None)
-    assert found.chosen is true
-    assert len(found.rivals) == 1
+    comparison = compared([true], joints, None)
+    assert comparison.chosen is true
+    assert len(comparison.rivals) == 1
 
 
 def test_joints_that_a_solution_does_not_determine_are_gross_errors():
@@ -94,8 +94,8 @@ def test_joints_that_a_solution_does_not_determine_are_gross_errors():
 def test_a_person_on_one_spot_is_not_seen_reversed(scene, seed, has_lenses):
     cameras = make_cameras(4, (640, 480), seed)
     lenses = cameras if has_lenses else blanks(cameras)
-    found = calibrate_by_person(detected(cameras, acted(scene, 20, seed)[0], seed), lenses, 1.78, has_lenses)
-    assert min(c.center_world[2] for c in found.cameras) > 1.5  # all are 2.2 m high
+    calibration = calibrate_by_person(detected(cameras, acted(scene, 20, seed)[0], seed), lenses, 1.78, has_lenses)
+    assert min(c.center_world[2] for c in calibration.cameras) > 1.5  # all are 2.2 m high
 
 
 @pytest.mark.slow
@@ -112,5 +112,5 @@ def test_a_small_motion_before_distant_cameras_is_refused():
 @pytest.mark.slow
 def test_a_person_who_walks_before_distant_cameras_is_not_refused():
     cameras, points = distant(16), dancing(20, reach=1.0)
-    found = calibrate_by_person(observed(cameras, points), cameras, STATURE_M, has_lenses=True)
-    assert np.median(joint_errors_m(found, points)[1]) < 0.035
+    calibration = calibrate_by_person(observed(cameras, points), cameras, STATURE_M, has_lenses=True)
+    assert np.median(joint_errors_m(calibration, points)[1]) < 0.035

@@ -46,24 +46,24 @@ def true_persons(observations):
 
 @pytest.mark.slow
 def test_one_person_is_calibrated_as_before_there_were_several():
-    found = calibrate_by_person(observed(CAMERAS, dancing(12)), blanks(CAMERAS), STATURE_M)
+    calibration = calibrate_by_person(observed(CAMERAS, dancing(12)), blanks(CAMERAS), STATURE_M)
     focal = [505.6339933105496, 505.04707894689125, 505.99188644479096, 505.42333759770105]
-    np.testing.assert_allclose([c.K[0, 0] for c in found.cameras], focal, rtol=1e-9)
-    assert found.volume.expected_m == pytest.approx(0.0025141291258745, rel=1e-9)
+    np.testing.assert_allclose([c.K[0, 0] for c in calibration.cameras], focal, rtol=1e-9)
+    assert calibration.volume.expected_m == pytest.approx(0.0025141291258745, rel=1e-9)
     center = [-0.06283313120575862, 3.976285101545119, 1.7199562364937797]
-    np.testing.assert_allclose(found.cameras[2].center_world, center, atol=1e-9)
-    assert found.identified == (("person",), 0, 0)
+    np.testing.assert_allclose(calibration.cameras[2].center_world, center, atol=1e-9)
+    assert calibration.identified == (("person",), 0, 0)
 
 
 def test_people_are_matched_without_names():
     observations = detected(CAMERAS, JOINTS, tracks=ANN_BOB)
     true = true_persons(observations)
-    found = match_across_cameras(observations, Views(CAMERAS), np.full_like(true, -1), 0)
-    assert found.n_people == 2
-    used = found.persons >= 0
+    matches = match_across_cameras(observations, Views(CAMERAS), np.full_like(true, -1), 0)
+    assert matches.n_people == 2
+    used = matches.persons >= 0
     assert used.sum() > 0.8 * (true >= 0).sum()
-    first = true[used][0] != found.persons[used][0]  # persons are numbered in any order
-    assert np.array_equal(np.where(used, found.persons ^ first, -1)[used], true[used])
+    first = true[used][0] != matches.persons[used][0]  # persons are numbered in any order
+    assert np.array_equal(np.where(used, matches.persons ^ first, -1)[used], true[used])
 
 
 def test_names_are_votes():
@@ -71,28 +71,28 @@ def test_names_are_votes():
     true = true_persons(observations)
     named = true.copy()
     named[3:6, 1][true[3:6, 1] >= 0] ^= 1
-    found = match_across_cameras(observations, Views(CAMERAS), named, 2)
-    used = found.persons >= 0
-    assert np.array_equal(found.persons[used], true[used])
-    assert np.array_equal(found.is_exchanged, used & (named != true))
-    assert found.is_exchanged.any()
+    matches = match_across_cameras(observations, Views(CAMERAS), named, 2)
+    used = matches.persons >= 0
+    assert np.array_equal(matches.persons[used], true[used])
+    assert np.array_equal(matches.is_exchanged, used & (named != true))
+    assert matches.is_exchanged.any()
 
 
 def test_people_who_cannot_be_told_apart_are_left_out():
     twins = np.repeat(JOINTS[:, :1], 2, axis=1)
     observations = detected(CAMERAS[:2], twins, gross=0, offset_px=0)
     nobody = np.full(observations.points.is_known.shape[:3], -1)
-    found = match_across_cameras(observations, Views(CAMERAS[:2]), nobody, 0)
-    assert np.mean(found.persons >= 0) < 0.1  # twice as near by chance
+    matches = match_across_cameras(observations, Views(CAMERAS[:2]), nobody, 0)
+    assert np.mean(matches.persons >= 0) < 0.1  # twice as near by chance
 
 
 def test_a_person_whom_one_camera_shows_is_nobody():
     observations = detected(CAMERAS, JOINTS, tracks=ANN_BOB)
     true = true_persons(observations)
     observations.points.confidence[:, 1:][true[:, 1:] == 1] = 0
-    found = match_across_cameras(observations, Views(CAMERAS), np.full_like(true, -1), 0)
-    assert (found.persons[true == 1] < 0).all()
-    assert found.n_people == 1
+    matches = match_across_cameras(observations, Views(CAMERAS), np.full_like(true, -1), 0)
+    assert (matches.persons[true == 1] < 0).all()
+    assert matches.n_people == 1
 
 
 @pytest.mark.parametrize(
@@ -121,16 +121,16 @@ def test_files_name_nobody_where_one_does_not():
 @pytest.mark.slow
 def test_two_people_with_names_give_cameras_and_scale():
     observations = detected(CAMERAS, JOINTS, tracks=ANN_BOB)
-    found = calibrate_by_person(observations, blanks(CAMERAS), {"ann": STATURE_M, "bob": STATURE_M})
-    error_m, scale = median_error_m(found)
+    calibration = calibrate_by_person(observations, blanks(CAMERAS), {"ann": STATURE_M, "bob": STATURE_M})
+    error_m, scale = median_error_m(calibration)
     assert error_m < 0.04  # offsets and noise of 3.6 px are 29 mm at 4 m
     assert scale == pytest.approx(1, abs=0.03)
-    assert found.cameras[0].K[0, 0] == pytest.approx(FOCAL_PX, rel=0.05)
-    assert found.identified.names == ("ann", "bob")
-    assert found.identified.n_exchanged == 0
-    assert found.world.joints_world.shape[0] == 24
+    assert calibration.cameras[0].K[0, 0] == pytest.approx(FOCAL_PX, rel=0.05)
+    assert calibration.identified.names == ("ann", "bob")
+    assert calibration.identified.n_exchanged == 0
+    assert calibration.world.joints_world.shape[0] == 24
     alone = calibrate_by_person(observed(CAMERAS, dancing(12)), CAMERAS, STATURE_M, has_lenses=True)
-    assert found.scale_sigma == pytest.approx(alone.scale_sigma / np.sqrt(2))
+    assert calibration.scale_sigma == pytest.approx(alone.scale_sigma / np.sqrt(2))
     one = calibrate_by_person(observations, CAMERAS, {"bob": 1.5 * STATURE_M}, has_lenses=True)
     assert median_error_m(one)[1] == pytest.approx(1 / 1.5, abs=0.02)
 
@@ -138,11 +138,14 @@ def test_two_people_with_names_give_cameras_and_scale():
 @pytest.mark.slow
 def test_people_without_names_follow_from_one_who_is_alone():
     observations = detected(CAMERAS, danced(24), alone=10)
-    found = calibrate_by_person(observations, CAMERAS, STATURE_M, has_lenses=True)
-    assert found.identified.names == ("person 1", "person 2")
-    assert found.seen.is_seen[12:].sum() > 1.6 * found.seen.is_seen[12:, :, : len(found.seen.names)].sum()
-    assert any("the height was taken for that of each of the 2 people" in note for note in found.notes)
-    assert median_error_m(found, danced(24))[0] < 0.04
+    calibration = calibrate_by_person(observations, CAMERAS, STATURE_M, has_lenses=True)
+    assert calibration.identified.names == ("person 1", "person 2")
+    assert (
+        calibration.seen.is_seen[12:].sum()
+        > 1.6 * calibration.seen.is_seen[12:, :, : len(calibration.seen.names)].sum()
+    )
+    assert any("the height was taken for that of each of the 2 people" in note for note in calibration.notes)
+    assert median_error_m(calibration, danced(24))[0] < 0.04
 
 
 @pytest.mark.slow
@@ -150,10 +153,10 @@ def test_exchanged_names_are_mended_or_refused():
     observations = detected(CAMERAS, JOINTS, tracks=ANN_BOB)
     some = np.zeros((12, 4), dtype=bool)
     some[2:4, 1] = True
-    found = calibrate_by_person(swapped(observations, some), CAMERAS, STATURE_M, has_lenses=True)
-    assert 2 <= found.identified.n_exchanged <= 4
-    assert any("times a file gives a person the name of another" in note for note in found.notes)
-    assert median_error_m(found)[0] < 0.04
+    calibration = calibrate_by_person(swapped(observations, some), CAMERAS, STATURE_M, has_lenses=True)
+    assert 2 <= calibration.identified.n_exchanged <= 4
+    assert any("times a file gives a person the name of another" in note for note in calibration.notes)
+    assert median_error_m(calibration)[0] < 0.04
     half = np.random.default_rng(0).random((12, 4)) < 0.5
     with pytest.raises(
         CalibrationError, match=r"names that mean one person in all cameras, found \d+ of \d+ in camera"
@@ -165,9 +168,9 @@ def test_exchanged_names_are_mended_or_refused():
 def test_names_that_mean_nothing_are_left_where_one_person_is_alone():
     observations = detected(CAMERAS, danced(24), alone=10, tracks=ANN_BOB)
     half = np.random.default_rng(0).random((24, 4)) < 0.5
-    found = calibrate_by_person(swapped(observations, half), CAMERAS, STATURE_M, has_lenses=True)
-    assert found.identified == (("person 1", "person 2"), found.identified.n_left_out, 0)
-    assert "the names of the people contradict each other in the cameras and were not used" in found.notes
+    calibration = calibrate_by_person(swapped(observations, half), CAMERAS, STATURE_M, has_lenses=True)
+    assert calibration.identified == (("person 1", "person 2"), calibration.identified.n_left_out, 0)
+    assert "the names of the people contradict each other in the cameras and were not used" in calibration.notes
 
 
 @pytest.mark.slow

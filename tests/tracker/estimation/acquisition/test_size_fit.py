@@ -64,13 +64,13 @@ def test_lengths_and_girths_of_another_body_are_found(seed, model):
     person = other_body(seed=seed)
     parameters = SizeParameters(model)
     frames = sighted(person, model, range(5), placed=True)
-    found = fit_sizes_to_contours(parameters, frames, SizeFitSettings())
+    fit = fit_sizes_to_contours(parameters, frames, SizeFitSettings())
     for measure in (thicknesses, lengths):
-        was, now = (np.abs(measure(b) / measure(person) - 1).mean() for b in (model, found.body))
+        was, now = (np.abs(measure(b) / measure(person) - 1).mean() for b in (model, fit.body))
         assert now < 0.05 < was
     off = [
-        np.linalg.norm(found.body.points_world(p) - f.placed.targets_world, axis=1).mean()
-        for p, f in zip(found.poses, frames, strict=True)
+        np.linalg.norm(fit.body.points_world(p) - f.placed.targets_world, axis=1).mean()
+        for p, f in zip(fit.poses, frames, strict=True)
     ]
     assert np.mean(off) < 0.012
 
@@ -93,9 +93,9 @@ def test_a_stated_height_is_kept_against_contours_of_another():
 @pytest.mark.slow
 def test_an_own_body_stays_as_it_is(model):
     """Contours of the very body, from poses that are off: nothing makes the sizes differ."""
-    found = fit_sizes_to_contours(SizeParameters(model), sighted(model, model, range(4)), SizeFitSettings())
-    assert found.body.height_m == pytest.approx(1.7, rel=0.01)
-    assert np.abs(thicknesses(found.body) / thicknesses(model) - 1).max() < 0.03
+    fit = fit_sizes_to_contours(SizeParameters(model), sighted(model, model, range(4)), SizeFitSettings())
+    assert fit.body.height_m == pytest.approx(1.7, rel=0.01)
+    assert np.abs(thicknesses(fit.body) / thicknesses(model) - 1).max() < 0.03
 
 
 @pytest.mark.slow
@@ -135,9 +135,9 @@ def test_frames_whose_errors_are_alike_count_as_fewer(model):
 def test_unseen_parts_stay_as_uncertain_as_before(model):
     parameters = SizeParameters(model)
     nothing = [f._replace(views=()) for f in sighted(model, model, range(2))]
-    found = fit_sizes_to_contours(parameters, nothing, SizeFitSettings())
-    np.testing.assert_allclose(found.sizes, 0, atol=1e-6)
-    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), parameters.sigmas, rtol=1e-6)
+    fit = fit_sizes_to_contours(parameters, nothing, SizeFitSettings())
+    np.testing.assert_allclose(fit.sizes, 0, atol=1e-6)
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), parameters.sigmas, rtol=1e-6)
 
 
 @pytest.mark.slow
@@ -145,8 +145,8 @@ def test_only_the_kinds_of_a_round_change():
     person, model = other_body(), load_model("gavrila22", 1.7)
     parameters = SizeParameters(model)
     settings = SizeFitSettings(rounds=(Round(("height",), 1.0),))
-    found = fit_sizes_to_contours(parameters, sighted(person, model, range(2)), settings)
-    assert np.flatnonzero(found.sizes).tolist() == [parameters.names.index("height")]
+    fit = fit_sizes_to_contours(parameters, sighted(person, model, range(2)), settings)
+    assert np.flatnonzero(fit.sizes).tolist() == [parameters.names.index("height")]
 
 
 def test_the_fit_can_be_stopped(model):
@@ -287,12 +287,12 @@ def test_the_height_of_a_child_is_the_stature():
     model = load_model("gavrila22", 1.1)
     child = with_child_proportions(model)
     frames = sighted(child, model, range(2), placed=True)
-    found = fit_sizes_to_contours(SizeParameters(model), frames, SizeFitSettings())
+    fit = fit_sizes_to_contours(SizeParameters(model), frames, SizeFitSettings())
     expected = model.height_m * stature_m(child) / stature_m(model)
     assert abs(expected / child.height_m - 1) > 0.02
-    assert found.body.height_m == pytest.approx(expected, rel=0.015)
-    assert found.body.height_m / stature_m(found.body) == pytest.approx(model.height_m / stature_m(model), rel=1e-6)
-    off = found.body.points_world(found.poses[0]) - frames[0].placed.targets_world
+    assert fit.body.height_m == pytest.approx(expected, rel=0.015)
+    assert fit.body.height_m / stature_m(fit.body) == pytest.approx(model.height_m / stature_m(model), rel=1e-6)
+    off = fit.body.points_world(fit.poses[0]) - frames[0].placed.targets_world
     assert np.linalg.norm(off, axis=1).mean() < 0.012
 
 

@@ -65,9 +65,9 @@ def test_trunks_that_turned_the_wrong_way_are_found_again(model):
         truth = posed(model, seed)
         staged = Staged(model, truth, turned_trunk(model, truth, seed))
         assert staged.off_m(staged.here) > 0.1
-        found = staged.search()
-        assert staged.contour_cost(found) < staged.contour_cost(staged.here) - CLEAR_NATS
-        n_nearer += staged.off_m(found) < 0.6 * staged.off_m(staged.here)
+        result = staged.search()
+        assert staged.contour_cost(result) < staged.contour_cost(staged.here) - CLEAR_NATS
+        n_nearer += staged.off_m(result) < 0.6 * staged.off_m(staged.here)
     assert n_nearer >= 3
 
 

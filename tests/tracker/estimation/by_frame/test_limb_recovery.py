@@ -83,14 +83,14 @@ def test_lost_arms_are_found(name, colors, least):
         truth = posed(model, seed)
         staged = Staged(model, truth, turned(model, truth, **lost), colors)
         assert staged.off_m(staged.here, arm.parts) > 0.15
-        found = staged.search(arm)
-        assert found is staged.here or found.cost < staged.here.cost
-        np.testing.assert_allclose(model.clip(found.pose), found.pose, atol=1e-9)
+        result = staged.search(arm)
+        assert result is staged.here or result.cost < staged.here.cost
+        np.testing.assert_allclose(model.clip(result.pose), result.pose, atol=1e-9)
         # The others are where they were, which is where they belong.
         for other in limbs(model):
             if other.name not in (arm.name, "head"):
-                assert staged.off_m(found, other.parts) < 0.025, other.name
-        n_found += staged.off_m(found, arm.parts) < 0.03
+                assert staged.off_m(result, other.parts) < 0.025, other.name
+        n_found += staged.off_m(result, arm.parts) < 0.03
     assert n_found >= least
 
 
@@ -242,9 +242,9 @@ def test_other_poses_are_tried_as_they_are(gavrila):
     staged.scorer = replace(staged.scorer, settings=few)
     assert staged.search(arm, [staged.here.pose]) is staged.here
     before = turned(gavrila, truth, left_knee__extension=100, right_hip__elevation=60)
-    found = staged.search(arm, [before])
-    assert staged.off_m(found, arm.parts) < 0.03
-    assert staged.off_m(found, np.arange(len(gavrila.parts))) < 0.03
+    result = staged.search(arm, [before])
+    assert staged.off_m(result, arm.parts) < 0.03
+    assert staged.off_m(result, np.arange(len(gavrila.parts))) < 0.03
 
 
 def test_colours_tell_limbs_apart_that_edges_do_not(gavrila):

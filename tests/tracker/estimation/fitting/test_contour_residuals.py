@@ -183,15 +183,15 @@ def test_shaken_poses_come_back(name, seed):
     views, body, values = staged(model, seed, start_deg)
     match, reached = ContourResiduals(views, [body]), body.values
     for weights in (np.where(model.dof_is_length, 20.0, 7.0), np.ones(model.n_dofs)):
-        found = solve(model, reached, [match, PosePrior(reached, weights)], max_iterations=40, tolerance=1e-5)
-        reached = found.pose
-    off = np.linalg.norm(model.points_world(found.pose) - model.points_world(values), axis=1)
-    axes = [model.kinematics(v).Ts_world_part[:, :3, 2] for v in (values, found.pose)]
+        fit = solve(model, reached, [match, PosePrior(reached, weights)], max_iterations=40, tolerance=1e-5)
+        reached = fit.pose
+    off = np.linalg.norm(model.points_world(fit.pose) - model.points_world(values), axis=1)
+    axes = [model.kinematics(v).Ts_world_part[:, :3, 2] for v in (values, fit.pose)]
     degrees = np.degrees(np.arccos(np.clip(np.sum(axes[0] * axes[1], axis=1), -1, 1)))
     assert off.mean() < mean_m
     assert off.max() < largest_m
     assert degrees.mean() < axes_deg
-    assert match.costs(found.pose[None])[0] < 0.03 * match.costs(body.values[None])[0]
+    assert match.costs(fit.pose[None])[0] < 0.03 * match.costs(body.values[None])[0]
 
 
 def seen(points_px, normals, distance_px, camera=FRONT):

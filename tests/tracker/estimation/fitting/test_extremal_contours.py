@@ -237,10 +237,10 @@ def test_traced_contours_lie_on_the_rulings():
     for seed in range(5):
         values = posed(BODY, seed)
         for camera in cameras_around(3):
-            found = trace([PosedBody(BODY, values)], camera)
+            contours = trace([PosedBody(BODY, values)], camera)
             for part in range(len(BODY.parts)):
                 cone, T = Cone.of(BODY.shapes[part]), cone_pose(values, part)
-                own = rigid.apply(rigid.inverse(T), found.points_world[found.parts == part].astype(float))
+                own = rigid.apply(rigid.inverse(T), contours.points_world[contours.parts == part].astype(float))
                 side = np.abs(own[:, 2]) < 0.999 * BODY.shapes[part].half_axes[2]
                 angles = rulings_of(values, part, cone, camera)
                 if not angles:

@@ -92,12 +92,12 @@ def test_normal_equations_of_rows_by_hand():
 def test_without_iterations_a_pose_is_only_looked_at():
     wild = GAVRILA.retract(GAVRILA.neutral(), np.full(GAVRILA.n_dofs, -0.4))  # knees beyond their limits
     block = target(GAVRILA, "left_wrist", 0.3, 0.2, 0.1, weight=2.0)
-    found = solve(GAVRILA, wild, [block], max_iterations=0)
+    fit = solve(GAVRILA, wild, [block], max_iterations=0)
     here = GAVRILA.clip(wild)
-    np.testing.assert_array_equal(found.pose, here)
+    np.testing.assert_array_equal(fit.pose, here)
     normal = block.linearize(GAVRILA, here, GAVRILA.kinematics(here))
-    assert (found.cost, found.iterations) == (normal.cost, 0)
-    np.testing.assert_array_equal(found.hessian, normal.hessian)
+    assert (fit.cost, fit.iterations) == (normal.cost, 0)
+    np.testing.assert_array_equal(fit.hessian, normal.hessian)
 
 
 def test_covariance_by_hand():
@@ -135,17 +135,17 @@ def test_covariance_against_noisy_targets():
 def test_weighted_mean_by_hand():
     # One point drawn to x = 0 with weight 1 and to x = 1 with weight 2: 1 (x - 0) + 4 (x - 1) = 0.
     blocks = [target(ARM, "shoulder", 0, 0, 0), target(ARM, "shoulder", 1, 0, 0, weight=2.0)]
-    found = solve(ARM, ARM.neutral(), blocks, active_dofs=ARM.dof_is_length)
-    np.testing.assert_allclose(found.pose[:3], [0.8, 0, 0], atol=1e-6)
-    assert found.cost == pytest.approx(0.5 * (0.8**2 + 4 * 0.2**2))
+    fit = solve(ARM, ARM.neutral(), blocks, active_dofs=ARM.dof_is_length)
+    np.testing.assert_allclose(fit.pose[:3], [0.8, 0, 0], atol=1e-6)
+    assert fit.cost == pytest.approx(0.5 * (0.8**2 + 4 * 0.2**2))
 
 
 def test_prior_against_a_target_by_hand():
     # Weight 3 to stay at 0, weight 1 to go to 1: 9 x + (x - 1) = 0.
     blocks = [PosePrior(ARM.neutral(), np.full(ARM.n_dofs, 3.0)), target(ARM, "shoulder", 0, 1, 0)]
-    found = solve(ARM, ARM.neutral(), blocks)
-    np.testing.assert_allclose(found.pose[:3], [0, 0.1, 0], atol=1e-6)
-    assert found.cost == pytest.approx(0.5 * (9 * 0.1**2 + 0.9**2))
+    fit = solve(ARM, ARM.neutral(), blocks)
+    np.testing.assert_allclose(fit.pose[:3], [0, 0.1, 0], atol=1e-6)
+    assert fit.cost == pytest.approx(0.5 * (9 * 0.1**2 + 0.9**2))
 
 
 def test_a_prior_is_exchanged_as_if_it_had_been_there(gavrila):
@@ -162,21 +162,21 @@ def test_a_prior_is_exchanged_as_if_it_had_been_there(gavrila):
 
 def test_two_bone_arm_by_the_law_of_cosines():
     # Bones of 0.3 and 0.4 m, the hand 0.5 m away: a right angle at the elbow.
-    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.3, 0, -0.4)], active_dofs=ROTATIONS)
-    np.testing.assert_allclose(hand(found.pose), [0.3, 0, -0.4], atol=1e-6)
-    assert found.pose[ARM.dof_value[-1]] == pytest.approx(np.pi / 2, abs=1e-5)
+    fit = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.3, 0, -0.4)], active_dofs=ROTATIONS)
+    np.testing.assert_allclose(hand(fit.pose), [0.3, 0, -0.4], atol=1e-6)
+    assert fit.pose[ARM.dof_value[-1]] == pytest.approx(np.pi / 2, abs=1e-5)
 
 
 def test_out_of_reach_the_arm_is_stretched_towards_the_target():
-    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 2.0, 0, -2.0)], active_dofs=ROTATIONS, max_iterations=200)
-    np.testing.assert_allclose(hand(found.pose), 0.7 * np.array([1, 0, -1]) / np.sqrt(2), atol=1e-3)
+    fit = solve(ARM, ARM.neutral(), [target(ARM, "hand", 2.0, 0, -2.0)], active_dofs=ROTATIONS, max_iterations=200)
+    np.testing.assert_allclose(hand(fit.pose), 0.7 * np.array([1, 0, -1]) / np.sqrt(2), atol=1e-3)
 
 
 def test_free_leaves_the_rest_alone():
     free = np.array(ARM.dof_names) == "elbow.bend"
-    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.4, 0, -0.3)], active_dofs=free)
-    np.testing.assert_array_equal(np.delete(found.pose, ARM.dof_value[-1]), np.delete(ARM.neutral(), -1))
-    assert found.pose[-1] == pytest.approx(np.pi / 2, abs=1e-5)
+    fit = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.4, 0, -0.3)], active_dofs=free)
+    np.testing.assert_array_equal(np.delete(fit.pose, ARM.dof_value[-1]), np.delete(ARM.neutral(), -1))
+    assert fit.pose[-1] == pytest.approx(np.pi / 2, abs=1e-5)
 
 
 def test_limits_hold_and_the_rest_does_what_it_can():
@@ -204,8 +204,8 @@ def test_ball_joint_recovers_a_rotation_from_points(seed):
     values[3:7] = rigid.quaternion_multiply(rigid.quaternion_exp(swing), turn)
     values[-1] = rng.uniform(0.3, 2.5)  # bent: the twist shows
     blocks = [target(ARM, n, *p) for n, p in zip(ARM.point_names, ARM.points_world(values), strict=True)]
-    found = solve(ARM, ARM.neutral(), blocks, max_iterations=200)
-    np.testing.assert_allclose(ARM.points_world(found.pose), ARM.points_world(values), atol=1e-4)
+    fit = solve(ARM, ARM.neutral(), blocks, max_iterations=200)
+    np.testing.assert_allclose(ARM.points_world(fit.pose), ARM.points_world(values), atol=1e-4)
 
 
 def test_the_cost_never_rises():
@@ -261,11 +261,11 @@ def test_fit_to_points_recovers_poses_from_their_own_joints(seed):
     values[limbs] = rng.uniform(0.8 * low + 0.2 * high, 0.2 * low + 0.8 * high)[limbs]
     values[5] = rng.uniform(-np.pi, np.pi)
     targets = points_of(GAVRILA, values)
-    found = fit_to_points(GAVRILA, targets)
+    fit = fit_to_points(GAVRILA, targets)
     # The weak pull to the start (1e-3 per rad) holds the joints back by a hair.
-    assert off(GAVRILA, found.pose, targets).max() < 0.001
+    assert off(GAVRILA, fit.pose, targets).max() < 0.001
     # What the joints show is the same: where every part's axis points.
-    axes = [GAVRILA.kinematics(v).Ts_world_part[:, :3, 2] for v in (values, found.pose)]
+    axes = [GAVRILA.kinematics(v).Ts_world_part[:, :3, 2] for v in (values, fit.pose)]
     assert np.degrees(np.arccos(np.clip(np.sum(axes[0] * axes[1], axis=1), -1, 1))).max() < 1
 
 
@@ -274,9 +274,9 @@ def test_other_sizes_are_fitted_as_well_as_they_can():
     values = GAVRILA.neutral()
     targets = points_of(GAVRILA, values)
     shorter = GAVRILA.with_height(1.6)
-    found = fit_to_points(shorter, targets)
+    fit = fit_to_points(shorter, targets)
     assert shorter.height_m == 1.6
-    assert 0.01 < off(shorter, found.pose, targets).mean() < 0.05
+    assert 0.01 < off(shorter, fit.pose, targets).mean() < 0.05
 
 
 @pytest.mark.slow
@@ -300,15 +300,15 @@ def test_near_is_where_the_fit_begins():
     values[names == "left_elbow.extension"] = 0
     near = values.copy()
     near[names == "left_shoulder.twist"] = 0.7
-    found = fit_to_points(GAVRILA, points_of(GAVRILA, values), near)
-    assert found.pose[names == "left_shoulder.twist"][0] == pytest.approx(0.7, abs=1e-3)
+    fit = fit_to_points(GAVRILA, points_of(GAVRILA, values), near)
+    assert fit.pose[names == "left_shoulder.twist"][0] == pytest.approx(0.7, abs=1e-3)
 
 
 def test_unknown_and_missing_points_are_passed_over():
     targets = points_of(GAVRILA, shaken(GAVRILA, GAVRILA.neutral(), np.random.default_rng(4), 0.3, 0.5))
-    found = fit_to_points(GAVRILA, targets | {"left_wrist": np.full(3, np.nan), "tail": np.zeros(3)})
+    fit = fit_to_points(GAVRILA, targets | {"left_wrist": np.full(3, np.nan), "tail": np.zeros(3)})
     del targets["left_wrist"]
-    assert off(GAVRILA, found.pose, targets).max() < 1e-3
+    assert off(GAVRILA, fit.pose, targets).max() < 1e-3
 
 
 @pytest.mark.parametrize("known", [[], ["left_hip", "right_hip", "left_knee"]])
@@ -327,7 +327,7 @@ def test_fit_to_joint_centers_puts_them_on_the_targets():
         model = with_center(model, f"{side}_hip", (0.0, y, -0.03))
     pose = model.clip(model.retract(model.neutral(), np.random.default_rng(4).normal(0, 0.2, model.n_dofs)))
     targets = dict(zip(model.point_names, model.joint_centers_world(pose), strict=True))
-    found = fit_to_points(model, targets, centers=True)
-    np.testing.assert_allclose(model.joint_centers_world(found.pose), list(targets.values()), atol=1e-4)
+    fit = fit_to_points(model, targets, centers=True)
+    np.testing.assert_allclose(model.joint_centers_world(fit.pose), list(targets.values()), atol=1e-4)
     off = fit_to_points(model, targets)
     assert np.linalg.norm(model.joint_centers_world(off.pose) - list(targets.values()), axis=1).max() > 0.005

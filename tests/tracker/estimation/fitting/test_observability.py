@@ -35,8 +35,8 @@ def standing(**degrees):
 
 
 def sentence(body, cameras, dof, noise=None):
-    found = observe_pose([body], cameras, noise=noise)
-    return describe_all([body], cameras, found, noise=noise)[NAMES.index(dof)]
+    observability = observe_pose([body], cameras, noise=noise)
+    return describe_all([body], cameras, observability, noise=noise)[NAMES.index(dof)]
 
 
 def test_the_normal_matrix_is_that_of_the_contour_residuals():
@@ -95,10 +95,10 @@ def test_a_limb_that_no_view_shows():
 
 def test_parameters_held_by_the_prior_alone_are_not_observable():
     body, cameras = standing(), [camera_at("front", (4.0, 0.0, 0.6))]
-    found = observe_pose([body], cameras)
+    observability = observe_pose([body], cameras)
     dof = NAMES.index("spine.elevation")  # a forward bend is along the only line of sight
-    assert found.sigmas[dof] > 0.8 * MODEL.spreads[dof]
-    assert not found.is_observable[dof]
+    assert observability.sigmas[dof] > 0.8 * MODEL.spreads[dof]
+    assert not observability.is_observable[dof]
     told = sentence(body, cameras, "spine.elevation")
     assert told.startswith("elevation of the spine: not observable")
 
@@ -106,9 +106,9 @@ def test_parameters_held_by_the_prior_alone_are_not_observable():
 def test_the_view_that_is_missed_most():
     """A forward bend shows from the side, not from the front."""
     cameras = [camera_at("front", (4.0, 0.0, 0.6)), camera_at("side", (0.0, 4.0, 0.6))]
-    found = observe_pose([standing()], cameras)
-    assert cameras[found.best_views[NAMES.index("left_hip.flexion")]].name == "side"
-    assert cameras[found.best_views[NAMES.index("left_shoulder.abduction")]].name == "front"
+    observability = observe_pose([standing()], cameras)
+    assert cameras[observability.best_views[NAMES.index("left_hip.flexion")]].name == "side"
+    assert cameras[observability.best_views[NAMES.index("left_shoulder.abduction")]].name == "front"
 
 
 def test_another_person_in_front_hides_a_body():
@@ -146,9 +146,9 @@ def test_every_degree_of_freedom_has_a_sentence(name):
 
 def test_finite_where_a_part_surrounds_the_camera():
     body = standing()
-    found = observe_pose([body], [camera_at("inside", body.points_world[0] + 0.01, (5.0, 5.0, 5.0))])
-    assert np.all(np.isfinite(found.sigmas))
-    assert found.rank <= MODEL.n_dofs
+    observability = observe_pose([body], [camera_at("inside", body.points_world[0] + 0.01, (5.0, 5.0, 5.0))])
+    assert np.all(np.isfinite(observability.sigmas))
+    assert observability.rank <= MODEL.n_dofs
 
 
 @pytest.mark.slow

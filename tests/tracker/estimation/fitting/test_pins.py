@@ -79,8 +79,8 @@ def test_a_body_is_found_by_its_pins(model):
     start = shaken(model, truth, np.random.default_rng(5), 0.3, 0.2)
     names = model.point_names
     block = pin_block(model, CAMERAS, seen(model, truth, names, CAMERAS))
-    found = solve(model, start, [block, PosePrior(start, np.full(model.n_dofs, 1e-3))], max_iterations=100)
-    off = np.linalg.norm(model.points_world(found.pose) - model.points_world(truth), axis=1)
+    fit = solve(model, start, [block, PosePrior(start, np.full(model.n_dofs, 1e-3))], max_iterations=100)
+    off = np.linalg.norm(model.points_world(fit.pose) - model.points_world(truth), axis=1)
     assert off.max() < 1e-3
 
 
@@ -90,10 +90,10 @@ def test_a_body_is_found_by_its_pins(model):
 def test_exact_views_meet_in_the_point():
     truth = np.array([0.3, -0.2, 0.4])
     views = [c.pinhole for c in CAMERAS]
-    found = triangulate(CAMERAS, np.stack([c.project(truth) for c in views]))
-    np.testing.assert_allclose(found.point_world, truth, atol=1e-9)
-    np.testing.assert_allclose(found.errors_px, 0, atol=1e-6)
-    assert found.why == ""
+    triangulation = triangulate(CAMERAS, np.stack([c.project(truth) for c in views]))
+    np.testing.assert_allclose(triangulation.point_world, truth, atol=1e-9)
+    np.testing.assert_allclose(triangulation.errors_px, 0, atol=1e-6)
+    assert triangulation.why == ""
 
 
 @pytest.mark.slow
@@ -119,22 +119,22 @@ def test_no_other_point_is_nearer_in_the_images():
     views = [camera_at("near", (0.6, 0.0, 0.2)), camera_at("far", (0.0, 9.0, 1.0))]
     places = np.stack([c.project(np.array([0.05, 0.1, 0.0])) for c in views])
     places += [[12.0, -9.0], [-6.0, 8.0]]
-    found = triangulate(views, places)
+    triangulation = triangulate(views, places)
 
     def squares(point):
         return sum(np.sum((c.project(point) - p) ** 2) for c, p in zip(views, places, strict=True))
 
-    here = squares(found.point_world)
-    assert np.sum(found.errors_px**2) == pytest.approx(here)
+    here = squares(triangulation.point_world)
+    assert np.sum(triangulation.errors_px**2) == pytest.approx(here)
     for step in 0.001 * np.concatenate([np.eye(3), -np.eye(3)]):
-        assert squares(found.point_world + step) > here
+        assert squares(triangulation.point_world + step) > here
 
 
 def test_one_view_is_not_enough():
-    found = triangulate(CAMERAS[:1], np.array([[100.0, 100.0]]))
-    assert found.point_world is None
-    assert np.isnan(found.errors_px).tolist() == [True]
-    assert "another view" in found.why
+    triangulation = triangulate(CAMERAS[:1], np.array([[100.0, 100.0]]))
+    assert triangulation.point_world is None
+    assert np.isnan(triangulation.errors_px).tolist() == [True]
+    assert "another view" in triangulation.why
 
 
 def test_parallel_lines_of_sight_tell_no_depth():
@@ -142,9 +142,9 @@ def test_parallel_lines_of_sight_tell_no_depth():
     left, right = camera_at("left", (4.0, 0.0, 0.0)), camera_at("right", (4.0, 0.02, 0.0), (0.0, 0.02, 0.0))
     opposite = camera_at("opposite", (-4.0, 0.0, 0.0))
     for pair in ([left, right], [left, opposite]):
-        found = triangulate(pair, np.stack([c.project(np.zeros(3)) for c in pair]))
-        assert found.point_world is None
-        assert "parallel" in found.why
+        triangulation = triangulate(pair, np.stack([c.project(np.zeros(3)) for c in pair]))
+        assert triangulation.point_world is None
+        assert "parallel" in triangulation.why
 
 
 def test_lines_of_sight_that_meet_behind_a_camera_are_a_mistake():
@@ -152,6 +152,6 @@ def test_lines_of_sight_that_meet_behind_a_camera_are_a_mistake():
         camera_at("left", (4.0, 0.5, 0.0), (0.0, 0.5, 0.0)),
         camera_at("right", (4.0, -0.5, 0.0), (0.0, -0.5, 0.0)),
     ]
-    found = triangulate(views, np.array([[600.0, 240.0], [40.0, 240.0]]))  # they part
-    assert found.point_world is None
-    assert "behind left and right" in found.why
+    triangulation = triangulate(views, np.array([[600.0, 240.0], [40.0, 240.0]]))  # they part
+    assert triangulation.point_world is None
+    assert "behind left and right" in triangulation.why

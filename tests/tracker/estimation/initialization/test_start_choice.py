@@ -69,10 +69,10 @@ def test_the_most_likely_track_is_first():
 
 def test_a_pose_that_a_track_comes_back_to_is_a_start():
     fitter = Fitter(lambda x_m: 1.0 if x_m == 0.3 else 2.0, ends={0.0: 0.3, 0.3: 0.6})
-    found = compared(fitter, start(0.0, name="axis"))
+    comparison = compared(fitter, start(0.0, name="axis"))
     assert fitter.tracked == [0.0, 0.3]
-    assert places(found) == [0.3, 0.0]
-    assert found.tracked[0].start.source == "axis"
+    assert places(comparison) == [0.3, 0.0]
+    assert comparison.tracked[0].start.source == "axis"
 
 
 def test_a_track_that_comes_back_gives_no_other_start():
@@ -82,23 +82,23 @@ def test_a_track_that_comes_back_gives_no_other_start():
 def test_a_person_who_is_lost_on_the_way_back():
     assert compared(Fitter(lambda x_m: 1.0, lost=(0.0,)), start(0.0)).is_lost
     # The start that the track came back to is another one.
-    found = compared(Fitter(lambda x_m: 1.0 - x_m, ends={0.0: 0.3}, lost=(0.0,)), start(0.0))
-    assert places(found)[0] == 0.3
-    assert not found.is_lost
+    comparison = compared(Fitter(lambda x_m: 1.0 - x_m, ends={0.0: 0.3}, lost=(0.0,)), start(0.0))
+    assert places(comparison)[0] == 0.3
+    assert not comparison.is_lost
 
 
 @pytest.mark.parametrize(("more", "n_tracked"), [(-1.0, 2), (1.0, 1)])
 def test_a_start_that_is_much_less_likely_on_the_frame_is_not_tracked(more, n_tracked):
     fitter = Fitter(lambda x_m: 0.0, on_frame=lambda x_m: BEAM_NATS + more if x_m else 0.0)
-    found = compared(fitter, start(0.0), start(1.0))
-    assert len(found.tracked) == n_tracked
-    assert len(found.searched) == 2
+    comparison = compared(fitter, start(0.0), start(1.0))
+    assert len(comparison.tracked) == n_tracked
+    assert len(comparison.searched) == 2
 
 
 def test_starts_that_end_at_the_same_pose_are_one():
     fitter = Fitter(lambda x_m: x_m)
-    found = compared(fitter, start(0.0, name="a"), start(0.02, name="b"), start(0.2, name="c"))
-    assert [t.start.source for t in found.tracked] == ["a", "c"]
+    comparison = compared(fitter, start(0.0, name="a"), start(0.02, name="b"), start(0.2, name="c"))
+    assert [t.start.source for t in comparison.tracked] == ["a", "c"]
 
 
 HERE = start()

@@ -38,26 +38,26 @@ def test_without_edges_pins_are_met(model):
     start = shaken(model, truth, np.random.default_rng(2), 0.2, 0.1)
     pins = seen(model, truth, model.point_names[-4:], CAMERAS)
     assert max(off_px(model, start, pins)) > 20
-    found = fit_frame([PosedBody(model, start)], [pins], CAMERAS, None, SETTINGS, [0])
-    assert max(off_px(model, found.poses[0], pins)) < 1
+    fit = fit_frame([PosedBody(model, start)], [pins], CAMERAS, None, SETTINGS, [0])
+    assert max(off_px(model, fit.poses[0], pins)) < 1
 
 
 def test_one_pin_moves_its_limb_and_leaves_the_others():
     truth = posed(GAVRILA, 1)
     (place,) = seen(GAVRILA, truth, ["left_wrist"], CAMERAS[:1])
     pin = place._replace(position_px=(place.position_px[0] + 25, place.position_px[1]))
-    found = fit_frame([PosedBody(GAVRILA, truth)], [[pin]], CAMERAS, None, SETTINGS, [0])
-    assert off_px(GAVRILA, found.poses[0], [pin])[0] < 0.5
-    moved = dict(zip(GAVRILA.point_names, off_m(GAVRILA, found.poses[0], truth), strict=True))
+    fit = fit_frame([PosedBody(GAVRILA, truth)], [[pin]], CAMERAS, None, SETTINGS, [0])
+    assert off_px(GAVRILA, fit.poses[0], [pin])[0] < 0.5
+    moved = dict(zip(GAVRILA.point_names, off_m(GAVRILA, fit.poses[0], truth), strict=True))
     assert moved["left_wrist"] > 0.1
     assert max(moved[p] for p in ("head", "right_wrist", "right_ankle", "left_ankle")) < 0.06
 
 
 def test_nobody_without_pins_moves_where_there_are_no_edges():
     start = posed(GAVRILA, 1)
-    found = fit_frame([PosedBody(GAVRILA, start)], [[]], CAMERAS, None, SETTINGS, [0])
-    np.testing.assert_array_equal(found.poses[0], start)
-    assert not found.pinned[0].any()
+    fit = fit_frame([PosedBody(GAVRILA, start)], [[]], CAMERAS, None, SETTINGS, [0])
+    np.testing.assert_array_equal(fit.poses[0], start)
+    assert not fit.pinned[0].any()
 
 
 @pytest.fixture(scope="module")
@@ -74,19 +74,19 @@ def two_people():
 def test_two_people_are_fitted_together_each_to_own_pins(two_people):
     truth, views, start = two_people
     pins = [seen(GAVRILA, v, ["left_wrist", "right_ankle"], CAMERAS[:2]) for v in truth]
-    found = fit_frame([PosedBody(GAVRILA, p) for p in start], pins, CAMERAS, views, SETTINGS, [0, 1])
+    fit = fit_frame([PosedBody(GAVRILA, p) for p in start], pins, CAMERAS, views, SETTINGS, [0, 1])
     for person in (0, 1):
-        before, after = (off_m(GAVRILA, v[person], truth[person]).mean() for v in (start, found.poses))
+        before, after = (off_m(GAVRILA, v[person], truth[person]).mean() for v in (start, fit.poses))
         assert before > 0.06
         assert after < 0.02
-        assert max(off_px(GAVRILA, found.poses[person], pins[person])) < 2
+        assert max(off_px(GAVRILA, fit.poses[person], pins[person])) < 2
 
 
 def test_other_people_stay(two_people):
     truth, views, start = two_people
-    found = fit_frame([PosedBody(GAVRILA, p) for p in start], [[], []], CAMERAS, views, SETTINGS, [1])
-    np.testing.assert_array_equal(found.poses[0], start[0])
-    assert off_m(GAVRILA, found.poses[1], truth[1]).mean() < 0.5 * off_m(GAVRILA, start[1], truth[1]).mean()
+    fit = fit_frame([PosedBody(GAVRILA, p) for p in start], [[], []], CAMERAS, views, SETTINGS, [1])
+    np.testing.assert_array_equal(fit.poses[0], start[0])
+    assert off_m(GAVRILA, fit.poses[1], truth[1]).mean() < 0.5 * off_m(GAVRILA, start[1], truth[1]).mean()
 
 
 def test_edges_leave_points_that_were_placed_near_their_places(two_people):
@@ -119,8 +119,8 @@ def test_a_held_point_belongs_where_the_user_saw_it():
     put = tuple(seen(GAVRILA, truth, ["left_wrist"], CAMERAS[:2]))
 
     def off_seen_m(constraints, pins=()):
-        found = fit_frame([PosedBody(GAVRILA, start)], [list(pins)], CAMERAS, None, SETTINGS, [0], [constraints])
-        return off_m(GAVRILA, found.poses[0], truth)[at]
+        fit = fit_frame([PosedBody(GAVRILA, start)], [list(pins)], CAMERAS, None, SETTINGS, [0], [constraints])
+        return off_m(GAVRILA, fit.poses[0], truth)[at]
 
     begun = off_m(GAVRILA, start, truth)[at]
     assert begun > 0.1
@@ -143,9 +143,9 @@ def test_pins_of_the_trunk_leave_limbs_that_were_placed():
     )
 
     def moved_m(held):
-        found = fit_frame([PosedBody(GAVRILA, placed)], [pins], CAMERAS, None, SETTINGS, [0], [Constraints(held=held)])
-        points = dict(zip(GAVRILA.point_names, off_m(GAVRILA, found.poses[0], placed), strict=True))
-        assert max(off_px(GAVRILA, found.poses[0], pins)) < 3
+        fit = fit_frame([PosedBody(GAVRILA, placed)], [pins], CAMERAS, None, SETTINGS, [0], [Constraints(held=held)])
+        points = dict(zip(GAVRILA.point_names, off_m(GAVRILA, fit.poses[0], placed), strict=True))
+        assert max(off_px(GAVRILA, fit.poses[0], pins)) < 3
         return max(points[f"{s}_{j}"] for s in ("left", "right") for j in ("wrist", "ankle"))
 
     assert moved_m(dict.fromkeys(limb_points(GAVRILA), CAMERAS)) < 0.03
@@ -161,16 +161,16 @@ def test_locked_dofs_stay_to_the_last_bit(two_people):
     begin[0][knee], free[knee] = -0.3, False  # beyond its limit: it was locked there, or imported
     pins = [seen(GAVRILA, truth[0], ["left_wrist"], CAMERAS), []]
     masks = [Constraints(free), Constraints()]
-    found = fit_frame([PosedBody(GAVRILA, p) for p in begin], pins, CAMERAS, views, SETTINGS, [0], masks)
-    np.testing.assert_array_equal(found.poses[0][~free], begin[0][~free])
-    assert np.any(found.poses[0][free] != begin[0][free])
+    fit = fit_frame([PosedBody(GAVRILA, p) for p in begin], pins, CAMERAS, views, SETTINGS, [0], masks)
+    np.testing.assert_array_equal(fit.poses[0][~free], begin[0][~free])
+    assert np.any(fit.poses[0][free] != begin[0][free])
 
 
 def test_pinned_is_what_pins_tell_more_of_than_edges_and_priors(two_people):
     truth, views, start = two_people
     pins = [seen(GAVRILA, truth[0], ["left_elbow", "left_wrist"], CAMERAS), []]
-    found = fit_frame([PosedBody(GAVRILA, p) for p in start], pins, CAMERAS, views, SETTINGS, [0])
-    by_pins = {n for n, p in zip(GAVRILA.value_names, found.pinned[0], strict=True) if p}
+    fit = fit_frame([PosedBody(GAVRILA, p) for p in start], pins, CAMERAS, views, SETTINGS, [0])
+    by_pins = {n for n, p in zip(GAVRILA.value_names, fit.pinned[0], strict=True) if p}
     assert {"left_shoulder.abduction", "left_shoulder.elevation", "left_elbow.extension"} <= by_pins
     assert not any(n.startswith(("left_hip", "right", "left_knee")) for n in by_pins)
 
@@ -178,8 +178,8 @@ def test_pinned_is_what_pins_tell_more_of_than_edges_and_priors(two_people):
 def test_a_ball_joint_is_pinned_with_all_of_its_quaternion():
     truth = posed(ARM, 1)
     pins = seen(ARM, truth, ["elbow"], CAMERAS)
-    found = fit_frame([PosedBody(ARM, truth)], [pins], CAMERAS, None, SETTINGS, [0])
-    by_pins = dict(zip(ARM.value_names, found.pinned[0].tolist(), strict=True))
+    fit = fit_frame([PosedBody(ARM, truth)], [pins], CAMERAS, None, SETTINGS, [0])
+    by_pins = dict(zip(ARM.value_names, fit.pinned[0].tolist(), strict=True))
     assert [by_pins[f"shoulder.q{x}"] for x in "wxyz"] == [True] * 4
     assert not by_pins["elbow.bend"]
 
@@ -203,8 +203,8 @@ def test_pins_and_edges_of_real_footage_come_below_45_mm(sample_folder):
             for name in ("left_wrist", "right_wrist", "left_ankle", "right_ankle")
             for i in (0, 1)
         ]
-        found = fit_frame([PosedBody(model, start)], [pins], cameras, evidence, SETTINGS, [0])
-        for values in (start, found.poses[0]):
+        fit = fit_frame([PosedBody(model, start)], [pins], cameras, evidence, SETTINGS, [0])
+        for values in (start, fit.poses[0]):
             places = model.named_points_world(values)
             errors.append(np.mean([np.linalg.norm(places[n] - true[n]) for n in LIMB_JOINTS]))
     assert np.mean(errors[::2]) > 0.07

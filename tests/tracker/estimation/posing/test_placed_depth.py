@@ -22,25 +22,25 @@ AT = np.array([0.1, -0.05, 0.3])
     ],
 )
 def test_opposite_and_neighbouring_views_miss_the_depth(n, views, across):
-    found = unseen_depth({"wrist": AT}, {"wrist": views}, cameras_around(n), "wrist")
-    assert (found is None) == (across is None)
-    if found is not None:
-        assert found.points == ("wrist",)
-        assert found.camera in across
+    depth_m = unseen_depth({"wrist": AT}, {"wrist": views}, cameras_around(n), "wrist")
+    assert (depth_m is None) == (across is None)
+    if depth_m is not None:
+        assert depth_m.points == ("wrist",)
+        assert depth_m.camera in across
 
 
 def test_others_are_named_after_the_point_asked_for():
     places, views = dict.fromkeys(("ankle", "knee", "wrist"), AT), {"ankle": [0, 2], "knee": [0, 1], "wrist": [2]}
-    found = unseen_depth(places, views, cameras_around(4), "wrist")
-    assert found is not None
-    assert found.points == ("wrist", "ankle")
+    depth_m = unseen_depth(places, views, cameras_around(4), "wrist")
+    assert depth_m is not None
+    assert depth_m.points == ("wrist", "ankle")
     assert unseen_depth(places, views, cameras_around(4), "knee") is None
 
 
 def test_a_view_that_does_not_see_the_point_is_not_named():
     cameras, far = cameras_around(4), np.array([0.0, 3.0, 0.3])
     seeing = [i for i, c in enumerate(cameras) if np.all((c.project(far) >= 0) & (c.project(far) < c.size))]
-    found = unseen_depth({"wrist": far}, {"wrist": [0]}, cameras, "wrist")
-    assert found is None or found.camera in seeing
+    depth_m = unseen_depth({"wrist": far}, {"wrist": [0]}, cameras, "wrist")
+    assert depth_m is None or depth_m.camera in seeing
     # Nothing looks across where all cameras stand on one line.
     assert unseen_depth({"wrist": AT}, {"wrist": [0]}, [cameras[0], cameras[2]], "wrist") is None

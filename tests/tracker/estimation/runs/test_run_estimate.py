@@ -69,42 +69,42 @@ def test_a_proposal_of_one_frame_leads_the_others_there(film, gavrila, arm):
 @pytest.mark.parametrize("n_frames", [1, 2, 3])
 def test_few_frames_and_cameras(gavrila, n_frames, n_cameras):
     film = FilmedRun(gavrila, moving(gavrila, n_frames), n_cameras=n_cameras)
-    found = estimated(film.asked(film.true[0]))
-    assert sorted(found) == list(range(n_frames))
-    for pose in found.values():
+    estimate = estimated(film.asked(film.true[0]))
+    assert sorted(estimate) == list(range(n_frames))
+    for pose in estimate.values():
         np.testing.assert_array_equal(gavrila.clip(pose.pose), pose.pose)
         assert np.isfinite(pose.errors_m2).all()
         assert np.isfinite(pose.elsewhere).all()
         assert pose.is_shown.all()
     if n_cameras == 2:
-        assert film.errors_m(found).max() < NEAR_M
-        assert max(pose.elsewhere.max() for pose in found.values()) < 0.05
+        assert film.errors_m(estimate).max() < NEAR_M
+        assert max(pose.elsewhere.max() for pose in estimate.values()) < 0.05
 
 
 def test_keyframes_stay_and_are_compared_as_others_are(film, gavrila, arm):
     true = film.true[0]
     keyframes = {1: true[1], WRONG: astray(gavrila, true, WRONG)[WRONG]}
-    found = estimated(film.asked(true, keyframes=keyframes))
+    estimate = estimated(film.asked(true, keyframes=keyframes))
     for k, pose in keyframes.items():
-        assert found[k].pose.tobytes() == pose.tobytes()
-    assert found[1].elsewhere.max() < 0.05
-    assert found[WRONG].elsewhere[arm] > 0.9
-    assert np.delete(found[WRONG].elsewhere, arm).max() < 0.05
-    assert film.errors_m(found)[[0, 1, 2, 6, 7]].max() < NEAR_M
+        assert estimate[k].pose.tobytes() == pose.tobytes()
+    assert estimate[1].elsewhere.max() < 0.05
+    assert estimate[WRONG].elsewhere[arm] > 0.9
+    assert np.delete(estimate[WRONG].elsewhere, arm).max() < 0.05
+    assert film.errors_m(estimate)[[0, 1, 2, 6, 7]].max() < NEAR_M
 
 
 def test_poses_that_stay_are_assessed(film, gavrila, arm):
     first = astray(gavrila, film.true[0], WRONG)
-    found = estimated(film.asked(first, stays=True))
+    estimate = estimated(film.asked(first, stays=True))
     for k, pose in enumerate(first):
-        assert found[k].pose.tobytes() == pose.tobytes()
-        assert (found[k].elsewhere[arm] > 0.9) == (k == WRONG)
-        assert found[k].entry is None
-    sigmas = [np.sqrt(np.trace(found[k].errors_m2, axis1=1, axis2=2)) for k in range(N)]
+        assert estimate[k].pose.tobytes() == pose.tobytes()
+        assert (estimate[k].elsewhere[arm] > 0.9) == (k == WRONG)
+        assert estimate[k].entry is None
+    sigmas = [np.sqrt(np.trace(estimate[k].errors_m2, axis1=1, axis2=2)) for k in range(N)]
     wrist = gavrila.point_names.index("left_wrist")
-    assert sigmas[WRONG][wrist] == pytest.approx(film.errors_m(found)[WRONG], rel=0.2)
+    assert sigmas[WRONG][wrist] == pytest.approx(film.errors_m(estimate)[WRONG], rel=0.2)
     assert max(s.max() for k, s in enumerate(sigmas) if k != WRONG) < NEAR_M
-    assert found[WRONG].cost_px > found[WRONG - 1].cost_px
+    assert estimate[WRONG].cost_px > estimate[WRONG - 1].cost_px
 
 
 @pytest.mark.parametrize(("n_shown", "is_shown"), [(1, False), (2, True)])
@@ -117,8 +117,8 @@ def test_a_limb_is_shown_by_two_views_or_more(film, gavrila, arm, monkeypatch, n
         return shown
 
     monkeypatch.setattr(FrameHypotheses, "views_of_limbs", hidden)
-    found = estimated(film.asked(film.true[0], stays=True))
-    for pose in found.values():
+    estimate = estimated(film.asked(film.true[0], stays=True))
+    for pose in estimate.values():
         assert pose.is_shown.tolist() == [is_shown or i != arm for i in range(len(limbs(gavrila)))]
 
 
@@ -149,8 +149,8 @@ def test_locked_degrees_of_freedom_stay_in_every_proposal(film, gavrila, monkeyp
         FrameHypotheses, "_scored",
         lambda self, poses, sources: (compared.extend((self, p) for p in poses), scored(self, poses, sources))[1],
     )  # fmt: skip
-    found = estimated(film.asked(first, keyframes={WRONG: film.true[0][WRONG]}, active=active))
-    assert [found[k].pose[value] for k in range(N)] == first[:, value].tolist()
+    estimate = estimated(film.asked(first, keyframes={WRONG: film.true[0][WRONG]}, active=active))
+    assert [estimate[k].pose[value] for k in range(N)] == first[:, value].tolist()
     assert len(compared) > 3 * N
     for own, pose in compared:
         assert pose[value] == own.bodies[0].values[value]
@@ -180,10 +180,10 @@ def test_blocks_give_nearly_what_one_block_gives(gavrila, monkeypatch):
     monkeypatch.setattr(
         film.observer, "evidence", lambda k, *args, **kw: (asked.append(k), evidence(k, *args, **kw))[1]
     )
-    found = estimated(film.asked(first))
-    assert sorted(found) == list(range(30))
-    apart = [gavrila.points_world(found[k].pose) - gavrila.points_world(whole[k].pose) for k in found]
+    estimate = estimated(film.asked(first))
+    assert sorted(estimate) == list(range(30))
+    apart = [gavrila.points_world(estimate[k].pose) - gavrila.points_world(whole[k].pose) for k in estimate]
     assert 0 < np.linalg.norm(apart, axis=-1).max() < 0.01
-    assert film.errors_m(found).max() < NEAR_M
-    assert [k for k in found if found[k].entry] == [3, 14, 15]
+    assert film.errors_m(estimate).max() < NEAR_M
+    assert [k for k in estimate if estimate[k].entry] == [3, 14, 15]
     assert {asked.count(k) for k in range(20)} == {1}  # those of the first block, which the second one shares

@@ -185,8 +185,8 @@ def test_quality_of_a_pose_and_of_a_lost_arm(gavrila, colors):
 def test_the_colours_of_a_head_say_nothing():
     """Hair and face differ."""
     model = load_model("gavrila34")
-    found = judged(model, posed(model, 1), posed(model, 1), colors=True)
-    assert [x.name for x in found.limbs if np.isinf(x.end_color)] == ["head"]
+    judgement = judged(model, posed(model, 1), posed(model, 1), colors=True)
+    assert [x.name for x in judgement.limbs if np.isinf(x.end_color)] == ["head"]
 
 
 def test_contours_view_by_view():
@@ -218,6 +218,6 @@ def test_views_show_the_limbs_of_which_they_show_enough(gavrila):
 
 def test_quality_where_nothing_is_seen(gavrila):
     truth = posed(gavrila, 1)
-    found = judged(gavrila, truth, gavrila.retract(truth, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3))))
-    assert found.views == 0
-    assert classify(found) == "lost"
+    judgement = judged(gavrila, truth, gavrila.retract(truth, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3))))
+    assert judgement.views == 0
+    assert classify(judgement) == "lost"

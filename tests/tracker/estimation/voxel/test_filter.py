@@ -78,13 +78,13 @@ def test_derivative_of_the_measurement():
     other = state.retract(nudge)
 
     def residual(s):
-        found = linearize(s, measure_parts(s, clouds_of(s, other), 0.01, by_size=False), NOISE, ALL, True)
-        rows = found.residual.reshape(N_PARTS, 9).copy()
+        equations = linearize(s, measure_parts(s, clouds_of(s, other), 0.01, by_size=False), NOISE, ALL, True)
+        rows = equations.residual.reshape(N_PARTS, 9).copy()
         return rows
 
-    found = linearize(state, measure_parts(state, clouds_of(state, other), 0.01, by_size=False), NOISE, ALL, True)
+    equations = linearize(state, measure_parts(state, clouds_of(state, other), 0.01, by_size=False), NOISE, ALL, True)
     expected = -differences(state, residual).reshape(9 * N_PARTS, -1)
-    np.testing.assert_allclose(found.jacobian, expected, atol=1e-6)
+    np.testing.assert_allclose(equations.jacobian, expected, atol=1e-6)
 
 
 def test_sizes_of_a_part_that_is_merged_with_another_count_less():
@@ -92,8 +92,10 @@ def test_sizes_of_a_part_that_is_merged_with_another_count_less():
     state, noise = some_state(3), NOISE._replace(independent_m3=0.0003)
 
     def size_variances(other):
-        found = linearize(state, measure_parts(state, clouds_of(state, other), 0.01, by_size=False), noise, ALL, True)
-        return np.diag(found.noise).reshape(N_PARTS, 9)[:, 6:]
+        equations = linearize(
+            state, measure_parts(state, clouds_of(state, other), 0.01, by_size=False), noise, ALL, True
+        )
+        return np.diag(equations.noise).reshape(N_PARTS, 9)[:, 6:]
 
     sizes = state.sizes.copy()
     sizes[0, :2] *= 2.0

@@ -35,10 +35,10 @@ def tracked(
     estimator = VoxelEstimator(run, settings or VoxelSettings())
     estimates, errors, seen = [], [], cameras()
     for k in frames:
-        found = estimator.estimate(k, change(k, views_at(k / FPS, sizes, seen)))
-        own = body.named_points_world(found.poses[0])
+        estimate = estimator.estimate(k, change(k, views_at(k / FPS, sizes, seen)))
+        own = body.named_points_world(estimate.poses[0])
         truth = joints_at(k / FPS, sizes)
-        estimates.append(found)
+        estimates.append(estimate)
         errors.append([np.linalg.norm(own[j] - truth[j]) for j in LIMB_JOINTS])
     return estimates, np.array(errors)
 
@@ -163,5 +163,5 @@ def test_locked_dofs_stay():
     run = TrackingRun(observer, Subjects.of([body], active_dofs=[active]), [start], range(2), FPS)
     estimator = VoxelEstimator(run, replace(VoxelSettings(), iterations=1))
     for k in range(2):
-        found = estimator.estimate(k, views_at(k / FPS))
-    assert found.poses[0][-1] == start[-1]
+        estimate = estimator.estimate(k, views_at(k / FPS))
+    assert estimate.poses[0][-1] == start[-1]

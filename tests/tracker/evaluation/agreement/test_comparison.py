@@ -110,9 +110,9 @@ def test_three_poses_say_nothing_of_a_line_in_space():
 def test_bodies_without_a_common_joint_have_no_worst_one():
     points = np.random.default_rng(0).normal(size=(3, 2, 2, 3))
     points[0, 0, 0] = points[0, 1, 1] = np.nan
-    found = compare(copies_of(points))
-    assert [d.subject.frame for d in found.worst if d.subject.frame == 0] == []
-    assert len(found.worst) == 2
+    comparison = compare(copies_of(points))
+    assert [d.subject.frame for d in comparison.worst if d.subject.frame == 0] == []
+    assert len(comparison.worst) == 2
     alone = compare(copies_of(points[:1]))
     assert (alone.worst, alone.joints) == ((), {})
     assert np.isnan(alone.annotators["a"].mean_distance_m)

@@ -55,17 +55,17 @@ def doubts(judgement):
 
 
 def test_nothing_is_off_where_nothing_is(joints, tracked):
-    found = judged(joints, tracked)
-    assert doubts(found) == set()
-    assert found.share_in_order == 1.0
-    assert all(v.reason == "" for own in found.frames.values() for v in own.values())
+    judgement = judged(joints, tracked)
+    assert doubts(judgement) == set()
+    assert judgement.share_in_order == 1.0
+    assert all(v.reason == "" for own in judgement.frames.values() for v in own.values())
 
 
 def test_an_offset_throughout_is_a_sentence_and_no_doubt(joints, tracked):
-    found = judged(joints, tracked)
-    assert len(found.sentences) == 2
-    assert "left hip off by 4 cm throughout: 4 cm down" in found.sentences
-    assert found.spread_m["left_hip"] < 0.03
+    judgement = judged(joints, tracked)
+    assert len(judgement.sentences) == 2
+    assert "left hip off by 4 cm throughout: 4 cm down" in judgement.sentences
+    assert judgement.spread_m["left_hip"] < 0.03
 
 
 @pytest.mark.parametrize(
@@ -111,18 +111,18 @@ def test_exchanged_legs_are_named(joints, tracked):
     for joint in ("hip", "knee", "ankle"):
         a, b = AT[f"left_{joint}"], AT[f"right_{joint}"]
         joints[5:9, [a, b]] = joints[5:9, [b, a]]
-    found = judged(joints, tracked)
-    assert doubts(found) == {(k, f"{side} leg") for k in range(5, 9) for side in ("left", "right")}
-    assert {d.verdict.reason for d in found.worst[:8]} == {"legs exchanged"}
-    assert found.share_in_order == pytest.approx(1 - 4 / N)
+    judgement = judged(joints, tracked)
+    assert doubts(judgement) == {(k, f"{side} leg") for k in range(5, 9) for side in ("left", "right")}
+    assert {d.verdict.reason for d in judgement.worst[:8]} == {"legs exchanged"}
+    assert judgement.share_in_order == pytest.approx(1 - 4 / N)
 
 
 def test_a_jump_is_named_on_its_frame(joints, tracked):
     joints[12, AT["left_wrist"]] += (0.0, 0.2, 0.1)
-    found = judged(joints, tracked)
-    assert doubts(found) == {(12, "left arm")}
-    assert found.worst[0].frame == 12
-    assert "left arm jumps" in found.worst[0].verdict.reason
+    judgement = judged(joints, tracked)
+    assert doubts(judgement) == {(12, "left arm")}
+    assert judgement.worst[0].frame == 12
+    assert "left arm jumps" in judgement.worst[0].verdict.reason
 
 
 def test_a_drift_is_found_from_where_it_is_large(joints, tracked):

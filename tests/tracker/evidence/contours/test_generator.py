@@ -80,19 +80,19 @@ def test_along_the_axis_only_the_ends_show(tilt):
     body = PosedBody(
         SOLIDS["cone"], np.array([0, 0, 0, np.cos((np.pi / 2 - tilt) / 2), 0, np.sin((np.pi / 2 - tilt) / 2), 0])
     )
-    found = trace([body], FRONT)
-    assert cKDTree(hull_of_mesh(body, FRONT)).query(dense(found.pieces_px))[0].max() < 0.3
+    contours = trace([body], FRONT)
+    assert cKDTree(hull_of_mesh(body, FRONT)).query(dense(contours.pieces_px))[0].max() < 0.3
     T = body.model.kinematics(body.values).Ts_world_part[0]
-    heights = ((found.points_world - T[:3, 3]) @ T[:3, :3])[:, 2] / 0.25
+    heights = ((contours.points_world - T[:3, 3]) @ T[:3, :3])[:, 2] / 0.25
     on_the_side = np.abs(heights) < 0.99
     assert on_the_side.any() == (tilt > 0.1)
 
 
 def test_rulings_are_straight_and_graze():
     body = PosedBody(SOLIDS["cone"], np.array([0.1, 0.2, 0.1, *_quaternion((0.3, 0.4, 0.5))]))
-    found = trace([body], FRONT)
+    contours = trace([body], FRONT)
     T = body.model.kinematics(body.values).Ts_world_part[0]
-    points = (found.points_world - T[:3, 3]) @ T[:3, :3]
+    points = (contours.points_world - T[:3, 3]) @ T[:3, :3]
     side = np.abs(points[:, 2]) < 0.24
     x, y, z = (points[side] / (0.06, 0.1, 0.25)).T
     np.testing.assert_allclose(x**2 + y**2, (1 + 0.4 * z) ** 2, rtol=1e-4)

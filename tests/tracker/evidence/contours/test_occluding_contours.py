@@ -78,8 +78,8 @@ def test_ellipsoid_projects_to_its_ellipse(half_axes):
     body = at(model, 0.1, 0.2, 0.1, turns=(0.3, 0.4, 0.5))
     T = model.kinematics(body.values).Ts_world_part[0]
     for camera in cameras_around():
-        found = trace([body], camera)
-        off = off_outline(outline(half_axes, T, camera), dense(found.pieces_px))
+        contours = trace([body], camera)
+        off = off_outline(outline(half_axes, T, camera), dense(contours.pieces_px))
         radius_px = 520 * max(half_axes) / (4 - 0.3)
         # Never outside (0.02 px for single precision), and inside by what the grid leaves: 0.2 px for the 10 cm of a
         # head or a limb at this distance, in proportion for what is larger.
@@ -89,10 +89,10 @@ def test_ellipsoid_projects_to_its_ellipse(half_axes):
         # All of the ellipse is there, once.
         ellipse = ellipse_points(outline(half_axes, T, camera))
         # dense() leaves half a px between its points, beside what the pieces lie inside.
-        assert cKDTree(dense(found.pieces_px)).query(ellipse)[0].max() < INWARD * radius_px + 0.55
-        drawn = np.linalg.norm(found.pieces_px[:, 2:] - found.pieces_px[:, :2], axis=1).sum()
+        assert cKDTree(dense(contours.pieces_px)).query(ellipse)[0].max() < INWARD * radius_px + 0.55
+        drawn = np.linalg.norm(contours.pieces_px[:, 2:] - contours.pieces_px[:, :2], axis=1).sum()
         assert drawn == pytest.approx(np.linalg.norm(np.diff(ellipse, axis=0), axis=1).sum(), rel=0.02)
-        assert not found.occluded.any()
+        assert not contours.occluded.any()
 
 
 def test_contour_points_lie_on_the_surface_and_graze_it():
@@ -113,8 +113,8 @@ def test_contour_points_lie_on_the_surface_and_graze_it():
 
 def test_a_point_of_the_contour_is_seen_at_the_middle_of_its_piece(gavrila):
     camera = cameras_around(1)[0]
-    found = trace([PosedBody(gavrila, gavrila.neutral())], camera)
-    np.testing.assert_allclose(camera.project(found.points_world), middles(found), atol=0.02)
+    contours = trace([PosedBody(gavrila, gavrila.neutral())], camera)
+    np.testing.assert_allclose(camera.project(contours.points_world), middles(contours), atol=0.02)
 
 
 @pytest.mark.parametrize("piece_px", [PIECE_PX, 2.0, 9.0])
@@ -134,9 +134,9 @@ def test_pieces_are_short_and_add_up_to_the_same(gavrila, piece_px):
 def test_parts_behind_are_hidden():
     large, small = solid((0.3, 0.3, 0.3), name="large"), ball()
     front, behind = at(large, 0, 0, 0), at(small, -1, 0.1, 0)
-    found = trace([front, behind], FRONT)
-    assert found.occluded[found.parts == 1].all()
-    assert not found.occluded[found.parts == 0].any()
+    contours = trace([front, behind], FRONT)
+    assert contours.occluded[contours.parts == 1].all()
+    assert not contours.occluded[contours.parts == 0].any()
     # Before it, the small one cuts nothing from the outline of the large one, and is seen whole.
     assert not trace([front, at(small, 1, 0.1, 0)], FRONT).occluded.any()
     assert not trace([front, at(small, -1, 1, 0)], FRONT).occluded.any()
@@ -144,11 +144,11 @@ def test_parts_behind_are_hidden():
 
 def test_hidden_up_to_the_outline_of_what_hides():
     blocker, body = at(solid((0.15, 0.3, 0.2)), 0.6, 0.1, 0.1), at(solid((0.1, 0.3, 0.3)), -0.5, 0.2, -0.1)
-    found = trace([blocker, body], FRONT)
+    contours = trace([blocker, body], FRONT)
     T = blocker.model.kinematics(blocker.values).Ts_world_part[0]
-    mine = found.parts == 1
-    off = off_outline(outline((0.15, 0.3, 0.2), T, FRONT), middles(found, mine))
-    occluded = found.occluded[mine]
+    mine = contours.parts == 1
+    off = off_outline(outline((0.15, 0.3, 0.2), T, FRONT), middles(contours, mine))
+    occluded = contours.occluded[mine]
     assert 10 < occluded.sum() < len(occluded) - 10
     # Each piece is judged by its middle; at the very outline a line of sight that only grazes may pass.
     assert np.all(occluded[off < -0.5])
@@ -177,8 +177,8 @@ def test_no_contour_where_parts_adjoin(gap_m, occluded):
     """A ball before a plate, its outline by a gap before the plate's face: within the margin they merely meet."""
     depth = -(gap_m + PLATE_M)
     joined = parse_model(BALL_ON_PLATE.replace("BEHIND", str(depth)), "ball on plate")
-    found = trace([at(joined, 0, 0, 0, turns=())], FRONT)
-    assert set(found.occluded[found.parts == 0]) == {occluded}
+    contours = trace([at(joined, 0, 0, 0, turns=())], FRONT)
+    assert set(contours.occluded[contours.parts == 0]) == {occluded}
     # Bodies of their own in the same places share no joint: there is a contour between them.
     apart = trace([at(ball(), 0, 0, 0), at(solid((PLATE_M, 0.3, 0.3), (0.3, 0.3)), depth, 0, 0)], FRONT)
     assert not apart.occluded[apart.parts == 0].any()
@@ -196,9 +196,9 @@ def test_nothing_is_drawn_of_what_is_behind_the_camera():
     assert len(trace([at(ball(), 6, 0, 0)], camera).parts) == 0  # behind
     assert len(trace([at(ball(), 4.05, 0, 0)], camera).parts) == 0  # around the camera
     assert len(trace([at(ball(), 4, 1, 0)], camera).parts) == 0  # astride its plane
-    found = trace([at(ball(), 6, 0, 0), at(ball(), 0, 0, 0)], camera)
-    assert set(found.parts) == {1}
-    assert not found.occluded.any()  # nor does it hide anything
+    contours = trace([at(ball(), 6, 0, 0), at(ball(), 0, 0, 0)], camera)
+    assert set(contours.parts) == {1}
+    assert not contours.occluded.any()  # nor does it hide anything
 
 
 def test_lens_distortion_is_left_out(gavrila):

@@ -254,9 +254,9 @@ def test_unread_files_are_named(tmp_path, make, expected):
 
 @pytest.mark.parametrize("recording", ["walk", "balance_real", "fast_arms", "two_people"])
 def test_real_calibrations_are_read_without_a_doubt(data_folder, recording):
-    found = read_cameras(data_folder(recording) / "Calib.toml")
-    assert len(found.entries) == 4
-    assert found.notes == ()
+    cameras = read_cameras(data_folder(recording) / "Calib.toml")
+    assert len(cameras.entries) == 4
+    assert cameras.notes == ()
 
 
 def test_text_of_other_encodings(tmp_path):

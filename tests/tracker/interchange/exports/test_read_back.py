@@ -37,10 +37,10 @@ def test_exported_people_are_read_back(tmp_path, name):
     choices = {"bvh": {"unit_m": 1.0}, "coco": {"confidence": 1.0}}.get(name, {})  # which these files do not state
     plan = plan_import(session, ImportRequest("back", tuple(paths), ("ann", "bob"), **choices))
     store_import(session, plan)
-    found = load_observations(session, "back")
-    assert found.format in FORMATS
-    joints = observed_joints(found, [c.camera for c in session.cameras])
-    columns = columns_of(joints.names, found.joint_map, LIMB_JOINTS)
+    observations = load_observations(session, "back")
+    assert observations.format in FORMATS
+    joints = observed_joints(observations, [c.camera for c in session.cameras])
+    columns = columns_of(joints.names, observations.joint_map, LIMB_JOINTS)
     is_there = columns >= 0
     assert is_there.sum() == (8 if name == "bvh" else 12)  # BVH has ends of chains without names
     for k, bodies in enumerate(truth):

@@ -244,11 +244,11 @@ def test_files_name_the_calibration_and_the_poses_of_an_earlier_one(tmp_path):
     writers.write_person_opensim(motion, ExportOptions(), paths[2:4], no_tick)
     assert note in paths[2].read_text().partition("endheader")[0].splitlines()
     writers.write_keypoints(motion, ExportOptions(), paths[4:], no_tick)
-    found = json.loads(paths[4].read_text())
-    assert found["info"]["calibration"] == 2
-    assert note in found["info"]["description"]
-    frames = {image["id"]: image["frame"] for image in found["images"]}
-    told = {(frames[a["image_id"]], a["calibration"], a["earlier_calibration"]) for a in found["annotations"]}
+    report = json.loads(paths[4].read_text())
+    assert report["info"]["calibration"] == 2
+    assert note in report["info"]["description"]
+    frames = {image["id"]: image["frame"] for image in report["images"]}
+    told = {(frames[a["image_id"]], a["calibration"], a["earlier_calibration"]) for a in report["annotations"]}
     assert told == {(1, 1, True), (2, 2, False)}
 
 

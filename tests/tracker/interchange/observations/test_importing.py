@@ -51,15 +51,15 @@ def test_key_points_are_stored_and_triangulated(session, keypoints):
     assert not plan.problems
     store_import(session, plan)
     assert list_observations(session) == ["mp"]
-    found = load_observations(load_session(session.folder), "mp")
-    assert found.points.cameras == session.camera_names
-    assert found.point_names == BODY_25.points
-    assert found.counterparts["MidHip"] == ("left_hip", "right_hip")
-    assert found.counterparts["Nose"] == ()
-    assert np.abs(in_space(session, found)[:, 0] - TRUTH).max() < 1e-4  # files have three decimals
-    for source in found.sources:
+    observations = load_observations(load_session(session.folder), "mp")
+    assert observations.points.cameras == session.camera_names
+    assert observations.point_names == BODY_25.points
+    assert observations.counterparts["MidHip"] == ("left_hip", "right_hip")
+    assert observations.counterparts["Nose"] == ()
+    assert np.abs(in_space(session, observations)[:, 0] - TRUTH).max() < 1e-4  # files have three decimals
+    for source in observations.sources:
         assert source_path(session, "mp", source).read_bytes() == (keypoints / source.path).read_bytes()
-    assert len(found.sources) == 4 * N
+    assert len(observations.sources) == 4 * N
     assert [f for f in session.folder.joinpath("observations").iterdir() if f.name.startswith(".")] == []
 
 
@@ -194,10 +194,10 @@ def test_points_in_space(session, tmp_path):
     plan = planned(session, tmp_path / "a.trc")
     assert not plan.problems
     store_import(session, plan)
-    found = load_observations(session, "mp")
-    assert found.points is None
-    assert np.abs(found.joints.joints_world[:, 0] - TRUTH).max() < 1e-6
-    assert found.row_frames[0].tolist() == [*range(N)]
+    observations = load_observations(session, "mp")
+    assert observations.points is None
+    assert np.abs(observations.joints.joints_world[:, 0] - TRUTH).max() < 1e-6
+    assert observations.row_frames[0].tolist() == [*range(N)]
 
 
 @pytest.mark.parametrize(
@@ -254,9 +254,9 @@ def test_one_file_for_each_person(tmp_path):
 def test_people_of_one_file_are_known_by_name(tmp_path, kind, names):
     session = make_session(tmp_path / "s", N, people=("BEN", "ann"))
     path = write_joints(kind, tmp_path, BODY_25.points, np.stack([TRUTH, TRUTH + 0.2]))
-    found = planned(session, path)
-    assert not found.problems
-    ben, ann = np.moveaxis(found.observations.joints.joints_world, 1, 0)
+    plan = planned(session, path)
+    assert not plan.problems
+    ben, ann = np.moveaxis(plan.observations.joints.joints_world, 1, 0)
     assert np.abs(ann - TRUTH).max() < 1e-5
     assert np.abs(ben - TRUTH - 0.2).max() < 1e-5
     alone = plan_import(session, ImportRequest("one", (path,), ("BEN",)))
@@ -266,9 +266,9 @@ def test_people_of_one_file_are_known_by_name(tmp_path, kind, names):
 
 def test_people_of_one_file_in_order(tmp_path):
     path = write_joints("people", tmp_path, BODY_25.points, np.stack([TRUTH, TRUTH + 0.2]))
-    found = planned(make_session(tmp_path / "s", N, people=("one", "two")), path)
-    assert np.abs(found.observations.joints.joints_world[:, 1] - TRUTH - 0.2).max() < 1e-5
-    assert found.observations.notes == ("a.csv: ann is taken for one", "a.csv: ben is taken for two")
+    plan = planned(make_session(tmp_path / "s", N, people=("one", "two")), path)
+    assert np.abs(plan.observations.joints.joints_world[:, 1] - TRUTH - 0.2).max() < 1e-5
+    assert plan.observations.notes == ("a.csv: ann is taken for one", "a.csv: ben is taken for two")
     with pytest.raises(
         SessionError, match=r"\(person\), found 2 people \(ann, ben\) in a.csv; make a session of as many"
     ):
@@ -277,11 +277,11 @@ def test_people_of_one_file_in_order(tmp_path):
 
 def test_a_person_whom_the_file_names_is_nobody_else(tmp_path):
     path = write_joints("people", tmp_path, BODY_25.points, np.stack([TRUTH, TRUTH + 0.2]))
-    found = planned(make_session(tmp_path / "s", N, people=("ben", "carl")), path)
-    ben, carl = np.moveaxis(found.observations.joints.joints_world, 1, 0)
+    plan = planned(make_session(tmp_path / "s", N, people=("ben", "carl")), path)
+    ben, carl = np.moveaxis(plan.observations.joints.joints_world, 1, 0)
     assert np.abs(ben - TRUTH - 0.2).max() < 1e-5
     assert np.abs(carl - TRUTH).max() < 1e-5
-    assert found.observations.notes == ("a.csv: ann is taken for carl",)
+    assert plan.observations.notes == ("a.csv: ann is taken for carl",)
 
 
 def test_our_own_tables_of_motion_are_read_back(tmp_path):
@@ -302,10 +302,10 @@ def test_our_own_tables_of_motion_are_read_back(tmp_path):
 
 @pytest.mark.parametrize("kind", ["npy", "easymocap"])
 def test_joints_without_names_are_known_by_their_number(session, tmp_path, kind):
-    found = planned(session, write_joints(kind, tmp_path, BODY_25.points, TRUTH[None]), unit_m=1.0)
-    assert not found.problems
-    assert found.observations.joint_map.name == "BODY_25"
-    assert found.observations.point_names == BODY_25.points
+    plan = planned(session, write_joints(kind, tmp_path, BODY_25.points, TRUTH[None]), unit_m=1.0)
+    assert not plan.problems
+    assert plan.observations.joint_map.name == "BODY_25"
+    assert plan.observations.point_names == BODY_25.points
     other = planned(session, write_joints(kind, tmp_path / "b", range(23), TRUTH[None, :, :23]), unit_m=1.0)
     assert "the number of points of a known skeleton" in problems(other)
 
@@ -314,10 +314,10 @@ def test_numbered_points_that_appear_late_or_never(session, tmp_path):
     points = TRUTH.copy()
     points[:2, 0] = np.nan
     points[:, 20] = np.nan
-    found = planned(session, write_joints("caliscope", tmp_path, BODY_25.points, points[None]), unit_m=1.0)
-    assert not found.problems
-    assert found.observations.point_names == BODY_25.points
-    assert np.nanmax(np.abs(found.observations.joints.joints_world[:, 0] - points)) < 1e-5
+    plan = planned(session, write_joints("caliscope", tmp_path, BODY_25.points, points[None]), unit_m=1.0)
+    assert not plan.problems
+    assert plan.observations.point_names == BODY_25.points
+    assert np.nanmax(np.abs(plan.observations.joints.joints_world[:, 0] - points)) < 1e-5
 
 
 @pytest.mark.parametrize("kind", ["caliscope", "npy"])
@@ -328,19 +328,19 @@ def test_hands_after_a_body_without_names(session, tmp_path, kind):
     for joint, marker in body.markers.items():
         if joint in BODY_25.markers:
             points[:, body.points.index(marker)] = TRUTH[:, BODY_25.points.index(BODY_25.markers[joint])]
-    found = planned(session, write_joints(kind, tmp_path, range(points.shape[1]), points[None]), unit_m=1.0)
-    assert not found.problems
-    assert found.observations.point_names[:33] == body.points
-    assert "120" in found.observations.point_names
-    wrist = found.observations.point_names.index("left_wrist")
-    assert np.nanmax(np.abs(found.observations.joints.joints_world[:, 0, wrist] - points[:, 15])) < 1e-5
+    plan = planned(session, write_joints(kind, tmp_path, range(points.shape[1]), points[None]), unit_m=1.0)
+    assert not plan.problems
+    assert plan.observations.point_names[:33] == body.points
+    assert "120" in plan.observations.point_names
+    wrist = plan.observations.point_names.index("left_wrist")
+    assert np.nanmax(np.abs(plan.observations.joints.joints_world[:, 0, wrist] - points[:, 15])) < 1e-5
 
 
 def test_numbers_of_no_skeleton_in_a_table_of_caliscope(session, tmp_path):
     path = write_joints("caliscope", tmp_path, range(14), TRUTH[None, :, :14]).rename(tmp_path / "xyz_HOLISTIC.csv")
-    found = planned(session, path.rename(tmp_path / "joints.csv"), unit_m=1.0)
-    assert "found 14" in problems(found)
-    assert any("the table of Caliscope whose name ends in _labelled.csv" in n for n in found.observations.notes)
+    plan = planned(session, path.rename(tmp_path / "joints.csv"), unit_m=1.0)
+    assert "found 14" in problems(plan)
+    assert any("the table of Caliscope whose name ends in _labelled.csv" in n for n in plan.observations.notes)
 
 
 def test_files_of_other_programs_are_named(session, tmp_path):

@@ -1,12 +1,10 @@
 """Mutated observations of each format: each is imported or refused by one sentence."""
 
-import json
 import multiprocessing
 import random
 import shutil
 import subprocess
 import sys
-import tomllib
 import traceback
 import warnings
 
@@ -14,7 +12,7 @@ import joint_files
 import numpy as np
 import pytest
 from mask_files import SIZE, person_masks, write_coco_masks, write_masks
-from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
+from mutation import mutated
 from observed_files import write_c3d, write_coco_images, write_deeplabcut, write_points_csv, write_sleap
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 from program_files import WRITERS
@@ -99,23 +97,14 @@ def write(kind, session, folder):
     return folder / KINDS[kind][0].split("/", maxsplit=1)[0]
 
 
-def mutated(rng, name, data):
-    if name.endswith((".json", ".toml")) and rng.random() < 0.5:
-        tree = tomllib.loads(data.decode()) if name.endswith(".toml") else json.loads(data)
-        return (toml_bytes if name.endswith(".toml") else json_bytes)(mutate_tree(rng, tree))
-    for _ in range(rng.choice((1, 1, 1, 1, 2, 4))):
-        data = mutate_bytes(rng, data, [data]) or b" "
-    return data
-
-
 def read(kind, session, path, case):
     """Import, or load what was imported; return whether it was refused."""
     if kind == "stored masks":
         load_masks(session, "mp")
         return False
     if kind.startswith("stored"):
-        found = load_observations(session, "mp")
-        observed_joints(found, [c.camera for c in session.cameras])
+        observations = load_observations(session, "mp")
+        observed_joints(observations, [c.camera for c in session.cameras])
         return False
     plan = plan_import(session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=_unit(kind)))
     if kind in OF_MASKS:
@@ -192,7 +181,7 @@ def test_mutated_observations_are_imported_or_refused(kind, n, tmp_path, monkeyp
     data = (folder / name).read_bytes()
     rng, failures, refused = random.Random(f"mutated {kind}"), [], 0
     for case in range(n):
-        (folder / name).write_bytes(mutated(rng, name, data))
+        (folder / name).write_bytes(mutated(rng, name, data, [data]))
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")

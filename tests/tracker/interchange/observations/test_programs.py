@@ -47,12 +47,12 @@ def in_space(session, observations):
 @pytest.mark.parametrize("program", WRITERS)
 def test_programs(session, tmp_path, program):
     WRITERS[program](tmp_path / "f", session.camera_names, list(POINTS), seen(session, [TRUTH]))
-    found = imported(session, tmp_path / "f", confidence=1.0 if program == "roboflow" else None)
-    assert found.format == FORMATS.get(program, program)
+    observations = imported(session, tmp_path / "f", confidence=1.0 if program == "roboflow" else None)
+    assert observations.format == FORMATS.get(program, program)
     rows = [k for k in range(N) if program != "hand labels" or k % 3 == 1]
-    assert np.abs(in_space(session, found)[rows] - TRUTH[rows]).max() < 1e-3
+    assert np.abs(in_space(session, observations)[rows] - TRUTH[rows]).max() < 1e-3
     expected = 1.0 if program in BY_HAND else 0.97 if program == "eks" else 0.9
-    assert np.allclose(found.points.confidence[found.points.is_known], expected)
+    assert np.allclose(observations.points.confidence[observations.points.is_known], expected)
 
 
 def test_sleaps_table_lists_pictures_with_somebody(session, tmp_path):
@@ -60,9 +60,9 @@ def test_sleaps_table_lists_pictures_with_somebody(session, tmp_path):
     for path in (tmp_path / "f").iterdir():
         head, *rows = path.read_text().splitlines()
         path.write_text("\n".join([head, *rows[2:]]))
-    found = imported(session, tmp_path / "f")
-    assert np.isnan(in_space(session, found)[:2]).all()
-    assert np.abs(in_space(session, found)[2:] - TRUTH[2:]).max() < 1e-3
+    observations = imported(session, tmp_path / "f")
+    assert np.isnan(in_space(session, observations)[:2]).all()
+    assert np.abs(in_space(session, observations)[2:] - TRUTH[2:]).max() < 1e-3
 
 
 def test_tables_of_deeplabcut_from_a_spreadsheet_and_beside_metrics(session, tmp_path):
@@ -88,9 +88,9 @@ def test_two_people(session, tmp_path, program):
 @pytest.mark.parametrize("n_cells", [1, 3])
 def test_labels_of_a_person_lie_at_their_pictures(session, tmp_path, n_cells):
     write_hand_labels(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]), n_cells)
-    found = imported(session, tmp_path / "f")
-    assert np.flatnonzero(found.points.is_known.any(axis=(1, 2, 3))).tolist() == [1, 4, 7]
-    assert "labels were placed by the numbers of their pictures" in found.notes[0]
+    observations = imported(session, tmp_path / "f")
+    assert np.flatnonzero(observations.points.is_known.any(axis=(1, 2, 3))).tolist() == [1, 4, 7]
+    assert "labels were placed by the numbers of their pictures" in observations.notes[0]
     moved = planned(session, tmp_path / "f", first_frame=0)
     assert "placed at frame 0, as chosen, though the numbers of the labels are those of" in moved.observations.notes[0]
     wrong = tmp_path / "f" / "labeled-data" / "cam0" / "CollectedData_ann.csv"
@@ -101,17 +101,17 @@ def test_labels_of_a_person_lie_at_their_pictures(session, tmp_path, n_cells):
 
 def test_single_points_of_cvat(session, tmp_path):
     write_cvat_points(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]))
-    found = imported(session, tmp_path / "f")
-    assert np.abs(in_space(session, found)[1::2] - TRUTH[1::2]).max() < 1e-3
-    assert not found.points.is_known[::2].any()
+    observations = imported(session, tmp_path / "f")
+    assert np.abs(in_space(session, observations)[1::2] - TRUTH[1::2]).max() < 1e-3
+    assert not observations.points.is_known[::2].any()
 
 
 def test_likelihoods_that_are_a_placeholder(session, tmp_path):
     write_eks(tmp_path / "f", session.camera_names, POINTS, seen(session, [TRUTH]), likelihood=0)
-    found = imported(session, tmp_path / "f")
-    assert (found.points.confidence[found.points.is_known] == 1).all()
-    assert sum("likelihoods are 0 throughout" in note for note in found.notes) == 4
-    assert sum("columns x_ens_median, y_posterior_var were left out" in note for note in found.notes) == 4
+    observations = imported(session, tmp_path / "f")
+    assert (observations.points.confidence[observations.points.is_known] == 1).all()
+    assert sum("likelihoods are 0 throughout" in note for note in observations.notes) == 4
+    assert sum("columns x_ens_median, y_posterior_var were left out" in note for note in observations.notes) == 4
 
 
 def test_a_labelled_table_that_is_there_twice(session, tmp_path):
@@ -187,16 +187,16 @@ def test_nobody_in_the_first_picture(session, tmp_path, program):
     WRITERS[program](tmp_path / "f", session.camera_names, list(POINTS), seen(session, [TRUTH]))
     for path in (tmp_path / "f").rglob("*000000.*"):
         path.write_text({"easymocap": '{"annots": []}', "mmpose pictures": "[]", "yolo": ""}[program])
-    found = imported(session, tmp_path / "f")
-    assert np.flatnonzero(found.points.is_known.any(axis=(1, 2, 3))).tolist() == list(range(1, N))
+    observations = imported(session, tmp_path / "f")
+    assert np.flatnonzero(observations.points.is_known.any(axis=(1, 2, 3))).tolist() == list(range(1, N))
 
 
 def test_names_with_a_rate(session, tmp_path):
     write_openpose(tmp_path / "k", session.camera_names, seen(session, [TRUTH]))
     for path in (tmp_path / "k").rglob("*.json"):
         path.rename(path.with_name(path.name.replace("keypoints", "30fps")))
-    found = imported(session, tmp_path / "k")
-    assert np.abs(in_space(session, found) - TRUTH).max() < 1e-3
+    observations = imported(session, tmp_path / "k")
+    assert np.abs(in_space(session, observations) - TRUTH).max() < 1e-3
 
 
 @pytest.mark.parametrize(("program", "name"), [("eks", "x" * 300), ("sleap csv", "a\x0bb"), ("cvat images", "a&#10;b")])

@@ -60,10 +60,10 @@ def test_deeplabcut(session, tmp_path, kind):
     points = seen(session, [TRUTH])
     for v, name in enumerate(session.camera_names):
         write_deeplabcut(tmp_path / "dlc" / f"{name}DLC_resnet50_demo", BODY_25.points, points[:, v], kind)
-    found = imported(session, tmp_path / "dlc")
-    assert found.format == ("hdf5" if kind == "h5" else "deeplabcut")
-    assert np.abs(in_space(session, found) - TRUTH).max() < 1e-4
-    assert np.allclose(found.points.confidence[found.points.is_known], 0.9)
+    observations = imported(session, tmp_path / "dlc")
+    assert observations.format == ("hdf5" if kind == "h5" else "deeplabcut")
+    assert np.abs(in_space(session, observations) - TRUTH).max() < 1e-4
+    assert np.allclose(observations.points.confidence[observations.points.is_known], 0.9)
 
 
 def test_deeplabcut_labels_of_pictures(tmp_path):
@@ -103,9 +103,9 @@ def test_sleap_and_nwb(session, tmp_path, suffix):
     points = seen(session, [TRUTH])
     for v, name in enumerate(session.camera_names):
         write_sleap(tmp_path / "sleap" / f"{name}{suffix}", BODY_25.points, points[:, v])
-    found = imported(session, tmp_path / "sleap")
-    assert found.format == "hdf5"
-    assert np.abs(in_space(session, found) - TRUTH).max() < 1e-4
+    observations = imported(session, tmp_path / "sleap")
+    assert observations.format == "hdf5"
+    assert np.abs(in_space(session, observations) - TRUTH).max() < 1e-4
 
 
 @pytest.mark.slow
@@ -165,9 +165,9 @@ def test_a_library_that_hangs_or_dies(tmp_path, monkeypatch):
 def test_coco(session, tmp_path, of):
     points = seen(session, [TRUTH])
     write_coco_images(tmp_path / "coco.json", session.camera_names, BODY_25.points, points, of)
-    found = imported(session, tmp_path / "coco.json", confidence=1.0 if of == "folders" else None)
-    assert found.format == "coco"
-    assert np.abs(in_space(session, found) - TRUTH).max() < 1e-4
+    observations = imported(session, tmp_path / "coco.json", confidence=1.0 if of == "folders" else None)
+    assert observations.format == "coco"
+    assert np.abs(in_space(session, observations) - TRUTH).max() < 1e-4
 
 
 def test_coco_flags_are_no_confidence(session, tmp_path):
@@ -182,9 +182,9 @@ def test_people_without_a_score_among_others_are_certain(session, tmp_path):
     data = json.loads(path.read_text())
     del data["annotations"][2]["score"]  # corrected by hand
     path.write_text(json.dumps(data))
-    found = imported(session, path)
-    assert sorted(set(found.points.confidence[found.points.is_known].round(6))) == [0.7, 1.0]
-    assert any("25 points without a confidence" in note for note in found.notes)
+    observations = imported(session, path)
+    assert sorted(set(observations.points.confidence[observations.points.is_known].round(6))) == [0.7, 1.0]
+    assert any("25 points without a confidence" in note for note in observations.notes)
 
 
 def test_coco_of_another_size(session, tmp_path):
@@ -232,8 +232,8 @@ def test_c3d(session, tmp_path):
     points = TRUTH.copy()
     points[2, 5] = np.nan
     write_c3d(tmp_path / "a.c3d", BODY_25.points, points, 30.0)
-    found = imported(session, tmp_path / "a.c3d")
-    there = found.joints.joints_world[:, 0]
+    observations = imported(session, tmp_path / "a.c3d")
+    there = observations.joints.joints_world[:, 0]
     assert np.isnan(there[2, 5]).all()
     assert np.nanmax(np.abs(there - points)) < 1e-6
     table = read_c3d(tmp_path / "a.c3d", None)
@@ -293,10 +293,10 @@ def test_csv_of_points(session, tmp_path, unit):
     points = TRUTH.copy()
     points[3, 4] = np.nan
     write_points_csv(tmp_path / "a.csv", BODY_25.points, points, 30.0, unit)
-    found = imported(session, tmp_path / "a.csv", unit_m=None if unit else 1.0)
-    assert found.format == "csv"
-    assert np.nanmax(np.abs(found.joints.joints_world[:, 0] - points)) < 1e-6
-    assert np.isnan(found.joints.joints_world[3, 0, 4]).all()
+    observations = imported(session, tmp_path / "a.csv", unit_m=None if unit else 1.0)
+    assert observations.format == "csv"
+    assert np.nanmax(np.abs(observations.joints.joints_world[:, 0] - points)) < 1e-6
+    assert np.isnan(observations.joints.joints_world[3, 0, 4]).all()
 
 
 @pytest.mark.parametrize(

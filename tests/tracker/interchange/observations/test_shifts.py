@@ -128,10 +128,10 @@ def test_late_key_points_are_refused_until_the_user_decides(tmp_path, points):
     with pytest.raises(FormatError, match=r"expected offsets of the cameras cam0, .* found one of 'cam9'"):
         plan(offsets={"cam9": 1})
     store_import(session, moved)
-    found = load_observations(session, "mp")
-    assert json.loads(dict(found.options)["offsets"]) == {"cam1": 3}
-    first = {s.camera: int(s.frames[0]) for s in stored_pictures(session, found)}
+    observations = load_observations(session, "mp")
+    assert json.loads(dict(observations.options)["offsets"]) == {"cam1": 3}
+    first = {s.camera: int(s.frames[0]) for s in stored_pictures(session, observations)}
     assert first == {"cam0": 0, "cam1": -3, "cam2": 0, "cam3": 0}
-    done = export_like(session, found, tmp_path / "back")
+    done = export_like(session, observations, tmp_path / "back")
     assert not done.changed
     assert len(done.paths) == 4 * N

@@ -25,8 +25,8 @@ def test_true_points_raise_few_questions():
     asked = []
     for seed in range(200):
         case = Case(seed)
-        found = case.found(case.points, in_space=seed % 2 == 0)
-        asked += [(seed, str(f)) for f in found[:1]]
+        problems = case.found(case.points, in_space=seed % 2 == 0)
+        asked += [(seed, str(f)) for f in problems[:1]]
     assert len(asked) <= 2, asked
 
 
@@ -37,8 +37,8 @@ def test_true_points_are_taken(case):
 def test_other_axes_are_named(case):
     for words in case.rng.permutation([w for w in axis_conventions() if w != "x,y,z"])[:4]:
         assert words in fields(case.found(case.points @ axes_matrix(words)), "axes"), words
-        found = case.found(case.points @ axes_matrix(words), axes=str(words))
-        assert found == [] or (is_mirrored(words) and found[0].remedy.code == "turn_axis")
+        problems = case.found(case.points @ axes_matrix(words), axes=str(words))
+        assert problems == [] or (is_mirrored(words) and problems[0].remedy.code == "turn_axis")
 
 
 class BesideAnother:
@@ -63,8 +63,8 @@ class BesideAnother:
 def test_another_ones_place_is_no_reason_to_turn_a_person_round(own, is_everybody, is_asked):
     case = Case(0)
     points = np.add(case.points, (5.0, 0.0, 0.0))
-    found = case.found(points, known_people=BesideAnother(own), is_everybody=is_everybody)
-    assert fields(found, "axes") == ["-x,-y,z"] * is_asked
+    problems = case.found(points, known_people=BesideAnother(own), is_everybody=is_everybody)
+    assert fields(problems, "axes") == ["-x,-y,z"] * is_asked
 
 
 @pytest.mark.parametrize(
@@ -72,9 +72,9 @@ def test_another_ones_place_is_no_reason_to_turn_a_person_round(own, is_everybod
     [1000.0, 0.3048, *(pytest.param(f, marks=pytest.mark.slow) for f in (100.0, 1 / 0.0254, 1 / 0.3048, 0.0254))],
 )
 def test_other_units_are_named(case, factor):
-    found = case.found(factor * case.points)
-    assert "the points fit one of" in str(found[0])
-    assert f"times {1 / factor:.4g} the points fit" in str(found[0])
+    problems = case.found(factor * case.points)
+    assert "the points fit one of" in str(problems[0])
+    assert f"times {1 / factor:.4g} the points fit" in str(problems[0])
 
 
 @pytest.mark.parametrize("lag", [2, 5, -5])
@@ -85,10 +85,10 @@ def test_lags_are_named_where_they_matter(case, lag):
     late[inside[0]] = case.points[inside[1]]
     limbs = [case.skeleton.points.index(case.skeleton.markers[j]) for j in LIMB_JOINTS]
     moved = np.linalg.norm(case.clean[inside[0]] - case.clean[inside[1]], axis=-1)[:, limbs]
-    found = case.found(late)
+    problems = case.found(late)
     if moved.mean() > WRONG_M:
-        assert found, moved.mean()
-    assert all(abs(frame + lag) <= 1 for frame in fields(found, "frame")), found
+        assert problems, moved.mean()
+    assert all(abs(frame + lag) <= 1 for frame in fields(problems, "frame")), problems
 
 
 def test_points_in_the_order_of_another_skeleton_are_refused(case):
@@ -100,13 +100,13 @@ def test_points_in_the_order_of_another_skeleton_are_refused(case):
         differ = [a for a, b in zip(own, first, strict=False) if own[a] and own[a] != theirs[b]]
         if len(first) < len(own) or not {own[a][0] for a in differ}.intersection(LIMB_JOINTS):
             continue
-        found = case.found(detected(skeleton_points(case.person, other), 0)[:, : len(own)])
-        assert found, other.name
+        problems = case.found(detected(skeleton_points(case.person, other), 0)[:, : len(own)])
+        assert problems, other.name
         if len(other.points) == len(own):
-            assert fields(found, "name") == [other.name]
+            assert fields(problems, "name") == [other.name]
 
 
 @pytest.mark.parametrize("in_space", [True, False])
 def test_exchanged_sides_are_named(case, in_space):
-    found = case.found(case.points, skeleton=case.skeleton.with_sides_exchanged, in_space=in_space)
-    assert "left for right" in str(found[0])
+    problems = case.found(case.points, skeleton=case.skeleton.with_sides_exchanged, in_space=in_space)
+    assert "left for right" in str(problems[0])

@@ -306,9 +306,9 @@ def test_in_version_3_nobody_had_reviewed_but_keyframes(version_3, read_only):
     assert [(r.frame, r.keyframe, r.reviewed) for r in store.frames("ann")] == [
         (1, True, True), (2, False, False), (3, False, False),
     ]  # fmt: skip
-    found = store.pose("ann", 3)
-    assert (found.reviewed, found.remark, found.view_costs_px) == (False, "late", (1.0, None))
-    assert found.settings == {"step_deg": 5}
+    pose = store.pose("ann", 3)
+    assert (pose.reviewed, pose.remark, pose.view_costs_px) == (False, "late", (1.0, None))
+    assert pose.settings == {"step_deg": 5}
     store.close()
     assert (version_3.read_bytes() == before) == read_only
 

@@ -22,20 +22,20 @@ def axes_of(voxels, cameras=CAMERAS):
 @pytest.mark.slow
 @pytest.mark.parametrize("arms_deg", [5, 35, 70])
 def test_the_axis_is_upright_and_ends_at_the_head(arms_deg):
-    found = find_body_axes(axes_of(figure(arms_deg=arms_deg, turn_deg=20)[0]), UP, 1.75)
-    assert found[0].up @ UP > np.cos(np.radians(4))
-    assert found[0].top[2] == pytest.approx(TOP_M, abs=0.05)
-    np.testing.assert_allclose(found[0].top[:2], 0, atol=0.05)
-    assert found[0].left_out == ()
+    axes = find_body_axes(axes_of(figure(arms_deg=arms_deg, turn_deg=20)[0]), UP, 1.75)
+    assert axes[0].up @ UP > np.cos(np.radians(4))
+    assert axes[0].top[2] == pytest.approx(TOP_M, abs=0.05)
+    np.testing.assert_allclose(axes[0].top[:2], 0, atol=0.05)
+    assert axes[0].left_out == ()
 
 
 def test_a_person_upside_down_has_the_head_below():
     voxels = figure(arms_deg=35)[0]
     down = rigid.transform(rigid.so3_exp(np.array([np.pi, 0.0, 0.0])), np.array([0.0, 0.0, 1.8]))
     cameras = [replace(c, T_world_camera=down @ c.T_world_camera) for c in CAMERAS]
-    found = find_body_axes([major_axis(s.mask, s.camera) for s in moved(voxels, cameras)], UP, 1.75)
-    assert found[0].up @ UP < -0.99
-    assert found[0].top[2] == pytest.approx(1.8 - TOP_M, abs=0.05)
+    axes = find_body_axes([major_axis(s.mask, s.camera) for s in moved(voxels, cameras)], UP, 1.75)
+    assert axes[0].up @ UP < -0.99
+    assert axes[0].top[2] == pytest.approx(1.8 - TOP_M, abs=0.05)
 
 
 def moved(voxels, cameras):
@@ -49,9 +49,9 @@ def test_a_view_that_contradicts_the_others_is_left_out():
     voxels = figure()[0]
     turned = CAMERAS[1].T_world_camera @ rigid.transform(rigid.so3_exp(np.array([0.0, 0.0, 0.7])))
     cameras = [CAMERAS[0], replace(CAMERAS[1], T_world_camera=turned), *CAMERAS[2:]]
-    found = find_body_axes([major_axis(s.mask, s.camera) for s in moved(voxels, cameras)], UP, 1.75)
-    assert found[0].left_out == ("c1",)
-    assert found[0].up @ UP > 0.99
+    axes = find_body_axes([major_axis(s.mask, s.camera) for s in moved(voxels, cameras)], UP, 1.75)
+    assert axes[0].left_out == ("c1",)
+    assert axes[0].up @ UP > 0.99
 
 
 @pytest.mark.slow

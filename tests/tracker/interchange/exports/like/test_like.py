@@ -428,11 +428,11 @@ def test_several_files_of_one_picture_are_not_sent_back(session, tmp_path, bodie
 
 def test_programs_to_which_nothing_is_sent_back(session, tmp_path, bodies):
     write_sleap_csv(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
-    found = imported(session, tmp_path / "f")
-    export_like(session, found, tmp_path / "untouched")
+    observations = imported(session, tmp_path / "f")
+    export_like(session, observations, tmp_path / "untouched")
     store(session, bodies)
     with pytest.raises(FormatError, match="to which points are sent back, found SLEAP's analysis in CSV") as caught:
-        export_like(session, found, tmp_path / "back")
+        export_like(session, observations, tmp_path / "back")
     assert caught.value.remedy == Remedy("export_other_format")
 
 
