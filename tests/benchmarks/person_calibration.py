@@ -222,15 +222,21 @@ def _scaled(T_world_camera: Array, scale: float) -> Array:
     return rigid.transform(T_world_camera[:3, :3], scale * T_world_camera[:3, 3])
 
 
-def main():
-    """Measure and print, or write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def read_arguments(description: str | None, kinds: Sequence[str], tables: Sequence[str]) -> argparse.Namespace:
+    """Read the words of a benchmark of recordings and of simulated rigs."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--data", type=Path, help="folder of the recordings; without it, simulated people only")
-    parser.add_argument("--only", nargs="+", choices=KINDS, default=KINDS, help="tables to measure")
+    parser.add_argument("--only", nargs="+", choices=kinds, default=kinds, help="tables to measure")
     parser.add_argument("--rigs", type=int, default=20, help="number of simulated rigs of each kind")
     add_write_option(parser)
     arguments = parser.parse_args()
-    check_places(arguments.write, TABLES)
+    check_places(arguments.write, tables)
+    return arguments
+
+
+def main():
+    """Measure and print, or write the tables."""
+    arguments = read_arguments(__doc__, KINDS, TABLES)
     if arguments.data is not None and "recordings" in arguments.only:
         measure_recordings(arguments.data, arguments.write)
     if "simulated" in arguments.only:

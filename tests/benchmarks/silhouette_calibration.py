@@ -5,7 +5,6 @@ Cameras of recordings are compared with the given ones as in `person_calibration
 are rendered masks with the errors of a segmentation (`tests/support/filmed_silhouettes.py`).
 """
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,10 +14,10 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, show, table
 from filmed_people import aligned, blanks
 from filmed_silhouettes import EXACT, FilmedSilhouettes, Segmentation, filmed
-from person_calibration import HEADS, HEIGHTS_M, LENS_NAMES, recording_row, reprojected
+from person_calibration import HEADS, HEIGHTS_M, LENS_NAMES, read_arguments, recording_row, reprojected
 
 from tracker.calibration.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
 from tracker.calibration.self_calibration.silhouette_calibration import calibrate_by_silhouettes
@@ -151,13 +150,7 @@ def _filmed_cells(results: Sequence[Calibrated | None]) -> list[str]:
 
 def main():
     """Measure and print, or write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, help="folder of the recordings; without it, simulated people only")
-    parser.add_argument("--only", nargs="+", choices=KINDS, default=KINDS, help="tables to measure")
-    parser.add_argument("--rigs", type=int, default=20, help="number of simulated people of each kind")
-    add_write_option(parser)
-    arguments = parser.parse_args()
-    check_places(arguments.write, TABLES)
+    arguments = read_arguments(__doc__, KINDS, TABLES)
     if arguments.data is not None and "recordings" in arguments.only:
         measure_silhouettes(arguments.data, arguments.write)
     if "simulated" in arguments.only:

@@ -57,10 +57,10 @@ def new_store(path):
     return store
 
 
-def copied(path, to):
-    """Copy a store that is closed, and open the copy."""
+def copied(path, to, author=None):
+    """Copy a store that is closed, and open the copy as an author."""
     shutil.copyfile(path, to)
-    return AnnotationStore(to)
+    return AnnotationStore(to, author=author)
 
 
 def merged(one, other, to, tolerance_m=0.025):

@@ -42,6 +42,12 @@ async def go_to(page, frame):
     await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 30)
 
 
+async def reloaded(page, expression=OPENED):
+    """Load the page again, and wait until an expression holds there."""
+    await page.reload()
+    await shows(page, expression)
+
+
 async def until(condition, timeout_s=20.0):
     """Wait until a condition of the fake endpoint holds.
 

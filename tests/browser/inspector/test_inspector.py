@@ -2,7 +2,7 @@
 
 import pytest
 from fake_endpoint import CAMERA_NAMES
-from page_driver import shows, until
+from page_driver import reloaded, shows, until
 
 
 async def opened(page, *sections):
@@ -183,8 +183,7 @@ async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
     last = await page.locator("#show-key-list").bounding_box()
     assert last["x"] + last["width"] <= 1280
     await page.locator("[data-section=search] summary").click()
-    await page.reload()
-    await shows(page, "window.quadrille?.state.settings && document.querySelector('[data-section=search]').open")
+    await reloaded(page, "window.quadrille?.state.settings && document.querySelector('[data-section=search]').open")
     assert await page.locator("#inspector").is_visible()
     assert await page.locator("#inspector").evaluate("(one) => one.scrollWidth <= one.clientWidth")
 
@@ -244,8 +243,7 @@ async def test_a_theme_is_chosen_kept_and_recolours_the_3d_view_as_it_stands(pag
     light = await page.evaluate(GROUND)
     assert await frame.evaluate("(body) => getComputedStyle(body).backgroundColor") == light
     assert await frame.evaluate("() => window.isLoadedOnce")
-    await page.reload()
-    await shows(page, "window.quadrille?.state.overlay")
+    await reloaded(page, "window.quadrille?.state.overlay")
     assert await page.evaluate(GROUND) == light
     await opened(page, "view")
     theme = row(page, "Theme").locator("select")

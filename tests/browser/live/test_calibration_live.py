@@ -8,7 +8,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from page_driver import go_to, shows, state_of
+from page_driver import go_to, reloaded, shows, state_of
 from program import ROOT, started, visited
 
 from tracker.footage.recording import Recording
@@ -97,8 +97,7 @@ async def gap_px(page, border, camera, kind="model"):
 async def checked(page):
     """Open the panel on a frame and check the cameras."""
     await page.evaluate(SECTION)
-    await page.reload()
-    await shows(page, "window.quadrille?.state.overlay", 60)
+    await reloaded(page, "window.quadrille?.state.overlay", 60)
     await go_to(page, FRAME)
     await page.get_by_role("button", name="Check the cameras").click()
     await shows(page, "quadrille.state.calibration.is_checked", 120)

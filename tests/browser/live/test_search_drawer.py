@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import shows, state_of
+from page_driver import reloaded, shows, state_of
 from program import ROOT, started, visit_again, visited
 
 pytestmark = pytest.mark.slow
@@ -220,8 +220,7 @@ async def test_the_drawer_keeps_the_height_it_is_given(page):
     await page.mouse.up()
     after = await page.locator("#drawer-stage").bounding_box()
     assert after["height"] == pytest.approx(before["height"] + 30, abs=6)
-    await page.reload()
-    await shows(page, f"{RUNS} && document.querySelector('#drawer-stage').clientHeight === {after['height']}", 30)
+    await reloaded(page, f"{RUNS} && document.querySelector('#drawer-stage').clientHeight === {after['height']}", 30)
     await page.locator("#drawer-grip").dblclick()
     await shows(page, f"document.querySelector('#drawer-stage').clientHeight === {before['height']}")
 

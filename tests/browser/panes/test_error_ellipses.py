@@ -1,7 +1,7 @@
 """The switch of the error ellipses: in the inspector, in the palette, kept in the browser; the error of a joint."""
 
 from fake_endpoint import COLORS, REST
-from page_driver import handle_of, shows, until
+from page_driver import handle_of, reloaded, shows, until
 
 LAYER = "quadrille.state.layers.shown.errors"
 ERRORS_M = [0.023 if name == "l_elbow" else 0.1 for name in REST]
@@ -41,8 +41,7 @@ async def test_ellipses_are_switched_on_in_the_inspector_and_kept(page, endpoint
     await until(lambda: "errors" in endpoint.views[-1]["layers"])
     await shows(page, "quadrille.state.overlay.paths.some((path) => path.kind === 'error')")
     assert await is_drawn(page)
-    await page.reload()
-    await shows(page, f"window.quadrille?.state.overlay?.paths.some((path) => path.kind === 'error') && {LAYER}")
+    await reloaded(page, f"window.quadrille?.state.overlay?.paths.some((path) => path.kind === 'error') && {LAYER}")
     assert await switch.is_checked()
     await page.keyboard.press("Control+k")
     await page.keyboard.type("hide error ellipses")

@@ -5,7 +5,7 @@ import itertools
 
 import pytest
 from fake_endpoint import COLORS, HIDDEN_LINE, FakeEndpoint
-from page_driver import handle_of, shows, state_of, to_client, until
+from page_driver import handle_of, reloaded, shows, state_of, to_client, until
 
 ROW = """([camera, from, to, v]) => {
   const canvas = document.querySelectorAll(".pane-overlay")[camera];
@@ -69,8 +69,7 @@ async def test_without_any_pictures_frames_are_shown_all_the_same(page):
     await shows(page, "!quadrille.state.layers.shown.image")
     await page.keyboard.press(".")
     await shows(page, "quadrille.state.shown.frame === 13 && quadrille.state.overlay.frame === 13")
-    await page.reload()
-    await shows(page, "window.quadrille?.state.overlay?.frame === 13 && !quadrille.state.layers.shown.image")
+    await reloaded(page, "window.quadrille?.state.overlay?.frame === 13 && !quadrille.state.layers.shown.image")
     await page.keyboard.press("Shift+Digit1")
     await shows(page, "'image 0' in quadrille.state.shown.pictures")
 
@@ -106,8 +105,7 @@ async def test_layers_are_remembered_and_reset(page, endpoint):
     await page.get_by_text("by part", exact=True).click()
     await page.locator("[data-layer=joints]").uncheck()
     await until(lambda: endpoint.views[-1]["by_part"] and "joints" not in endpoint.views[-1]["layers"])
-    await page.reload()
-    await shows(page, "window.quadrille?.state.shown.pictures['silhouette 0']")
+    await reloaded(page, "window.quadrille?.state.shown.pictures['silhouette 0']")
     layers = (await state_of(page))["layers"]
     assert layers["opacity"]["silhouette"] == 0.8
     assert layers["colors"] == "part"
@@ -149,8 +147,7 @@ async def test_brightness_belongs_to_one_camera_and_is_remembered(page):
     await set_slider(page, "[data-tone=contrast]", -50)
     await shows(page, "quadrille.state.imageTones[0].contrast === -50")
     assert await color_at(page) == pytest.approx([(c + 127.5) / 2 + 0.3 * 255 for c in plain], abs=3)
-    await page.reload()
-    await shows(page, "window.quadrille?.state.shown.pictures['image 0'] && quadrille.state.overlay")
+    await reloaded(page, "window.quadrille?.state.shown.pictures['image 0'] && quadrille.state.overlay")
     assert (await color_at(page))[0] > plain[0] + 60
     await page.mouse.move(pane["x"] + 60, pane["y"] + 200)
     await page.keyboard.press("i")

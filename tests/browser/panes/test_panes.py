@@ -5,7 +5,7 @@ import asyncio
 import numpy as np
 import pytest
 from fake_endpoint import project
-from page_driver import DRAWN, OPENED, dragging, handle_of, shows, state_of, to_client, until
+from page_driver import DRAWN, OPENED, dragging, handle_of, reloaded, shows, state_of, to_client, until
 
 PIXEL = """([x, y]) => {
   const canvas = document.querySelector(".pane-overlay");
@@ -319,8 +319,7 @@ async def test_zoom_is_kept_over_a_reload(page):
     await page.mouse.wheel(0, -600)
     await shows(page, "localStorage.getItem('quadrille.views.elbow_rotation')")
     before = [await to_client(page, camera, 100.0, 90.0) for camera in (0, 1)]
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     for camera, place in enumerate(before):
         assert await to_client(page, camera, 100.0, 90.0) == pytest.approx(place, abs=0.01)
     await page.keyboard.press("0")  # the whole image, kept as well
@@ -330,8 +329,7 @@ async def test_zoom_is_kept_over_a_reload(page):
 @pytest.mark.slow
 async def test_a_session_is_framed_on_its_people_when_it_first_opens_and_not_again(page, endpoint):
     await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
-    await page.reload()
-    await shows(page, f"{OPENED} && quadrille.state.views.every((view) => view.zoom > 1.05)")
+    await reloaded(page, f"{OPENED} && quadrille.state.views.every((view) => view.zoom > 1.05)")
     framed = (await state_of(page))["views"]
     await page.reload()  # kept, as if by hand
     await shows(page, OPENED)
@@ -352,8 +350,7 @@ async def test_a_session_is_framed_on_its_people_when_it_first_opens_and_not_aga
     # Without a pose there is nobody to frame.
     endpoint.state["people"][0]["source"] = None
     await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     assert all(view["zoom"] == 1 for view in (await state_of(page))["views"])
 
 
@@ -361,8 +358,7 @@ async def test_a_session_is_framed_on_its_people_when_it_first_opens_and_not_aga
 async def test_a_view_moved_before_the_first_overlay_stays_where_it_is(page, endpoint):
     endpoint.held = asyncio.Event()
     await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
-    await page.reload()
-    await shows(page, "window.quadrille?.state.views.length === 4 && quadrille.state.state")
+    await reloaded(page, "window.quadrille?.state.views.length === 4 && quadrille.state.state")
     pane = await page.locator(".pane").nth(1).bounding_box()
     await page.mouse.move(pane["x"] + 100, pane["y"] + 100)
     await page.mouse.wheel(0, -300)
@@ -378,13 +374,11 @@ async def test_a_view_moved_before_the_first_overlay_stays_where_it_is(page, end
 async def test_the_pane_that_fills_the_grid_is_kept_over_a_reload(page):
     await page.keyboard.press("3")
     await shows(page, "quadrille.state.filled === 2")
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     assert [await p.is_visible() for p in await page.locator(".pane").all()] == [False, False, True, False]
     await page.keyboard.press("3")
     await shows(page, "quadrille.state.filled === null")
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     assert await page.locator(".pane:visible").count() == 4
 
 
@@ -425,8 +419,7 @@ async def test_panes_are_resized_by_their_borders_and_corners(page):
     resized = await sizes_of(page)
     assert [h for _, h in resized] == [height - 24, height - 24, automatic[2][1] + 24, automatic[3][1] + 24]
     assert int(await rows.get_attribute("aria-valuenow")) < 50
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     assert await sizes_of(page) == resized
     # No pane vanishes, however far the border is moved.
     await pulled(page, between, 2000, 0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from page_driver import OPENED, handle_of, shows, state_of, to_client, until
+from page_driver import OPENED, handle_of, reloaded, shows, state_of, to_client, until
 
 PORTRAIT = ((1080, 1920),)
 STEPPED = "quadrille.state.shown.frame === {0} && quadrille.state.overlay.frame === {0}"
@@ -120,8 +120,7 @@ async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, end
     await page.keyboard.press("Shift+0")
     await shows(page, "(localStorage.getItem('quadrille.views.elbow_rotation') ?? '').includes('framed')")
     endpoint.state["frame"] = 24
-    await page.reload()
-    await shows(page, f"{OPENED} && quadrille.state.views[0].zoom > 1.05")
+    await reloaded(page, f"{OPENED} && quadrille.state.views[0].zoom > 1.05")
     place = await place_in_pane(page, 0, "head")
     assert place[0] == pytest.approx(0.5, abs=0.05)
     # A view of a place that people have left shows them, too.
@@ -130,8 +129,7 @@ async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, end
     await page.mouse.wheel(0, -1500)
     await shows(page, "quadrille.state.views[0].zoom > 8")
     endpoint.state["frame"] = 12
-    await page.reload()
-    await shows(page, f"{OPENED} && quadrille.state.views[0].zoom < 8")
+    await reloaded(page, f"{OPENED} && quadrille.state.views[0].zoom < 8")
     assert (await place_in_pane(page, 0, "head") > 0).all()
     assert (await place_in_pane(page, 0, "head") < 1).all()
 
@@ -188,6 +186,5 @@ async def test_portrait_footage_uses_the_window(page, endpoint, size):
     for _ in range(5):
         await page.keyboard.press("ArrowLeft")
     chosen = await page.locator("#panes").evaluate("(panes) => panes.clientWidth")
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     assert abs(await page.locator("#panes").evaluate("(panes) => panes.clientWidth") - chosen) <= 1

@@ -1,7 +1,7 @@
 """When the 3-D view is loaded."""
 
 import pytest
-from page_driver import OPENED, shows
+from page_driver import OPENED, reloaded, shows
 
 NOTE = "!document.querySelector('#scene-note').hidden"
 ADDRESS = "document.querySelector('#scene').getAttribute('src')"
@@ -12,8 +12,7 @@ async def test_it_follows_the_first_cost_where_no_graphics_card_draws(page, endp
     """Its start stops such a page for seconds, in which nobody could drag."""
     assert not await page.evaluate(NOTE)
     endpoint.state |= {"compiling": "evidence", "cost_px": None}
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     await shows(page, NOTE)
     assert await page.evaluate(ADDRESS) is None
     endpoint.state["cost_px"] = 6.27
@@ -25,5 +24,4 @@ async def test_it_follows_the_first_cost_where_no_graphics_card_draws(page, endp
 async def test_it_waits_no_longer_than_for_the_kernels_of_a_cost(page, endpoint):
     """A frame that cannot be read has no cost."""
     endpoint.state |= {"compiling": "tracking", "cost_px": None}
-    await page.reload()
-    await shows(page, f"{OPENED} && {ADDRESS}?.startsWith('viser/')")
+    await reloaded(page, f"{OPENED} && {ADDRESS}?.startsWith('viser/')")

@@ -1,7 +1,8 @@
 """What the program says: notices, their log, what is not saved, the first card; against `fake_endpoint`."""
 
 import pytest
-from page_driver import shows, until
+import pytest_asyncio
+from page_driver import reloaded, shows, until
 
 
 async def say(endpoint, text, level="error"):
@@ -100,36 +101,39 @@ BY_HAND = {"sources": ("manual",)}
 """A session that was never tracked."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "endpoint", [{"n_people": 1, **BY_HAND}, {"n_people": 2, **BY_HAND}], indirect=True, ids=("one", "two")
-)
-async def test_the_first_steps_cover_nothing(browser, address, endpoint):
+@pytest_asyncio.fixture(loop_scope="session")
+async def newcomer(browser, address):
+    """The page of somebody who has never seen it."""
     context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
     page = await context.new_page()
     await page.goto(address)
-    await shows(page, "window.quadrille?.state.overlay")
-    await page.locator("#first-steps").wait_for()
-    await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
-    await page.get_by_role("alert").wait_for()
-    assert await page.locator("#first-place").is_visible() == (endpoint.n_people > 1)
-    for width, height in ((1280, 720), (1920, 1080)):
-        await page.set_viewport_size({"width": width, "height": height})
-        await shows(page, f"innerWidth === {width}")
-        assert await page.evaluate(TAKEN) == []
-        assert await page.evaluate(CUT_OFF) == 0
-        footer = await page.locator("footer").bounding_box()
-        assert footer["y"] + footer["height"] <= height
+    yield page
     await context.close()
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "endpoint", [{"n_people": 1, **BY_HAND}, {"n_people": 2, **BY_HAND}], indirect=True, ids=("one", "two")
+)
+async def test_the_first_steps_cover_nothing(newcomer, endpoint):
+    await shows(newcomer, "window.quadrille?.state.overlay")
+    await newcomer.locator("#first-steps").wait_for()
+    await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
+    await newcomer.get_by_role("alert").wait_for()
+    assert await newcomer.locator("#first-place").is_visible() == (endpoint.n_people > 1)
+    for width, height in ((1280, 720), (1920, 1080)):
+        await newcomer.set_viewport_size({"width": width, "height": height})
+        await shows(newcomer, f"innerWidth === {width}")
+        assert await newcomer.evaluate(TAKEN) == []
+        assert await newcomer.evaluate(CUT_OFF) == 0
+        footer = await newcomer.locator("footer").bounding_box()
+        assert footer["y"] + footer["height"] <= height
+
+
+@pytest.mark.slow
 @pytest.mark.endpoint(**BY_HAND)
-async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(browser, address, endpoint):
-    context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
-    page = await context.new_page()
-    await page.goto(address)
-    card = page.locator("#first-steps")
+async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(newcomer, endpoint):
+    card = newcomer.locator("#first-steps")
     await card.wait_for()
     steps = [" ".join(text.split()) for text in await card.locator("li:visible").all_inner_texts()]
     shortest = ["Press F to search", "then G to fit", "then T to track"]
@@ -137,57 +141,51 @@ async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(bro
     # A body that stands far from the person is not found by a search.
     endpoint.state |= {"cost_px": 28.4, "people": [endpoint.state["people"][0] | {"source": None}]}
     await endpoint.broadcast(endpoint.state)
-    await page.locator("#first-place").wait_for()
+    await newcomer.locator("#first-place").wait_for()
     steps = [" ".join(text.split()) for text in await card.locator("li:visible").all_inner_texts()]
     assert [step.rstrip(",") for step in steps] == [
         "Place the body: drag the square, then joints, in two views", *shortest
     ]  # fmt: skip
-    assert not await page.locator("#first-off").is_visible()
+    assert not await newcomer.locator("#first-off").is_visible()
     endpoint.state["compared"] = {
         "number": 1, "work": "fit", "before_px": 6.3, "after_px": 2.4, "before_view_costs_px": [],
         "after_view_costs_px": [], "warning": "", "moved": [], "is_before_shown": False,
     }  # fmt: skip
     await endpoint.broadcast(endpoint.state)
-    await shows(page, "document.querySelector('#first-fit').classList.contains('is-done')")
-    await page.locator("#close-first-steps").click()
-    await page.reload()
-    await shows(page, "window.quadrille?.state.overlay")
+    await shows(newcomer, "document.querySelector('#first-fit').classList.contains('is-done')")
+    await newcomer.locator("#close-first-steps").click()
+    await reloaded(newcomer, "window.quadrille?.state.overlay")
     assert not await card.is_visible()
-    await page.keyboard.press("Control+k")
-    await page.keyboard.type("first steps")
-    await page.keyboard.press("Enter")
+    await newcomer.keyboard.press("Control+k")
+    await newcomer.keyboard.type("first steps")
+    await newcomer.keyboard.press("Enter")
     await card.wait_for()
-    await page.keyboard.press("Escape")
+    await newcomer.keyboard.press("Escape")
     assert not await card.is_visible()
-    await page.evaluate("localStorage.clear()")
-    await page.reload()
+    await newcomer.evaluate("localStorage.clear()")
+    await newcomer.reload()
     await card.wait_for()
-    await page.keyboard.press("t")
+    await newcomer.keyboard.press("t")
     await card.wait_for(state="hidden")  # the first steps are done
-    await context.close()
 
 
 @pytest.mark.slow
 @pytest.mark.endpoint(**BY_HAND)
-async def test_the_first_steps_belong_to_a_session(browser, address, endpoint):
+async def test_the_first_steps_belong_to_a_session(newcomer, address, endpoint):
     """Closed in one, they show in the next one, but not where a run has tracked."""
-    context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
-    page = await context.new_page()
-    await page.goto(address)
-    card = page.locator("#first-steps")
+    card = newcomer.locator("#first-steps")
     await card.wait_for()
-    assert await page.locator("#first-new-session").is_visible()
-    await page.locator("#close-first-steps").click()
+    assert await newcomer.locator("#first-new-session").is_visible()
+    await newcomer.locator("#close-first-steps").click()
     endpoint.name = "dance"
-    await page.goto(address)
-    await shows(page, "window.quadrille?.state.session?.name === 'dance'")
+    await newcomer.goto(address)
+    await shows(newcomer, "window.quadrille?.state.session?.name === 'dance'")
     await card.wait_for()
     endpoint.name, endpoint.sources = "walk", ("manual", "tracked")
-    await page.goto(address)
-    await shows(page, "window.quadrille?.state.overlay && quadrille.state.session.name === 'walk'")
+    await newcomer.goto(address)
+    await shows(newcomer, "window.quadrille?.state.overlay && quadrille.state.session.name === 'walk'")
     assert not await card.is_visible()
-    await page.keyboard.press("Control+k")
-    await page.keyboard.type("first steps")
-    await page.keyboard.press("Enter")
+    await newcomer.keyboard.press("Control+k")
+    await newcomer.keyboard.type("first steps")
+    await newcomer.keyboard.press("Enter")
     await card.wait_for()
-    await context.close()

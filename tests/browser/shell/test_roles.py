@@ -1,7 +1,7 @@
 """Pages with a shared link, against `fake_endpoint`: what they show, and what they send."""
 
 import pytest
-from page_driver import shows, until
+from page_driver import reloaded, shows, until
 from playwright.async_api import expect
 
 ANNOTATING = ("#joint-bar", "#undo", "#toggle-keyframe", "#track-forward", "#search-frame", "#show-export")
@@ -68,8 +68,7 @@ async def test_a_link_asks_for_a_name_and_then_moves_by_itself(page, endpoint):
     await page.keyboard.press("Alt+e")
     await expect(page.locator("#participants-list")).to_contain_text("Lou Q (you)")
     await page.keyboard.press("Escape")
-    await page.reload()
-    await shows(page, "window.quadrille?.state.presence?.name === 'Lou Q'")
+    await reloaded(page, "window.quadrille?.state.presence?.name === 'Lou Q'")
 
 
 @pytest.mark.slow
@@ -92,8 +91,7 @@ async def test_the_list_of_a_host_who_is_alone_opens_below_its_button(page):
 @pytest.mark.slow
 async def test_the_note_in_place_of_the_3d_view_covers_nothing(page, endpoint):
     endpoint.role = "review"
-    await page.reload()
-    await shows(page, "!document.querySelector('#scene-note').hidden")
+    await reloaded(page, "!document.querySelector('#scene-note').hidden")
     await page.keyboard.press("Alt+u")
     await expect(page.locator("[data-section=annotation]")).to_be_visible()
     note, column = [await page.locator(one).bounding_box() for one in ("#scene-note", "#inspector")]

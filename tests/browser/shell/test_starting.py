@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 import pytest
 from aiohttp import web
 from fake_endpoint import FakeEndpoint
-from page_driver import OPENED, shows
+from page_driver import OPENED, reloaded, shows
 from serving import listening
 
 from app.server.address import Serving
@@ -101,8 +101,7 @@ async def test_other_ports_of_this_machine_get_no_cookie(browser, doorway, blank
         await page.wait_for_url(f"http://{name}:{doorway.port}{doorway.access.root}")
         await shows(page, OPENED)
         assert [c["path"] for c in await page.context.cookies(page.url)] == [doorway.access.root]
-        await page.reload()
-        await shows(page, OPENED)
+        await reloaded(page)
         assert page.errors == []
         other = await page.context.new_page()
         await other.goto(f"http://{name}:{port}/any/path")
@@ -118,8 +117,7 @@ async def test_an_open_page_comes_back_after_a_restart(browser, doorway, blank_v
         doorway.__exit__(None, None, None)
         with Doorway(Serving(port=doorway.port, browser=False)) as again:
             assert again.access.root == doorway.access.root
-            await page.reload()
-            await shows(page, "document.querySelector('#steps li')")
+            await reloaded(page, "document.querySelector('#steps li')")
             async with program(again, blank_viser):
                 await shows(page, OPENED)
                 assert page.errors == []

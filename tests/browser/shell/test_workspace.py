@@ -1,7 +1,7 @@
 """Widths of the panes and the 3-D view, and how the 3-D view folds away."""
 
 import pytest
-from page_driver import OPENED, shows, until
+from page_driver import reloaded, shows, until
 
 SMALL = {"width": 1280, "height": 720}
 
@@ -30,8 +30,7 @@ async def test_the_3d_view_leaves_its_room_where_inspector_and_search_leave_none
     assert await button.get_attribute("aria-pressed") == "false"
     await button.click()
     assert (await widths(page))[1] >= 290
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     assert (await widths(page))[1] >= 290
     await page.keyboard.press("Alt+y")
     assert (await widths(page))[1] == 0
@@ -52,8 +51,7 @@ async def test_the_separator_folds_the_3d_view_away_and_opens_it(page, endpoint)
 
     await drag_to(1400)
     assert (await widths(page))[1] == 0
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     assert (await widths(page))[1] == 0
     await drag_to(900)
     assert abs((await widths(page))[1] - (1440 - 900)) < 5

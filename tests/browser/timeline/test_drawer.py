@@ -1,7 +1,7 @@
 """The drawer closes when it is empty, belongs to its session, and leaves the lanes of the timeline their room."""
 
 import pytest
-from page_driver import OPENED, shows
+from page_driver import OPENED, reloaded, shows
 
 EMPTY = {"type": "timeline", "person": None, "cells": {}, "replace": True}
 
@@ -10,18 +10,15 @@ EMPTY = {"type": "timeline", "person": None, "cells": {}, "replace": True}
 async def test_a_drawer_opens_again_in_its_session_only_and_only_with_content(page, endpoint):
     await page.keyboard.press("c")
     await shows(page, "quadrille.state.drawer === 'arms'")
-    await page.reload()
-    await shows(page, f"{OPENED} && quadrille.state.drawer === 'arms'")
+    await reloaded(page, f"{OPENED} && quadrille.state.drawer === 'arms'")
     await page.evaluate("localStorage.setItem('quadrille.drawer.elbow_rotation', '\"runs\"')")
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     await page.wait_for_timeout(300)
     assert await page.locator("#drawer").is_hidden()  # nothing is compared
     await page.keyboard.press("c")
     await page.evaluate("localStorage.setItem('quadrille.drawer.other', '\"arms\"')")
     await page.evaluate("localStorage.removeItem('quadrille.drawer.elbow_rotation')")
-    await page.reload()
-    await shows(page, OPENED)
+    await reloaded(page)
     await page.wait_for_timeout(300)
     assert await page.locator("#drawer").is_hidden()
 

@@ -55,8 +55,7 @@ def test_merging_is_commutative_and_merging_again_changes_nothing(tmp_path_facto
 def copies(tmp_path):
     """The stores of anna and ben, copied from one; and a function that merges them and opens the result."""
     new_store(tmp_path / "a").close()
-    a, b = (copied(tmp_path / "a", tmp_path / name) for name in ("anna", "ben"))
-    a._author, b._author = "anna", "ben"
+    a, b = (copied(tmp_path / "a", tmp_path / name, name) for name in ("anna", "ben"))
 
     def merge():
         a.close()

@@ -575,8 +575,7 @@ def test_each_person_has_the_rows_of_their_own_file(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["people", "semicolon", "deeplabcut", "c3d", "easymocap"])
-def test_points_of_other_layouts_are_not_written_back(tmp_path, kind, bodies):
-    session = make_session(tmp_path / "s", N, people=("ann",))
+def test_points_of_other_layouts_are_not_written_back(session, tmp_path, kind, bodies):
     truth = observed(session, bodies)
     path = write_joints(kind, tmp_path, BODY_25.points, np.stack([truth, truth][: 1 + (kind in ("people", "c3d"))]))
     observations = imported(session, path, unit_m=1.0)
