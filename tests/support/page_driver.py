@@ -42,10 +42,10 @@ async def go_to(page, frame):
     await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 30)
 
 
-async def reloaded(page, expression=OPENED):
+async def reloaded(page, expression=OPENED, *timeout_s):
     """Load the page again, and wait until an expression holds there."""
     await page.reload()
-    await shows(page, expression)
+    await shows(page, expression, *timeout_s)
 
 
 async def until(condition, timeout_s=20.0):
