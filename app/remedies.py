@@ -245,6 +245,9 @@ PHRASES = {
         "say --first-frame {frames}", "correct Frame#, Time or OrigDataStartFrame in the file"
     ),
     # cameras that are off
+    "acquire_first": Phrases(
+        "say --acquire to acquire it for the check", "press Check the cameras again to acquire it for the check"
+    ),
     "check_cameras": Phrases(
         "run quadrille check to measure it", "press Check the cameras in the inspector's Calibration to measure it"
     ),

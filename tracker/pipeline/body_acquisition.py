@@ -24,9 +24,10 @@ from tracker.estimation.initialization.first_pose import HEIGHT_SIGMA
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evidence.observer import Observer
-from tracker.formats.model_toml import format_model
+from tracker.formats.model_toml import format_model, has_preset_proportions
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.pipeline.posed_recording import PosedRecording
 from tracker.pipeline.seen_points import seen_points
 from tracker.session.session import Session, save_model
 from tracker.session.store.annotation_store import AnnotationStore
@@ -164,6 +165,37 @@ def posed_frames(session: Session, person: int, frames: Sequence[int], start: in
     has_known_joints = any(s.record.settings.get("joints") for s in keyframes.values())
     is_measured = any(s.record.settings.get(MEASURED) for s in usable.values())
     return PosedFrames(bodies, placed, seen, has_known_joints, is_measured)
+
+
+def generic_people(session: Session) -> list[int]:
+    """Return the people who are in the shape of a preset."""
+    return [i for i, person in enumerate(session.people) if has_preset_proportions(person.model)]
+
+
+def generic_doubt(session: Session) -> str:
+    """Return a sentence on a check of the cameras by people in the shape of a preset; empty without any."""
+    names = " and ".join(session.people[i].name for i in generic_people(session))
+    return f"the shape of {names} is a preset's, so that a healthy camera may seem off" if names else ""
+
+
+def with_acquired_bodies(recording: PosedRecording, session: Session, report: Report = unreported) -> PosedRecording:
+    """Return the poses of a session in bodies that are acquired for those of presets. Nothing is stored.
+
+    Args:
+        recording: the poses.
+        session: of the recording.
+        report: shows progress. An exception that it raises ends the work.
+
+    Raises:
+        TrackerError: see `acquire_body`.
+    """
+    bodies, generic = dict[BodyModel, BodyModel](), generic_people(session)
+    for n, person in enumerate(generic):
+        part = part_of(report, n / len(generic), (n + 1) / len(generic), "acquiring sizes")
+        frames, settings = range(session.n_frames), AcquisitionSettings()
+        found = acquire_body(session, recording.observer, person, frames, settings, part)
+        bodies[session.people[person].model] = found.body
+    return recording.with_bodies(bodies)
 
 
 def store_body(

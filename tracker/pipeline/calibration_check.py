@@ -57,15 +57,15 @@ class CalibrationCheck:
         """Sentences on cameras that are off, the worst first; none where nothing is off."""
         if len(self.cameras) == 2:
             worst = max(self.cameras, key=lambda c: c.misfit_px)
-            apart = f"the two cameras contradict each other by {worst.misfit_px:.1f} px; nothing shows which is off"
+            apart = f"the two cameras contradict each other: by {worst.misfit_px:.1f} px; nothing shows which is off"
             return [apart] if self.diagnosis.kept else []
         by_name = {c.name: c for c in self.cameras}
         return [sentence(by_name[name], self.since.get(name), self.lost.get(name)) for name in self.named]
 
     @property
     def sentences(self) -> list[str]:
-        """Sentences for the user: on cameras that are off, and on what these frames cannot show."""
-        return [*self.contradictions, *self.notes]
+        """Sentences for the user: on what these frames cannot show, and on cameras that are off."""
+        return [*self.notes, *self.contradictions]
 
     def n_lost(self, name: str) -> int:
         """Return the number of frames that a camera lost within the recording; negative where it doubled some."""
@@ -88,8 +88,8 @@ class CalibrationCheck:
         """
         for name, k in {k: v for k, v in self.since.items() if k not in self.lost}.items():
             raise TrackerError(
-                f"expected a camera that is off on all frames, found that {name} is off since frame {k}; make a "
-                f"session of the frames from {k} on, and correct it there"
+                f"expected a camera that is off on all frames, found that {name} moved before frame {k}; make a "
+                f"session of the frames from {k} on and correct it there, or leave {name} out"
             )
         if not scores:
             raise TrackerError(
@@ -140,7 +140,8 @@ def check_calibration(
 def contradiction(recording: PosedRecording) -> str:
     """Return a sentence on the camera that is off most, as a glance at few frames shows it; else "".
 
-    A frame of the glance costs a quarter of tracking it, so that a tenth of the frames are taken.
+    It has no figure, which is for `check_calibration`. A frame of the glance costs a quarter of tracking it, so that a
+    tenth of the frames are taken.
 
     Args:
         recording: nothing is said unless `N_FRAMES` frames have credible poses.
@@ -151,7 +152,8 @@ def contradiction(recording: PosedRecording) -> str:
     n = int(np.clip(len(usable) // 10, MIN_FRAMES, N_FRAMES))
     seen = recording.seen(recording.diverse(usable, n))
     found = glance(seen, [SizeParameters(b.model) for b in seen[0].bodies], recording.fps)
-    return "; ".join(_judged(recording, seen, found).contradictions)
+    judged = _judged(recording, seen, found)
+    return "; ".join(f"{words.partition(': ')[0]} or the body has other sizes" for words in judged.contradictions)
 
 
 def n_better(scores: Sequence[tuple[FrameScore, FrameScore]]) -> int:
@@ -223,7 +225,7 @@ class _Changes:
         self._sigmas = prior_sigmas(recording.fps)
 
     def first(self, name: str) -> int | None:
-        """Return the frame since when a camera is off; None if on all frames."""
+        """Return the frame since when a camera is off; None if on all frames, or if too few confirm a change."""
         index = [c.name for c in self._check.cameras].index(name)
         columns = np.concatenate([np.arange(N_CORRECTIONS)[KINDS[k]] for k in self._check.cameras[index].kinds])
         corrections, without = self._check.corrections, self._check.corrections
@@ -242,7 +244,10 @@ class _Changes:
                 return None
             last, first = ordered[change.first - 1][0].frame, ordered[change.first][0].frame
             between = [k for k in self._usable if last < k < first]
+            if not between and not change.is_confirmed:
+                is_early = change.first < len(ordered) / 2
+                between = [k for k in self._usable if k not in scores and (k < first) == is_early]
             if not between:
-                return first
+                return first if change.is_confirmed else None
             more = sorted({between[i] for i in np.linspace(0, len(between) - 1, 5).round().astype(int)})
             self._seen.update({f.frame: f for f in self._recording.seen(more)})

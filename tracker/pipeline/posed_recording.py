@@ -1,7 +1,7 @@
 """Frames with known poses of people, and what the views show there: the evidence from which cameras are judged."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from tracker.compute.sampling import farthest_first, spread_indices
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import learn_static_edges
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M
+from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.tracking.estimate import TrackedFrame
 from tracker.estimation.tracking.view_regions import regions
 from tracker.evidence.images.static_edges import StaticEdgeModel
@@ -65,6 +66,15 @@ class PosedRecording:
         """Take the poses of a finished run. Doubtful ones count, because a camera that is off makes many doubtful."""
         poses = [{k: PosedBody(m, f.poses[i]) for k, f in tracked.items()} for i, m in enumerate(models)]
         return cls(observer, fps, poses, {k for k, f in tracked.items() if "lost" in f.statuses})
+
+    def with_bodies(self, bodies: Mapping[BodyModel, BodyModel]) -> "PosedRecording":
+        """Return the recording with other bodies in place of some, their joints in the places of before."""
+
+        def moved(own: PosedBody) -> PosedBody:
+            body = bodies.get(own.model)
+            return own if body is None else PosedBody(body, retarget_pose(own.values, own.model, body), own.velocity)
+
+        return replace(self, poses=[{k: moved(b) for k, b in own.items()} for own in self.poses])
 
     @property
     def middle_s(self) -> float:

@@ -1,7 +1,7 @@
 """`quadrille check`: find the cameras whose calibration the contours of tracked people contradict, and correct them."""
 
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -11,7 +11,7 @@ from app.cli.target import parse_frames
 from app.remedies import command_line_text
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 
 if TYPE_CHECKING:
     from tracker.calibration.check.findings import CameraFinding
@@ -30,6 +30,8 @@ class CheckArguments:
     """A:B, half open; all by default."""
     max_frames: int = 20
     """largest number of frames of diverse poses that are used: 3 find the camera, 20 measure its correction."""
+    acquire: bool = False
+    """acquire the shape of people who have that of a preset, for the check alone; nothing of it is stored."""
     apply: bool = False
     """correct the cameras that are named, if other frames confirm it; the page undoes it."""
     json: bool = False
@@ -48,12 +50,13 @@ def command(arguments: Annotated[CheckArguments, tyro.conf.arg(name="")]) -> Non
     frames = parse_frames(arguments.frames, session)
     if arguments.max_frames < 3:
         raise TrackerError(f"expected --max-frames as a number from 3, found {arguments.max_frames}")
-    found = check(session, frames, arguments.max_frames, arguments.apply, Reporter(silent=arguments.json))
+    options = arguments.acquire, arguments.apply
+    found = check(session, frames, arguments.max_frames, options, Reporter(silent=arguments.json))
     print(format_json(found) if arguments.json else _format(found))
 
 
-def check(session: "Session", frames: range, n: int, applies: bool, progress: Reporter) -> dict[str, Any]:
-    """Check the cameras of a session; correct them if asked.
+def check(session: "Session", frames: range, n: int, options: tuple[bool, bool], progress: Reporter) -> dict[str, Any]:
+    """Check the cameras of a session; acquire shapes for it, and correct the cameras, if asked for either.
 
     Returns:
         The object that `--json` prints.
@@ -64,19 +67,26 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
     """
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
+    from tracker.pipeline.body_acquisition import generic_doubt, with_acquired_bodies
     from tracker.pipeline.calibration_check import check_calibration, held_out_scores
     from tracker.pipeline.posed_recording import PosedRecording
     from tracker.session.relink import require_files
 
     require_files(session)
+    acquires, applies = options
     with Recording(session.cameras) as recording, progress.share("checking the cameras") as advance:
 
         def report(stage: str, share: float, text: str = "", /) -> None:
             advance(share)
 
         posed = PosedRecording.of_session(session, Observer(session.cameras, recording).in_time())
+        if acquires:
+            posed = with_acquired_bodies(posed, session, report)
         found = check_calibration(posed, frames, n, report)
         scores = held_out_scores(posed, found, n, report) if found.named else []
+    doubt = "" if acquires else generic_doubt(session)
+    notes = (command_line_text(doubt, Remedy("acquire_first")),) if doubt else ()
+    found = replace(found, notes=(*notes, *found.notes))
     out = _as_json(found, scores) | {"clocks": clock_notes(session, found) if found.named else []}
     if applies:
         out["applied"] = list(found.named)
@@ -147,7 +157,7 @@ def _camera(finding: "CameraFinding", check: "CalibrationCheck") -> dict[str, An
 def _format(found: dict[str, Any]) -> str:
     lines, notes = list(found["explained"]["sentences"]), found["explained"]["notes"]
     if len(lines) == len(notes):
-        lines = ["no camera is off: the contours agree with the calibration", *notes]
+        lines = [*notes, "no camera is off: the contours agree with the calibration"]
     for camera in found["cameras"]:
         if camera["kind"] is not None:
             lines = [*lines, *_correction_lines(camera)]

@@ -14,9 +14,10 @@ from app.state.calibration import CalibrationState, CorrectedFrame
 from app.state.state import State
 from tracker.body.model import PosedBody
 from tracker.calibration.check.single_frames import score_frame
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.geometry.camera_correction import corrected, later_s
+from tracker.pipeline.body_acquisition import generic_doubt, with_acquired_bodies
 from tracker.pipeline.calibration_check import CalibrationCheck, check_calibration, held_out_scores, n_better
 from tracker.pipeline.posed_recording import PosedRecording
 
@@ -46,9 +47,17 @@ class Calibrating:
     def start(self) -> None:
         """Begin to check the cameras by poses of all frames.
 
+        Bodies in the shape of a preset are acquired for it, at the second request: the first one says so.
+
         Raises:
             TrackerError: another check is at work.
         """
+        doubt = generic_doubt(self._session_state.session)
+        said = f"{page_text(doubt[:1].upper() + doubt[1:], Remedy('acquire_first'))}."
+        if doubt and self._session_state.state.calibration.message != said:
+            self._work.require_free()
+            self._set(message=said, failed=False)
+            return
         before = self._session_state.state.calibration
         begin = CalibrationState(n_changes=before.n_changes, outdated=before.outdated, revision=before.revision)
         self._work.start(self._check, begin)
@@ -143,7 +152,8 @@ class Calibrating:
         return check
 
     def _check(self) -> dict[str, Any]:
-        recording, report = self._recording(), self._work.report
+        recording, report, session = self._recording(), self._work.report, self._session_state.session
+        recording = with_acquired_bodies(recording, session, report)
         check = check_calibration(recording, report=report)
         scores = held_out_scores(recording, check, report=report) if check.named else []
         refused = ""

@@ -79,7 +79,7 @@ def test_a_clock_that_changes_within_the_recording_has_lost_whole_frames(n, word
     check = check_calibration(Seen([*viewed({}, range(5)), *viewed({1: late}, range(5, 10))]))
     assert (check.named, check.lost) == (("cam1",), {"cam1": LostFrames(5, n)})
     (sentence,) = check.sentences
-    assert sentence.startswith(f"camera cam1 {words} before frame 5: the body is")
+    assert sentence.startswith(f"camera cam1 {words} before frame 5: ")
     assert check.corrections[1, TIME] == n / FPS
     np.testing.assert_array_equal(check.corrections_on(4), 0.0)
     np.testing.assert_array_equal(check.corrections_on(5), check.corrections)
@@ -87,10 +87,12 @@ def test_a_clock_that_changes_within_the_recording_has_lost_whole_frames(n, word
 
 
 def test_a_camera_that_was_turned_within_the_recording_is_not_corrected():
-    check = check_calibration(Seen([*viewed({}, range(3)), *viewed({1: turned(yaw_deg=1.0)}, range(3, 6))]))
-    assert (check.since, check.lost) == ({"cam1": 3}, {})
-    with pytest.raises(TrackerError, match="found that cam1 is off since frame 3"):
+    check = check_calibration(Seen([*viewed({}, range(5)), *viewed({1: turned(yaw_deg=1.0)}, range(5, 10))]))
+    assert (check.since, check.lost) == ({"cam1": 5}, {})
+    with pytest.raises(TrackerError, match="found that cam1 moved before frame 5; make a session of the frames from 5"):
         check.require_applicable([(SimpleNamespace(cost=2.0), SimpleNamespace(cost=1.0))])
+    few = check_calibration(Seen([*viewed({}, range(3)), *viewed({1: turned(yaw_deg=1.0)}, range(3, 13))]))
+    assert (few.since, few.named) == ({}, ("cam1",))  # three frames are no proof that it stood right before
 
 
 def test_a_correction_without_other_frames_is_refused():
@@ -116,4 +118,6 @@ def test_other_frames_confirm_a_correction_by_their_summed_cost():
 def test_a_glance_says_nothing_of_few_frames():
     frames = viewed({1: turned(yaw_deg=1.0)}, [0, 1, 2])
     assert contradiction(Seen(frames)) == ""
-    assert "camera cam1 is" in contradiction(Seen(frames * 7))
+    found = contradiction(Seen(frames * 7))
+    assert found.startswith("camera cam1 is ")
+    assert found.endswith(" or the body has other sizes")  # a figure is for the check

@@ -106,7 +106,7 @@ def _sigma(diagnosis: Diagnosis, camera: int) -> Array:
 
 
 def sentence(finding: CameraFinding, since_frame: int | None = None, lost: LostFrames | None = None) -> str:
-    """Say how a camera is off."""
+    """Say how a camera is off, then by how much, then how else it may be off."""
     how = "is " + " and ".join(WORDS[kind] for kind in finding.kinds)
     since = "" if since_frame is None else f" since frame {since_frame}"
     if lost is not None:
@@ -114,8 +114,8 @@ def sentence(finding: CameraFinding, since_frame: int | None = None, lost: LostF
         since = f" before frame {lost.since}"
     also = ""
     if finding.rivals:
-        also = f"; it may as well have been {' or '.join(WORDS[kind] for kind in finding.rivals)}"
+        also = f"; that it is {' or '.join(WORDS[kind] for kind in finding.rivals)} explains it as well"
     return (
-        f"camera {finding.name} {how}{since}: the body is {finding.misfit_px:.1f} px off in its pictures, "
+        f"camera {finding.name} {how}{since}: {finding.misfit_px:.1f} px off in its pictures, "
         f"{finding.misfit_mm:.0f} mm at the body{also}"
     )

@@ -54,6 +54,9 @@ class Change(NamedTuple):
     """Index of the first score from which on the camera is off; 0 if it always is."""
     gain_nats: float
     """Fall of the cost against a camera that is off on all frames, or that never changes."""
+    is_confirmed: bool = True
+    """Whether enough frames before it and after it say so: as many as the gain has nats to reach, because one bad frame
+    may have any gain."""
 
 
 def find_change(
@@ -86,4 +89,7 @@ def find_change(
     first = int(np.argmax(gains))
     gain = gains[first] - gains[0]
     # The best of n frames gains ln n more by chance than a frame that was named before.
-    return Change(first, gain) if gain > CLEAR_NATS + np.log(len(scores)) else Change(0, gain)
+    needed = CLEAR_NATS + np.log(len(scores))
+    if gain <= needed:
+        return Change(0, gain)
+    return Change(first, gain, min(first, len(scores) - first) >= int(needed))

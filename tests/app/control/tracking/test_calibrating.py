@@ -9,8 +9,10 @@ from gestures import drag, wait_for
 
 from app.control.tracking import calibrating
 from tracker.errors import TrackerError
+from tracker.formats.model_toml import load_model
 from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
+from tracker.session.session import save_model
 
 
 @pytest.fixture
@@ -95,3 +97,21 @@ def test_nothing_found_cannot_be_applied(controller):
         controller.calibrating.apply()
     after = [c.camera.T_world_camera for c in controller.session.cameras]
     assert all(map(np.array_equal, before, after))
+
+
+def test_the_shape_of_a_preset_is_said_first_and_acquired_at_the_second_request(controller, monkeypatch):
+    preset = load_model(controller.session.people[0].model.name, 1.7)
+    controller.session_state.set_body_models(save_model(controller.session, 0, preset))
+    asked = []
+    monkeypatch.setattr(
+        calibrating, "with_acquired_bodies", lambda recording, *rest: asked.append(rest[0]) or recording
+    )
+    controller.calibrating.start()
+    found = controller.state.calibration
+    assert (found.running, asked) == (False, [])
+    assert found.message.startswith(
+        "The shape of person is a preset's, so that a healthy camera may seem off; press Check"
+    )
+    controller.calibrating.start()
+    wait_for(lambda: asked and not controller.state.calibration.running)
+    assert controller.state.calibration.message.startswith("Expected at least 3 frames with poses")
