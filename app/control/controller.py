@@ -103,10 +103,10 @@ class Controller:
         """Interpolates, clears, marks and tracks ranges of frames."""
         self.comparing_runs = ComparingRuns(session_state)
         """Compares the poses of a range with those that they replaced."""
-        self.dragging = Dragging(session_state, activities)
-        """Drags points and parts."""
         self.held_points = HeldPoints(session_state, activities)
         """Holds points in place during drags."""
+        self.dragging = Dragging(session_state, activities, self.held_points)
+        """Drags points and parts."""
         self.pinning = Pinning(session_state, activities)
         """Sets pins, and fits people to them."""
         self.replay = Replay(session_state, runs, activities)
@@ -142,7 +142,8 @@ class Controller:
         """Plans tasks, decides on them, and comments."""
         self.proposing = Proposing(session_state)
         """Proposes the next best click."""
-        follow = () if host else (self.body_sizes.follow, self.calibrating.follow)
+        restored = () if host else (self.body_sizes.follow, self.calibrating.follow)
+        follow = (*restored, self.held_points.follow, self.tracking.follow_history)
         self.history = History(session_state, activities, follow)
         """Moves along the history."""
         self.cost_landscape = CostLandscapes(session_state, activities)

@@ -26,6 +26,8 @@ class HistoryMoves:
         self._shared, self._store, self._author = shared, shared.store, author
         self.moved_edits: tuple[int, ...] = ()
         """Entries of the history that the last move reverted or reapplied, in that order."""
+        self.is_undone = False
+        """Whether it reverted them: a move has one direction."""
 
     def undo(self) -> list[int]:
         """Revert the last entry of the history, or of one's own; returns its frames, ascending.
@@ -52,7 +54,9 @@ class HistoryMoves:
         self._write_all()
         if self._shared.has_several:
             self._require_own(edit)
-        return self._moved(self._store.go_to(edit))
+        moved = self._store.go_to(edit)
+        self.is_undone = edit not in moved
+        return self._moved(moved)
 
     def _require_own(self, edit: int | None) -> None:
         """Check that a move to an entry passes entries of one's own only, on whose poses nobody works.
@@ -88,6 +92,7 @@ class HistoryMoves:
 
     def _move(self, undo: bool) -> list[int]:
         self._write_all()
+        self.is_undone = undo
         if not self._shared.has_several:
             entry = next((e for e in self._store.history(1) if e.undone is not undo), None)
             if entry is None:

@@ -95,10 +95,10 @@ class Alternatives:
     def _costs(self, taken: Mapping[int, Alternative]) -> Costs:
         """Return the costs of the frame with alternatives of some people."""
         session_state, state = self._session_state, self._session_state.state
-        poses = tuple(taken[i].values if i in taken else pose for i, pose in enumerate(state.poses))
-        bodies = session_state.saver.revisions
-        models = tuple(bodies.body(taken[i].model_revision) if i in taken else m for i, m in enumerate(state.models))
-        return session_state.costs(poses, state.frame, models)
+        poses, models, bodies = [*state.poses], [*state.models], session_state.saver.revisions
+        for i, other in taken.items():
+            poses[i], models[i] = other.values, bodies.body(other.model_revision)
+        return session_state.costs(tuple(poses), state.frame, tuple(models))
 
     def _change(self, person: int, stored: tuple[Alternative, ...], at: int, costs: Costs) -> PoseChange:
         """Return the change that stores one of the alternatives and appends the former pose to them."""

@@ -212,14 +212,11 @@ class BodySizeEditing:
         """
         session_state, saver = self._session_state, self._session_state.saver
         edits = saver.setting(SIZES_EDITS, {})
-        latest = next((e for e in saver.moves.entries(1) if not e.undone), None)
         for edit in saver.moves.moved_edits:
-            # A move has one direction: if its last entry is applied now, all of them are.
-            done = latest is not None and latest.edit == saver.moves.moved_edits[-1]
             for name, before, after in sizes_changed(edits, edit):
                 person = next((i for i, p in enumerate(session_state.session.people) if p.name == name), None)
                 if person is not None:
-                    self._restore(person, after if done else before)
+                    self._restore(person, before if saver.moves.is_undone else after)
 
     def _restore(self, person: int, revision: int) -> None:
         """Make a revision the present body of a person."""

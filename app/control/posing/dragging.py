@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.control.posing.depth_check import note_unseen_depth
+from app.control.posing.held_points import HeldPoints
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.runtime.jobs import LatestWinsWorker
@@ -28,14 +29,15 @@ _MODES = {"move": modes.drag, "turn": modes.turn, "push": modes.push, "bend": mo
 class Dragging:
     """Drags on the shown frame; at most one at a time."""
 
-    def __init__(self, session_state: SessionState, activities: Activities) -> None:
+    def __init__(self, session_state: SessionState, activities: Activities, held_points: HeldPoints) -> None:
         """Drag nothing yet.
 
         Args:
             session_state: holds the state.
             activities: ends jobs and gestures before an edit.
+            held_points: hold a point where a drag has placed it.
         """
-        self._session_state, self._activities = session_state, activities
+        self._session_state, self._activities, self._held_points = session_state, activities, held_points
         self._gesture_grab: Grab | None = None  # at the start of the gesture
         self._mode_grab: Grab | None = None  # at the start of its present mode
         self._page = 0
@@ -190,8 +192,7 @@ class Dragging:
         """Hold the point that was placed in a view."""
         state = self._session_state.state
         if not drag.by_surface and drag.point in holdable_points(self._session_state.models[drag.person]):
-            placed = HeldPoint(state.frame, drag.person, drag.point, drag.camera)
-            self._session_state.set(held=state.held | {placed})
+            self._held_points.place(HeldPoint(state.frame, drag.person, drag.point, drag.camera))
 
     def _score(self, _: State) -> None:
         """Score the dragged pose, unless it has changed meanwhile or the drag is over."""

@@ -19,6 +19,21 @@ class HeldPoints:
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
+        self._placed: dict[int, set[HeldPoint]] = {}  # by entry of the history, the points that its drag came to hold
+
+    def place(self, placed: HeldPoint) -> None:
+        """Hold a point that a drag has placed, as long as its entry of the history is not undone."""
+        session_state, edit = self._session_state, self._session_state.edit
+        if placed not in session_state.state.held and edit is not None:
+            self._placed.setdefault(edit, set()).add(placed)
+        session_state.set(held=session_state.state.held | {placed})
+
+    def follow(self) -> None:
+        """Release the points of drags that a move along the history reverted; hold those that it brought back."""
+        moves = self._session_state.saver.moves
+        placed = set[HeldPoint]().union(*(self._placed.get(edit, ()) for edit in moves.moved_edits))
+        held = self._session_state.state.held
+        self._session_state.set(held=held - placed if moves.is_undone else held | placed)
 
     def set(self, person: int, point: str | None, held: bool, frame: int | None = None) -> None:
         """Hold a point where it is, or release it.

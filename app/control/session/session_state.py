@@ -67,7 +67,8 @@ class SessionState:
         self._stored: tuple[tuple[ShownPose, ...], Pins] | None = None  # the shown poses and pins that are on disk
         self.unwritten: list[Callable[[], bool]] = []
         """Functions that return whether a part of the controller holds poses that it has not saved yet."""
-        self._edit: int | None = None  # the entry of the history that the current gesture amends
+        self.edit: int | None = None
+        """The entry of the history that the current gesture amends; None before it is saved."""
         self.open_edit_owner: object = None
         """The gesture whose next save amends the last entry of the history; None if a save makes a new entry."""
         self.last_save = 0.0
@@ -367,8 +368,8 @@ class SessionState:
         """
         label = self.label_of(label, person)
         goes_on = gesture is not None and (self.open_edit_owner is gesture or self.open_edit_owner == gesture)
-        amend = self._edit if goes_on else None
-        self._edit = self.saver.save(self.state, label, source, amend, vouched)
+        amend = self.edit if goes_on else None
+        self.edit = self.saver.save(self.state, label, source, amend, vouched)
         # Points that were seen are stored now, or wait in the saver's queue.
         people = tuple(replace(p, seen=()) if p.seen else p for p in self.saver.with_stored_sources(self.state))
         if any(shown is not before for shown, before in zip(people, self.state.people, strict=True)):

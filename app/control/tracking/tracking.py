@@ -256,6 +256,14 @@ class Tracking:
             elif self._session_state.state.track.message:
                 self._session_state.set(track=TrackState())
 
+    def follow_history(self) -> None:
+        """Say that a move along the history took a run back, or brought it back."""
+        moves = self._session_state.saver.moves
+        label = moves.labels()[moves.is_undone] or ""
+        if label.startswith("track ") and len(moves.moved_edits) == 1:
+            how = "taken back: {}, Redo brings it back" if moves.is_undone else "brought back: {}"
+            self._session_state.set(track=TrackState(message=how.format(label)))
+
     def flush(self) -> None:
         """Save the results of the run, so that every tracked frame can be shown."""
         with self._session_state.lock:

@@ -36,6 +36,20 @@ def test_a_drag_holds_the_point_it_placed_on_its_frame_until_it_is_released(cont
     assert controller.state.held == frozenset()
 
 
+def test_a_drag_that_is_undone_holds_nothing_and_holds_again_when_it_is_redone(controller):
+    for by in (9.0, 4.0):  # the second one holds what the first holds already
+        drag(controller, "left_wrist", (by, 0.0))
+    controller.held_points.set(0, "left_knee", True)  # no entry of the history
+    knee, wrist = HeldPoint(0, 0, "left_knee", None), HeldPoint(0, 0, "left_wrist", FRONT)
+    for move, held in (("undo", {knee, wrist}), ("undo", {knee}), ("redo", {knee, wrist}), ("redo", {knee, wrist})):
+        getattr(controller.history, move)()
+        assert controller.state.held == held
+    controller.history.go_to(None)
+    assert controller.state.held == {knee}
+    handles = joint_handles.handles(controller.session, controller.state, [FRONT])
+    assert {h.point for h in handles if h.held} <= {"left_knee"}
+
+
 def test_still_points_and_spines_are_not_held(controller):
     controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(pixel_of(controller, "left_wrist")))
     controller.dragging.end(PAGE)
