@@ -135,10 +135,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def entries_below(
-    folder: Path,
-    error: type[TrackerError],
-    enters: bool = True,
-    passes_unreadable: bool = False,
+    folder: Path, error: type[TrackerError], enters: bool = True, passes_unreadable: bool = False
 ) -> "Iterator[os.DirEntry[str]]":
     """Yield the files and folders in a folder and in those inside; links to folders are not followed.
 

@@ -78,25 +78,15 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
     from tracker.session.rig_summary import summarize_rig
 
     request = NewSession(
-        arguments.session,
-        calibration=arguments.calibration,
-        videos=arguments.videos,
-        camera_paths=parse_pairs(arguments.camera, "--camera", Path),
-        cameras=arguments.cameras,
-        background=arguments.background,
-        masks=arguments.masks,
-        offsets=parse_pairs(arguments.offset, "--offset", finite),
-        people=arguments.people,
+        arguments.session, calibration=arguments.calibration, videos=arguments.videos,
+        camera_paths=parse_pairs(arguments.camera, "--camera", Path), cameras=arguments.cameras,
+        background=arguments.background, masks=arguments.masks,
+        offsets=parse_pairs(arguments.offset, "--offset", finite), people=arguments.people,
         models=_models(arguments) or DEFAULT_MODEL,
-        heights=parse_common_or_pairs(arguments.height, "--height", float),
-        common_frames=arguments.common_frames,
-        fps=arguments.fps,
-        up=arguments.up,
-        units=arguments.units,
-        poses=arguments.poses,
-        rescale=arguments.rescale,
+        heights=parse_common_or_pairs(arguments.height, "--height", float), common_frames=arguments.common_frames,
+        fps=arguments.fps, up=arguments.up, units=arguments.units, poses=arguments.poses, rescale=arguments.rescale,
         any_size=arguments.any_size,
-    )
+    )  # fmt: skip
     notes: list[str] = []
     made = assemble(request, note=notes.append)
     print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")

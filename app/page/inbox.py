@@ -12,15 +12,7 @@ MAX_WAITING = 256
 """Messages that wait at most: a held key repeats 30 times a second, so these are 8 s of it with none carried out."""
 MAX_HELD_UP = 64
 """Messages in a row that may have to wait for a place before the page is taken for a flood."""
-COALESCED = (
-    wire.Seek,
-    wire.SetView,
-    wire.CheckEpipolar,
-    WatchProvenance,
-    ReplayStep,
-    PreviewCandidate,
-    SetSearchSpeed,
-)
+COALESCED = (wire.Seek, wire.SetView, wire.CheckEpipolar, WatchProvenance, ReplayStep, PreviewCandidate, SetSearchSpeed)
 """Messages of which only the newest in the queue is carried out."""
 
 

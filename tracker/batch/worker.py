@@ -30,10 +30,7 @@ class LostClaimError(Exception):
 
 
 def work(
-    folder: Path,
-    max_tasks: int | None = None,
-    do: Work = do_task,
-    is_stopped: Callable[[], bool] = lambda: False,
+    folder: Path, max_tasks: int | None = None, do: Work = do_task, is_stopped: Callable[[], bool] = lambda: False
 ) -> int:
     """Do tasks of a batch until all have ended.
 
@@ -63,13 +60,7 @@ def work(
     return n_done
 
 
-def _do(
-    manifest: Manifest,
-    task: RecordingTask,
-    held: Claim,
-    do: Work,
-    is_stopped: Callable[[], bool],
-) -> bool:
+def _do(manifest: Manifest, task: RecordingTask, held: Claim, do: Work, is_stopped: Callable[[], bool]) -> bool:
     """Do one task; return whether its result was written."""
     if held.dead is not None:
         held.free_session(task.session(manifest.folder))

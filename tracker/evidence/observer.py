@@ -252,13 +252,7 @@ class Observer:
         n = len(self._views)
         return list(
             self._pool_ahead.map(
-                self._find_features,
-                [k] * n,
-                range(n),
-                prepared.result(),
-                regions,
-                [with_static_edges] * n,
-                [edges] * n,
+                self._find_features, [k] * n, range(n), prepared.result(), regions, [with_static_edges] * n, [edges] * n
             )
         )
 

@@ -349,11 +349,7 @@ Footage = VideoFile | ImageFolder | ChapteredVideo
 
 
 def open_footage(
-    path: Path,
-    camera: str,
-    indices: Path | None = None,
-    in_background: bool = False,
-    passed_bytes: int = MAX_BYTES,
+    path: Path, camera: str, indices: Path | None = None, in_background: bool = False, passed_bytes: int = MAX_BYTES
 ) -> Footage:
     """Open a video file, a folder of images, or one of the chapters of a video.
 

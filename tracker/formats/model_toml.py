@@ -208,18 +208,10 @@ def format_model(model: BodyModel) -> str:
         if j.free:
             row["free"] = True
         if j.kind == "ball":
-            row |= {
-                "kind": "ball",
-                "cone_deg": float(np.degrees(j.cone)),
-                "twist_deg": float(np.degrees(j.twist)),
-            }
+            row |= {"kind": "ball", "cone_deg": float(np.degrees(j.cone)), "twist_deg": float(np.degrees(j.twist))}
         if j.axes:
             row["axes"] = [
-                {
-                    "name": a.name,
-                    "axis": list(a.direction),
-                    "limits_deg": [float(np.degrees(x)) for x in a.limits],
-                }
+                {"name": a.name, "axis": list(a.direction), "limits_deg": [float(np.degrees(x)) for x in a.limits]}
                 | ({"spread_deg": float(np.degrees(a.spread))} if np.isfinite(a.spread) else {})
                 for a in j.axes
             ]

@@ -90,22 +90,13 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
         raise TrackerError("expected a folder or files to import after the session, found none; name them")
     session = load_session(arguments.session)
     request = ImportRequest(
-        arguments.name,
-        arguments.files,
-        _people(session, arguments.person),
-        arguments.joint_map,
-        parse_pairs(arguments.cameras, "--cameras", Path),
-        arguments.first_frame,
-        parse_pairs(arguments.offset, "--offset", int),
-        arguments.clock,
-        arguments.axes,
-        METRES_BY_WORD[arguments.units] if arguments.units is not None else None,
-        _confidence(arguments.confidence),
-        _size(arguments.picture_size),
-        arguments.masks,
-        arguments.unusual,
+        arguments.name, arguments.files, _people(session, arguments.person), arguments.joint_map,
+        parse_pairs(arguments.cameras, "--cameras", Path), arguments.first_frame,
+        parse_pairs(arguments.offset, "--offset", int), arguments.clock, arguments.axes,
+        None if arguments.units is None else METRES_BY_WORD[arguments.units], _confidence(arguments.confidence),
+        _size(arguments.picture_size), arguments.masks, arguments.unusual,
         parse_pairs(arguments.values, "--values", int),
-    )
+    )  # fmt: skip
     plan = plan_examined_import(session, request)
     summary: dict[str, Any] = {**import_summary(session, plan, command_line_text), "stored": False}
     if not (plan.problems or arguments.dry_run):

@@ -81,26 +81,16 @@ def provenance(state: State, person: int, origin: PoseOrigin | None) -> Provenan
         for name, p, q in zip(model.point_names, origin.points, lost, strict=True)
     )
     return ProvenanceMessage(
-        frame=state.frame,
-        person=person,
-        source=source,
-        author=record.author,
-        time=record.time,
-        program=record.program,
-        keyframe=record.keyframe,
-        reviewed=record.reviewed or record.keyframe,
-        method=str(record.settings.get("method", "")),
+        frame=state.frame, person=person, source=source, author=record.author, time=record.time, program=record.program,
+        keyframe=record.keyframe, reviewed=record.reviewed or record.keyframe,
+        method=str(record.settings.get("method", "")), seam_mm=record.seam_mm,
         between=None if between is None else (int(between[0]), int(between[1])),
-        seam_mm=record.seam_mm,
         imported_from=_imported_from(record.remark) if "imported" in record.sources else "",
-        taken_from=str(record.settings.get(TAKEN_FROM, "")),
-        body=model.name,
-        body_revision=record.model_revision,
+        taken_from=str(record.settings.get(TAKEN_FROM, "")), body=model.name, body_revision=record.model_revision,
         is_earlier_body=record.model_revision != state.present[person],
         calibration_revision=origin.calibration_revision,
-        is_earlier_calibration=origin.calibration_revision != origin.present_calibration,
-        points=points,
-    )
+        is_earlier_calibration=origin.calibration_revision != origin.present_calibration, points=points,
+    )  # fmt: skip
 
 
 def _imported_from(remark: str) -> str:

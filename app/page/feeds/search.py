@@ -91,10 +91,7 @@ class SearchFeed:
 def setup(controller: Controller, state: State) -> wire.SearchSetupMessage:
     """Describe the decomposition of the search."""
     leaves = search_settings.leaves(controller.models, state.settings.search, controller.active_dofs())
-    return wire.SearchSetupMessage(
-        speed=state.search_view.speed,
-        leaves=tuple(leaves),
-    )
+    return wire.SearchSetupMessage(speed=state.search_view.speed, leaves=tuple(leaves))
 
 
 def runs(found: Sequence[SearchRun], state: State) -> wire.SearchRunsMessage:

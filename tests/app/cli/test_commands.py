@@ -50,16 +50,9 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     assert [c["name"] for c in summary["cameras"]] == ["FRONT", "RIGHT", "BACK", "LEFT"]
     assert all(c["background"] and not c["masks"] for c in summary["cameras"])
     assert summary["people"] == [
-        {
-            "name": "ann",
-            "model": "gavrila22",
-            "height_m": 1.78,
-            "dofs": 22,
-            "poses": 0,
-            "keyframes": 0,
-            "earlier_calibration": 0,
-        }
-    ]
+        {"name": "ann", "model": "gavrila22", "height_m": 1.78, "dofs": 22, "poses": 0, "keyframes": 0,
+        "earlier_calibration": 0}
+    ]  # fmt: skip
 
     status, out, _ = run("init", s, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")
     summary = json.loads(out)

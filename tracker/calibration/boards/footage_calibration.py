@@ -96,10 +96,7 @@ def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
 
 
 def footage_paths(
-    videos: Sequence[Path],
-    camera_paths: Mapping[str, Path],
-    offsets: Mapping[str, int],
-    fisheye: Collection[str] = (),
+    videos: Sequence[Path], camera_paths: Mapping[str, Path], offsets: Mapping[str, int], fisheye: Collection[str] = ()
 ) -> dict[str, Path]:
     """Return the footage by camera name; the arguments are the fields of a `FilmedBoard`.
 

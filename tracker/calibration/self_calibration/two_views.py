@@ -42,10 +42,7 @@ def relate(seen: SeenJoints, pair: tuple[int, int], a: Camera, b: Camera) -> Two
         return None
     _, R, t, _ = cv2.recoverPose(E, x[valid], y[valid], np.eye(3))
     T_b_a = rigid.transform(np.asarray(R, dtype=np.float64), np.asarray(t, dtype=np.float64).ravel())
-    cameras = (
-        replace(a, T_world_camera=np.eye(4)),
-        replace(b, T_world_camera=rigid.inverse(T_b_a)),
-    )
+    cameras = (replace(a, T_world_camera=np.eye(4)), replace(b, T_world_camera=rigid.inverse(T_b_a)))
     adjusted = adjust_joints(cameras, observations, seen.n_joints, Gauge(0, 1))
     if adjusted is None or len(adjusted.observed.px) < len(observations.px) / 2:
         return None  # rays to most joints are parallel

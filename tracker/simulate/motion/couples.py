@@ -123,11 +123,7 @@ def couple(apart_m: float, seed: int) -> tuple[Partner, Partner]:
 
 
 def _partners(
-    apart_m: float,
-    turn: Turn,
-    step_s: float,
-    his: Callable[[float], Reaches],
-    hers: Callable[[float], Reaches],
+    apart_m: float, turn: Turn, step_s: float, his: Callable[[float], Reaches], hers: Callable[[float], Reaches]
 ) -> tuple[Partner, Partner]:
     """Place two people's trunks at a distance; closer than their feet have room for, they lean on each other."""
     lean_m = max(0.0, 0.5 * (_STANCE_M - apart_m))

@@ -80,15 +80,10 @@ def test_worst():
 
 
 figures = st.builds(
-    LimbFeatures,
-    name=st.just("arm"),
-    at_limits=st.floats(0, 1),
-    free_spread_px=st.floats(0.1, 80),
-    second_forward=st.floats(0, 1),
-    end_color=st.floats(-3, 3),
-    end_explained=st.floats(0, 1.5),
-    innovation=st.floats(0, 0.3),
-)
+    LimbFeatures, name=st.just("arm"), at_limits=st.floats(0, 1), free_spread_px=st.floats(0.1, 80),
+    second_forward=st.floats(0, 1), end_color=st.floats(-3, 3), end_explained=st.floats(0, 1.5), innovation=st.floats(0,
+    0.3),
+)  # fmt: skip
 CLEAR = LimbFeatures("leg", 0.0, 1.2, 0.06, 1.0, 0.5, 0.01)
 ASTRAY = (0.25, 6.0, 0.4, -1.0, 0.1, 0.2)
 """Contours far from edges, that explain little, with the wrong colour, far from the prediction."""

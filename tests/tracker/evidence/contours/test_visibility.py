@@ -88,14 +88,7 @@ def test_hidden_panels_stay_hidden():
     Q = np.column_stack([np.eye(3), np.zeros(3), (50.0, 0, 0)]).astype(np.float32)
     out = np.array([True, False])
     mark_occluded(
-        0,
-        surfaces.solids,
-        Q,
-        0.0,
-        np.full((3, 2 + LANES), 9.0, np.float32),
-        0,
-        2,
-        np.empty((2, 2 + LANES), np.float32),
-        out,
-    )
+        0, surfaces.solids, Q, 0.0, np.full((3, 2 + LANES), 9.0, np.float32), 0, 2, np.empty((2, 2 + LANES),
+        np.float32), out,
+    )  # fmt: skip
     assert out.tolist() == [True, False]

@@ -76,16 +76,9 @@ def rows_json(folder):
 def halves_json(folder):
     """Intrinsics and poses apart within each camera, the poses as 3x4 matrices, 14 coefficients of distortion."""
     cameras = {
-        c.name: {
-            "intrinsics": {
-                "K": c.K,
-                "dist_coeffs": [*c.distortion, *[0.0] * 9],
-                "image_size": {"width": 640, "height": 480},
-            },
-            "extrinsics": {"RT": c.T_camera_world[:3]},
-        }
-        for c in CAMERAS
-    }
+        c.name: {"intrinsics": {"K": c.K, "dist_coeffs": [*c.distortion, *[0.0] * 9], "image_size": {"width": 640,
+        "height": 480}}, "extrinsics": {"RT": c.T_camera_world[:3]}} for c in CAMERAS
+    }  # fmt: skip
     return to_json(folder / "halves.json", {"cameras": cameras})
 
 

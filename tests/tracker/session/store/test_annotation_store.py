@@ -98,16 +98,9 @@ def test_frames_in_short(store):
 def test_a_mark_leaves_the_pose_as_it_is(store):
     told = {"method": "chamfer"}
     put_it = put(
-        3,
-        1.0,
-        cost_px=0.5,
-        status="good",
-        settings=told,
-        view_costs_px=(None, 0.5),
-        part_costs_px=(2.0,),
-        remark="x",
+        3, 1.0, cost_px=0.5, status="good", settings=told, view_costs_px=(None, 0.5), part_costs_px=(2.0,), remark="x",
         limbs_lost=(0.5,),
-    )
+    )  # fmt: skip
     store.commit("a", [put_it])
     before = store.pose("ann", 3)
     store.commit("verify", [MarkChange("ann", 3, keyframe=True, reviewed=True), MarkChange("ann", 4, True, True)])
