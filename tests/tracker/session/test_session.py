@@ -181,22 +181,6 @@ def test_lost_frames_are_kept(tmp_path, cameras):
     assert (tmp_path / "s" / "session.toml").read_text() == text
 
 
-@pytest.mark.parametrize(
-    ("rows", "expected"),
-    [
-        ("[[30, 1], [20, 1]]", "a later frame in each row of 'lost_frames' in 'cameras[left]', found frames 30, 20"),
-        ("[[30, 1], [30, 1]]", "found frames 30, 30"),
-        ("[[0, 1]]", "a frame from 1 on"),
-        ("[[30, 0.5]]", "a whole number of frames"),
-    ],
-)
-def test_impossible_lost_frames_are_refused(tmp_path, cameras, rows, expected):
-    make(tmp_path, cameras)
-    edit(tmp_path / "s", "offset = 3", f"offset = 3, lost_frames = {rows}")
-    with pytest.raises(SessionError, match=re.escape(expected)):
-        load_session(tmp_path / "s")
-
-
 def test_without_clocks_none_are_written(tmp_path, cameras):
     make(tmp_path, cameras)
     text = (tmp_path / "s" / "session.toml").read_text()
@@ -209,14 +193,6 @@ def test_start_is_split_into_the_nearest_frame_and_the_rest(cameras, start, offs
     source = cameras[0].starting_at(start)
     assert (source.offset, source.clock.ahead_frames) == (offset, ahead)
     assert source.start_frames == pytest.approx(start, abs=1e-12)
-
-
-@pytest.mark.parametrize(("key", "expected"), [("time_offset_s", "a time from -1 to 1 s"), ("time_rate", "a drift")])
-def test_impossible_clock_is_refused(tmp_path, cameras, key, expected):
-    make(tmp_path, cameras)
-    edit(tmp_path / "s", "offset = 3", f"offset = 3, {key} = 7.0")
-    with pytest.raises(SessionError, match=expected):
-        load_session(tmp_path / "s")
 
 
 def test_nothing_half_written_when_writing_fails(tmp_path, cameras, monkeypatch):
@@ -255,6 +231,12 @@ def edit(folder, old, new):
         ("fps = 50.0", "fps = nan", "as 'fps', found nan"),
         ("offset = 3", "offset = inf", r"as 'cameras\[left\].offset', found inf"),
         ("offset = 3", "offset = -4", "others an offset of 4"),
+        ("offset = 3", "offset = 3, lost_frames = [[30, 1], [20, 1]]", r"'cameras\[left\]', found frames 30, 20"),
+        ("offset = 3", "offset = 3, lost_frames = [[30, 1], [30, 1]]", "a later frame in each row.*frames 30, 30"),
+        ("offset = 3", "offset = 3, lost_frames = [[0, 1]]", "a frame from 1 on"),
+        ("offset = 3", "offset = 3, lost_frames = [[30, 0.5]]", "a whole number of frames"),
+        ("offset = 3", "offset = 3, time_offset_s = 7.0", "a time from -1 to 1 s"),
+        ("offset = 3", "offset = 3, time_rate = 7.0", "a drift"),
         ("#112233", "red", r"a colour such as #f2a33a as 'people\[ann\].color', found 'red'"),
         ("videos/left", "videos\\u0000left", r"as 'cameras\[left\].footage'"),
         ('calibration = "calibration.toml"', "calibration = 3", "path of a file or folder as 'calibration', found 3"),

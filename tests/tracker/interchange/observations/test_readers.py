@@ -79,9 +79,8 @@ def test_deeplabcut_labels_of_pictures(tmp_path):
     assert not table.is_found[1].any()
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
+MALFORMED = {
+    "deeplabcut": [
         ("scorer,a,a\nbodyparts,n,n\n0,1,2\n", "the rows scorer, bodyparts and coords of equal length"),
         ("scorer,a,a\nbodyparts,n,n\ncoords,x,z\n0,1,2\n", "each x, y and likelihood once, found 'z'"),
         ("scorer,a,a\nbodyparts,n,n\ncoords,x,y\n0,1\n", "line 4: expected 3 columns, found 2"),
@@ -89,11 +88,47 @@ def test_deeplabcut_labels_of_pictures(tmp_path):
         ("scorer,a,a\nbodyparts,n,n\ncoords,x,y\n0,1,two\n", "expected numbers, found 'two'"),
         ("scorer,a,a\nbodyparts,n,n\ncoords,x,y\n", "no rows of numbers"),
     ],
+    "coco": [
+        ('{"images": [], "annotations": []}', "annotations with key points, found none"),
+        (
+            '[{"image_id": 1, "keypoints": [1, 2, 3]}, {"image_id": 2, "keypoints": [1, 2]}]',
+            "3 numbers for 1 key points",
+        ),
+        ('{"images": [{"id": -1}], "annotations": []}', "a whole number"),
+    ],
+    "openpose": [
+        ('{"people": [{"pose_keypoints_2d": [1, 2]}]}', "x, y and confidence of each point.*found 2 numbers"),
+        ('{"version": 1.3}', "expected the key 'people', found version"),
+        ('{"people": [{"pose_keypoints_2d": [1e99, 2, 1]}]}', "a finite number"),
+        ("{", "not valid JSON"),
+        ("[]", "expected"),
+    ],
+    "csv": [
+        ("frame,a_x,a_y\n0,1,2\n", "'a' without all three"),
+        ("frame,a_x,a_y,a_z\n0,1,2\n", "line 2: expected 4 columns, found 3"),
+        ("frame,a_x,a_y,a_z,a_x\n", "each column once, found 'a_x' twice"),
+        ("frame,a_x_m,a_y_m,a_z_mm\n", "in one unit"),
+        ("frame,b,c\n", "columns NAME_x, NAME_y, NAME_z"),
+        ("", "columns NAME_x, NAME_y, NAME_z"),
+    ],
+}
+"""For each format, files that are not of it and what the message says."""
+READERS = {
+    "deeplabcut": ("a.csv", read_deeplabcut_csv),
+    "coco": ("c.json", read_coco),
+    "openpose": ("a_1.json", read_openpose),
+    "csv": ("a.csv", lambda path: read_one(path, 1.0)),
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "expected"), [(kind, *row) for kind, rows in MALFORMED.items() for row in rows]
 )
-def test_malformed_deeplabcut(tmp_path, text, expected):
-    (tmp_path / "a.csv").write_text(text)
+def test_malformed(tmp_path, kind, text, expected):
+    name, read = READERS[kind]
+    (tmp_path / name).write_text(text)
     with pytest.raises(FormatError, match=expected):
-        read_deeplabcut_csv(tmp_path / "a.csv")
+        read(tmp_path / name)
 
 
 @pytest.mark.slow
@@ -197,36 +232,6 @@ def test_coco_of_another_size(session, tmp_path):
     assert "key points of the 640x480 footage, found 1280x960 in the file" in str(plan.problems[0])
 
 
-@pytest.mark.parametrize(
-    ("data", "expected"),
-    [
-        ({"images": [], "annotations": []}, "annotations with key points, found none"),
-        ([{"image_id": 1, "keypoints": [1, 2, 3]}, {"image_id": 2, "keypoints": [1, 2]}], "3 numbers for 1 key points"),
-        ({"images": [{"id": -1}], "annotations": []}, "a whole number"),
-    ],
-)
-def test_malformed_coco(tmp_path, data, expected):
-    (tmp_path / "c.json").write_text(json.dumps(data))
-    with pytest.raises(FormatError, match=expected):
-        read_coco(tmp_path / "c.json")
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ('{"people": [{"pose_keypoints_2d": [1, 2]}]}', "x, y and confidence of each point.*found 2 numbers"),
-        ('{"version": 1.3}', "expected the key 'people', found version"),
-        ('{"people": [{"pose_keypoints_2d": [1e99, 2, 1]}]}', "a finite number"),
-        ("{", "not valid JSON"),
-        ("[]", "expected"),
-    ],
-)
-def test_malformed_openpose(tmp_path, text, expected):
-    (tmp_path / "a_1.json").write_text(text)
-    with pytest.raises(FormatError, match=expected):
-        read_openpose(tmp_path / "a_1.json")
-
-
 def test_c3d(session, tmp_path):
     pytest.importorskip("ezc3d")
     points = TRUTH.copy()
@@ -297,23 +302,6 @@ def test_csv_of_points(session, tmp_path, unit):
     assert observations.format == "csv"
     assert np.nanmax(np.abs(observations.joints.joints_world[:, 0] - points)) < 1e-6
     assert np.isnan(observations.joints.joints_world[3, 0, 4]).all()
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("frame,a_x,a_y\n0,1,2\n", "'a' without all three"),
-        ("frame,a_x,a_y,a_z\n0,1,2\n", "line 2: expected 4 columns, found 3"),
-        ("frame,a_x,a_y,a_z,a_x\n", "each column once, found 'a_x' twice"),
-        ("frame,a_x_m,a_y_m,a_z_mm\n", "in one unit"),
-        ("frame,b,c\n", "columns NAME_x, NAME_y, NAME_z"),
-        ("", "columns NAME_x, NAME_y, NAME_z"),
-    ],
-)
-def test_malformed_csv_of_points(tmp_path, text, expected):
-    (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(FormatError, match=expected):
-        read_one(tmp_path / "a.csv", 1.0)
 
 
 def test_a_csv_with_the_index_of_its_table_and_a_column_of_frames(tmp_path):
