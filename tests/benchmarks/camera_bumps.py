@@ -174,11 +174,11 @@ def judged(at: Path, recording: str, body: str, bump: Bump | None, right: Sequen
         if bump is not None and bump.kind == "rotation":
             seen = posed.seen(posed.diverse(posed.credible_frames(), N_CHECKED))
             parameters = [SizeParameters(b.model) for b in seen[0].bodies]
-            found = fit_fault(seen, parameters, posed.fps, Fault(bump.camera, "rotation"))
-            correction = found.corrections[bump.camera][ROTATION]
+            fitted = fit_fault(seen, parameters, posed.fps, Fault(bump.camera, "rotation"))
+            correction = fitted.corrections[bump.camera][ROTATION]
             mended = so3_exp(correction) @ _rotation(session.cameras[bump.camera].camera)
             error = np.degrees(so3_log(mended @ _rotation(right[bump.camera]).T))
-            sigma = np.degrees(found.sigmas(bump.camera)[ROTATION])
+            sigma = np.degrees(fitted.sigmas(bump.camera)[ROTATION])
     by = "+".join(check.cameras[bump.camera].kinds) if bump else ""
     return Judged(
         recording, body, bump.kind if bump else "", right[bump.camera].name if bump else "",

@@ -67,18 +67,18 @@ def by_silhouettes(film: FilmedSilhouettes, n_cameras: int, has_lenses: bool) ->
     cameras, rows = film.cameras[:n_cameras], [row[:n_cameras] for row in film.rows]
     lenses = cameras if has_lenses else blanks(cameras)
     try:
-        found = calibrate_by_silhouettes(rows, lenses, film.height_m, has_lenses)
+        calibration = calibrate_by_silhouettes(rows, lenses, film.height_m, has_lenses)
     except CalibrationError as error:
         print(str(error).split(";")[0], flush=True)
         return None
     points = film.joints_world.reshape(-1, 3)[::5]
-    joints, known = reprojected(cameras, found.cameras, points)
+    joints, known = reprojected(cameras, calibration.cameras, points)
     scale, R, t = aligned(joints[known], points[known])
     errors = np.linalg.norm(scale * joints[known] @ R.T + t - points[known], axis=1)
-    true, volume = float(np.sqrt(np.mean(errors**2))) / scale, found.volume
+    true, volume = float(np.sqrt(np.mean(errors**2))) / scale, calibration.volume
     off = 1 / scale - 1
     is_inside = bool(volume.low_m <= true <= volume.high_m)
-    return Calibrated(1000 * scale * true, true / volume.expected_m, is_inside, off, off / found.scale_sigma)
+    return Calibrated(1000 * scale * true, true / volume.expected_m, is_inside, off, off / calibration.scale_sigma)
 
 
 def measure_silhouettes(data: Path, write: Sequence[Path]):

@@ -50,11 +50,11 @@ def main() -> None:
         for frame in range(0, session.n_frames, arguments.every):
             try:
                 people, methods = range(len(session.people)), arguments.method.split(",")
-                found = find_first_poses(session, observer, people, [frame], methods)
+                first = find_first_poses(session, observer, people, [frame], methods)
             except TrackerError as error:
                 print(f"{frame:4d} {error}")
                 continue
-            rows += [_row(pose, references, frame) for pose in found.poses.values()]
+            rows += [_row(pose, references, frame) for pose in first.poses.values()]
     errors, sides = np.array(rows).T
     print(f"{len(rows)} starts: {errors.mean():.0f} mm, worst {errors.max():.0f}; left right in {sides.mean():.0%}")
 

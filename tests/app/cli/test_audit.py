@@ -19,9 +19,9 @@ FRAMES, APART, STEP_M = range(20, 26), 23, 0.02
 @pytest.fixture
 def estimate(monkeypatch):
     """The likeliest poses are a step aside, and on one frame the left arm is elsewhere on half of the paths."""
-    found = Estimate(STEP_M, doubted(APART))
-    monkeypatch.setattr(audit, "estimate_run", found)
-    return found
+    held_estimate = Estimate(STEP_M, doubted(APART))
+    monkeypatch.setattr(audit, "estimate_run", held_estimate)
+    return held_estimate
 
 
 @pytest.fixture

@@ -275,8 +275,8 @@ def test_workers_that_end_early_are_a_sentence_with_their_last_words(plan, run, 
 
     monkeypatch.setattr("app.cli.batches.local.subprocess.Popen", Ended)
     monkeypatch.setattr("app.cli.batches.local.compile_kernels", lambda progress: None)
-    found = run("batch", plan, "--json")
-    assert_refused(found, ["found none that said: quadrille: cannot write x: No space left", "run the batch again"])
+    refused = run("batch", plan, "--json")
+    assert_refused(refused, ["found none that said: quadrille: cannot write x: No space left", "run the batch again"])
 
 
 def test_the_table_of_a_folder_that_cannot_be_written_is_shown(run, ended):

@@ -178,8 +178,8 @@ def test_a_folder_is_replaced_only_if_an_export_made_it(run, couple, tmp_path):
     assert not (labels / "old").exists()
     (labels / "provenance.json").unlink()
     (labels / "mine").touch()
-    found = run(*words, "--out", tmp_path, "--overwrite")
-    assert_refused(found, ["s_openpose not to exist, found a folder", "choose another --out"])
+    refused = run(*words, "--out", tmp_path, "--overwrite")
+    assert_refused(refused, ["s_openpose not to exist, found a folder", "choose another --out"])
     assert (labels / "mine").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["s", "s_openpose"]
 
@@ -211,8 +211,8 @@ def test_help_lists_every_format(run):
     ("nobody", "body model 'nobody' not found"), ("gavrila34:9", "expected a height of 0.3 to 3 metres"),
 ])  # fmt: skip
 def test_a_character_that_is_none(run, couple, tmp_path, character, expected):
-    found = run("export", couple, "--out", tmp_path / "m.mp4", "--character", character)
-    assert_refused(found, [expected])
+    refused = run("export", couple, "--out", tmp_path / "m.mp4", "--character", character)
+    assert_refused(refused, [expected])
     assert not (tmp_path / "m.mp4").exists()
 
 
@@ -293,6 +293,6 @@ def test_a_name_whose_side_file_would_be_too_long_is_a_sentence(run, couple, tmp
 def test_a_full_disk_is_a_sentence_and_nothing_is_left(run, couple, tmp_path, name):
     out = tmp_path / f"m{FORMATS[name].suffixes[0]}"
     with full_disk(1000):
-        found = run("export", couple, "--person", "ann", "--format", name, "--out", out, "--json")
-    assert_refused(found, [f"cannot write {out}: File too large; choose a folder that you may write to, with room"])
+        refused = run("export", couple, "--person", "ann", "--format", name, "--out", out, "--json")
+    assert_refused(refused, [f"cannot write {out}: File too large; choose a folder that you may write to, with room"])
     assert {p.name for p in tmp_path.iterdir() if "state" not in p.name} == {"s"}

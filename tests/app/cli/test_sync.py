@@ -51,9 +51,9 @@ def test_sound_writes_what_is_clear_only_when_asked(run, heard):
     assert (session / "session.toml").read_text() == before
     status, _, error = run("sync", session, "--sound", "--apply")
     assert (status, error) == (0, "")
-    found = clocks(session)
-    assert found[first] == found[second] == (0, 0.0)
-    offset, ahead = found[last]
+    offsets = clocks(session)
+    assert offsets[first] == offsets[second] == (0, 0.0)
+    offset, ahead = offsets[last]
     assert offset - ahead == pytest.approx(0.01 * load_session(session).fps, abs=0.01)
 
 

@@ -234,15 +234,15 @@ def test_a_session_open_already(run, session):
 
 
 def test_exchanged_footage_is_told(run, room, monkeypatch):
-    found = CameraExchange(("front", "left"), 0.2, 0.9, True)
-    monkeypatch.setattr("tracker.evidence.camera_exchange.find_exchange", lambda *_: found)
+    exchange = CameraExchange(("front", "left"), 0.2, 0.9, True)
+    monkeypatch.setattr("tracker.evidence.camera_exchange.find_exchange", lambda *_: exchange)
     status, out, err = run(*new(room))
     assert (status, out.splitlines()[0]) == (0, f"made {room / 's'}: 2 cameras, 6 frames at 25 per second")
     err = err.splitlines()[-1]  # after a note on the axis that points up
     assert err.startswith("warning: the footage of 'front' and 'left' seems to be exchanged: ")
     assert "20% of what moves in the views, and 90% with the two exchanged" in err
     assert run("info", room / "s")[1].splitlines()[-1] == err.strip()
-    assert json.loads(run("info", room / "s", "--json")[1])["warning"] == found.text
+    assert json.loads(run("info", room / "s", "--json")[1])["warning"] == exchange.text
     assert "warning" not in run("info", room / "s", "--no-check")[1]
 
 

@@ -22,10 +22,10 @@ def px(camera, place):
 
 
 def test_a_place_lies_on_its_lines_and_beside_them_at_its_distance(wrist):
-    found = epipolar_check(CAMERAS, [(0, px(0, wrist))], [BODY])
-    assert [line.camera for line in found.lines] == [1, 2]
-    assert found.distance is None
-    for line in found.lines:
+    check = epipolar_check(CAMERAS, [(0, px(0, wrist))], [BODY])
+    assert [line.camera for line in check.lines] == [1, 2]
+    assert check.distance is None
+    for line in check.lines:
         start, end = np.array([[line.x0, line.y0], [line.x1, line.y1]])
         across = np.array([start[1] - end[1], end[0] - start[0]]) / np.linalg.norm(end - start)
         assert abs((px(line.camera, wrist) - start) @ across) < 0.05

@@ -18,8 +18,8 @@ def test_each_alternative_has_a_path_in_each_view_in_its_order(controller):
     arm = next(x for x in limbs(model) if x.name == "left_forearm")
     lifted = model.clip(model.retract(values, np.where(arm.dofs, 0.7, 0.0)))
     others = (RankedPose(lifted, -8.0, ("left arm",)), RankedPose(lifted, 2.0, ()))
-    found = Reason(state.frame, 0, values, None, None, alternatives=others)
-    shown = replace(state, reasons=ReasonState(found=found))
+    reason = Reason(state.frame, 0, values, None, None, alternatives=others)
+    shown = replace(state, reasons=ReasonState(found=reason))
     paths = ghost_lines(controller.session, shown, VIEW)
     assert [(p.camera, p.kind) for p in paths] == [(c, "alternative") for _ in others for c in (0, 2, 3)]
     of_arm, of_body = paths[0], paths[3]

@@ -18,11 +18,11 @@ def pieces(shift, angles_rad, at=(100.0, 100.0)):
 
 
 def test_pieces_of_all_directions_give_the_whole_shift():
-    found = misfit_field([NOTHING, pieces((3.0, -2.0), np.linspace(0, np.pi, 40))], [SIZE, SIZE])
-    (arrow,) = found.arrows
+    field = misfit_field([NOTHING, pieces((3.0, -2.0), np.linspace(0, np.pi, 40))], [SIZE, SIZE])
+    (arrow,) = field.arrows
     assert (arrow.camera, arrow.u, arrow.v) == (1, 100, 100)
     assert (arrow.du, arrow.dv) == (pytest.approx(3), pytest.approx(-2))
-    assert found.factor == 10  # 53 px are a cell
+    assert field.factor == 10  # 53 px are a cell
 
 
 def test_of_contours_that_run_alike_only_the_shift_across_them_is_known():

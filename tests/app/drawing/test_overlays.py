@@ -90,11 +90,11 @@ def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
     assert 0 < traced.occluded.sum() < len(traced.occluded)
     paths = drawn(controller, state, view=view_of("contours", "hidden"))
     for kind, those in (("hidden", traced.occluded), ("model", ~traced.occluded)):
-        found = kinds_of(paths, kind, camera=1)
+        kinds = kinds_of(paths, kind, camera=1)
         np.testing.assert_array_equal(
-            rows_sorted([p.segments_px for p in found]), rows_sorted([traced.pieces_px[those]])
+            rows_sorted([p.segments_px for p in kinds]), rows_sorted([traced.pieces_px[those]])
         )
-        assert {p.color for p in found} == {session.people[0].color}
+        assert {p.color for p in kinds} == {session.people[0].color}
     assert {p.kind for p in drawn(controller, state, view=view_of("hidden"))} == {"hidden"}
 
 

@@ -24,14 +24,14 @@ GREY = [150, 150, 150]
 def test_a_voxel_has_the_colour_of_its_part():
     state = state_of(MODEL, [POSE], 1.0, VoxelSettings())
     far = np.array([[5.0, 5.0, 5.0]])
-    found = part_colors(np.concatenate([state.centers, far]), [MODEL], [POSE])
+    colors = part_colors(np.concatenate([state.centers, far]), [MODEL], [POSE])
     expected = [rgb(MODEL.parts[m[0]].color) for m in figure_of(MODEL).members]
-    np.testing.assert_array_equal(found, [*expected, GREY])
+    np.testing.assert_array_equal(colors, [*expected, GREY])
 
 
 def test_without_a_pose_all_voxels_are_grey():
-    found = part_colors(np.zeros((3, 3)), [MODEL], [None])
-    np.testing.assert_array_equal(found, [GREY] * 3)
+    colors = part_colors(np.zeros((3, 3)), [MODEL], [None])
+    np.testing.assert_array_equal(colors, [GREY] * 3)
 
 
 class Scene:

@@ -143,9 +143,9 @@ def test_persistence_is_that_of_the_recording(session, model):
 
 
 def test_units_are_limbs_and_the_trunk(session, model):
-    found = expected_errors(model, recording(session))
-    assert {*found.units} == {TRUNK, "left arm", "right arm", "left leg", "right leg"}
-    of = dict(zip(found.joints, (found.units[u] for u in found.unit_of), strict=True))
+    errors = expected_errors(model, recording(session))
+    assert {*errors.units} == {TRUNK, "left arm", "right arm", "left leg", "right leg"}
+    of = dict(zip(errors.joints, (errors.units[u] for u in errors.unit_of), strict=True))
     assert [of[j] for j in ("left_shoulder", "right_hip", "left_elbow", "right_ankle")] == [
         TRUNK, TRUNK, "left arm", "right leg",
     ]  # fmt: skip

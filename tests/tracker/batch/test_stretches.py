@@ -33,27 +33,27 @@ def frames_of(stretches):
 
 
 def test_stretches_without_keyframes_share_a_second():
-    found = divide(range(3000), (), 1000, fps=30.0)
-    assert frames_of(found) == [(0, 1014), (985, 2014), (1985, 2999)]
+    stretches = divide(range(3000), (), 1000, fps=30.0)
+    assert frames_of(stretches) == [(0, 1014), (985, 2014), (1985, 2999)]
 
 
 @pytest.mark.parametrize(("n", "length", "parts"), [(1999, 1000, 1), (2000, 1000, 2), (20000, 1000, 20), (5000, 0, 1)])
 def test_a_stretch_has_at_least_its_length(n, length, parts):
-    found = divide(range(n), (), length, fps=30.0)
-    assert len(found) == parts
-    assert (found[0].first, found[-1].last) == (0, n - 1)
-    assert all(s.last - s.first + 1 >= length for s in found)
+    stretches = divide(range(n), (), length, fps=30.0)
+    assert len(stretches) == parts
+    assert (stretches[0].first, stretches[-1].last) == (0, n - 1)
+    assert all(s.last - s.first + 1 >= length for s in stretches)
 
 
 def test_a_recording_is_cut_at_the_nearest_keyframe_which_both_stretches_have():
-    found = divide(range(3000), {100, 900, 2600}, 1000, fps=30.0)
-    assert frames_of(found) == [(0, 900), (900, 1964), (1935, 2999)]
+    stretches = divide(range(3000), {100, 900, 2600}, 1000, fps=30.0)
+    assert frames_of(stretches) == [(0, 900), (900, 1964), (1935, 2999)]
 
 
 def test_strides_count_tracked_frames():
-    found = divide(range(10, 4010, 2), (), 1000, fps=30.0)
-    assert frames_of(found) == [(10, 2024), (1994, 4008)]
-    assert all((s.first - 10) % 2 == 0 for s in found)
+    stretches = divide(range(10, 4010, 2), (), 1000, fps=30.0)
+    assert frames_of(stretches) == [(10, 2024), (1994, 4008)]
+    assert all((s.first - 10) % 2 == 0 for s in stretches)
 
 
 class Scene:

@@ -27,12 +27,12 @@ def test_sizes_go_there_and_back(name):
         for i, (n, p) in enumerate(sizes.parts.items())
     }
     wanted = sizes._replace(height_m=1.7, parts=parts, widths_m={n: 1.1 * w for n, w in sizes.widths_m.items()})
-    found = dimensions_of(parse_model(format_model(with_dimensions(model, wanted)), "test"))
-    assert found.height_m == wanted.height_m
+    dimensions = dimensions_of(parse_model(format_model(with_dimensions(model, wanted)), "test"))
+    assert dimensions.height_m == wanted.height_m
     for part, own in parts.items():
-        assert found.parts[part].length_m == pytest.approx(own.length_m)
-        assert found.parts[part].girths_m == pytest.approx(own.girths_m)
-    assert found.widths_m == pytest.approx(wanted.widths_m)
+        assert dimensions.parts[part].length_m == pytest.approx(own.length_m)
+        assert dimensions.parts[part].girths_m == pytest.approx(own.girths_m)
+    assert dimensions.widths_m == pytest.approx(wanted.widths_m)
 
 
 def test_a_length_is_the_distance_of_the_joints():
@@ -93,9 +93,9 @@ def test_joint_centers_scale_with_the_dimensions_of_their_part():
         "pelvis": PartDimensions(pelvis.length_m * 1.1, (pelvis.girths_m[0] * 1.2, pelvis.girths_m[1] * 0.9)),
         "left_forearm": PartDimensions(forearm.length_m, (forearm.girths_m[0] * 1.5, forearm.girths_m[1])),
     }
-    found = with_dimensions(model, sizes._replace(parts=parts))
-    hip, wrist = (found.point_names.index(n) for n in ("left_hip", "left_wrist"))
-    np.testing.assert_allclose(found.center_offsets[hip], 1.8 * np.array([0.012, 0.018, 0.033]))
-    np.testing.assert_allclose(found.center_offsets[wrist], 1.8 * np.array([0.015, 0.0, 0.0]))
+    resized = with_dimensions(model, sizes._replace(parts=parts))
+    hip, wrist = (resized.point_names.index(n) for n in ("left_hip", "left_wrist"))
+    np.testing.assert_allclose(resized.center_offsets[hip], 1.8 * np.array([0.012, 0.018, 0.033]))
+    np.testing.assert_allclose(resized.center_offsets[wrist], 1.8 * np.array([0.015, 0.0, 0.0]))
     taller = with_dimensions(model, scaled(sizes, 0.9))
     np.testing.assert_allclose(taller.center_offsets[hip], 0.9 * np.array([0.01, 0.02, 0.03]))

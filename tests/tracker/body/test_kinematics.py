@@ -17,8 +17,8 @@ def test_a_chain_in_many_poses_is_where_the_whole_body_puts_it(name):
         start, *poses = model.retract(base, rng.normal(size=(30, model.n_dofs)) * limb.dofs)
         rest = model.kinematics(start)
         before = rest.Ts_world_part.copy()
-        found = chain_poses(model.tree, rest, limb.parts, np.array(poses))
-        np.testing.assert_array_equal(found, [model.kinematics(v).Ts_world_part[limb.parts] for v in poses])
+        placed = chain_poses(model.tree, rest, limb.parts, np.array(poses))
+        np.testing.assert_array_equal(placed, [model.kinematics(v).Ts_world_part[limb.parts] for v in poses])
         np.testing.assert_array_equal(rest.Ts_world_part, before)
 
 

@@ -19,11 +19,11 @@ def test_the_height_follows_the_stature_and_the_body_stays():
         for n, p in sizes.parts.items()
     }
     short = with_dimensions(model, sizes._replace(parts=parts))
-    found = with_height_of_stature(short, model)
+    resized = with_height_of_stature(short, model)
     assert short.height_m == 1.6
-    assert found.height_m == pytest.approx(1.6 - 0.15 * 1.6 * (0.2425 + 0.2527), abs=0.02)
+    assert resized.height_m == pytest.approx(1.6 - 0.15 * 1.6 * (0.2425 + 0.2527), abs=0.02)
     pose = np.random.default_rng(0).normal(0, 0.3, model.n_dofs)
-    np.testing.assert_allclose(found.points_world(pose), short.points_world(pose))
-    np.testing.assert_allclose(found.joint_centers_world(pose), short.joint_centers_world(pose))
-    np.testing.assert_allclose([s.half_axes for s in found.shapes], [s.half_axes for s in short.shapes])
-    np.testing.assert_allclose(found.centers_part, short.centers_part)
+    np.testing.assert_allclose(resized.points_world(pose), short.points_world(pose))
+    np.testing.assert_allclose(resized.joint_centers_world(pose), short.joint_centers_world(pose))
+    np.testing.assert_allclose([s.half_axes for s in resized.shapes], [s.half_axes for s in short.shapes])
+    np.testing.assert_allclose(resized.centers_part, short.centers_part)

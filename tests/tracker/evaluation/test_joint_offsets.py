@@ -27,17 +27,17 @@ def evaluated(true_model, align="none", n=20):
 
 def test_an_offset_in_the_body_is_found_and_taken_away():
     """The anatomical hip lies beside the pivot, in the pelvis: the world difference turns with the body."""
-    found = evaluated(with_center(MODEL, "left_hip", (0.02, 0.0, -0.01)))
-    assert found.per_joint_mm["left_hip"] == pytest.approx(1700 * np.hypot(0.02, 0.01))
-    assert found.offsets_mm["left_hip"] == pytest.approx((-34.0, 0.0, 17.0), abs=1e-6)
-    assert found.per_joint_without_offsets_mm["left_hip"] == pytest.approx(0, abs=1e-6)
-    assert found.mpjpe_mm == pytest.approx(1700 * np.hypot(0.02, 0.01) / 12)
-    assert found.mpjpe_without_offsets_mm == pytest.approx(0, abs=1e-6)
+    evaluation = evaluated(with_center(MODEL, "left_hip", (0.02, 0.0, -0.01)))
+    assert evaluation.per_joint_mm["left_hip"] == pytest.approx(1700 * np.hypot(0.02, 0.01))
+    assert evaluation.offsets_mm["left_hip"] == pytest.approx((-34.0, 0.0, 17.0), abs=1e-6)
+    assert evaluation.per_joint_without_offsets_mm["left_hip"] == pytest.approx(0, abs=1e-6)
+    assert evaluation.mpjpe_mm == pytest.approx(1700 * np.hypot(0.02, 0.01) / 12)
+    assert evaluation.mpjpe_without_offsets_mm == pytest.approx(0, abs=1e-6)
 
 
 def test_offsets_after_an_alignment_are_those_of_the_aligned_poses():
-    found = evaluated(with_center(MODEL, "left_wrist", (0.0, 0.03, 0.0)), "rigid-all")
-    assert found.mpjpe_without_offsets_mm < 0.5 * found.mpjpe_mm
+    evaluation = evaluated(with_center(MODEL, "left_wrist", (0.0, 0.03, 0.0)), "rigid-all")
+    assert evaluation.mpjpe_without_offsets_mm < 0.5 * evaluation.mpjpe_mm
 
 
 def test_an_error_that_moves_is_no_offset():
@@ -46,19 +46,19 @@ def test_an_error_that_moves_is_no_offset():
     wrist = truth.names.index("left_wrist")
     truth.points[:, wrist, 0] += 0.04 * (-1.0) ** np.arange(20)
     result = evaluate_joints(estimate, truth, range(20))
-    found = evaluate_offsets(result, motion, (estimate, truth), range(20))
-    assert found.per_joint_without_offsets_mm["left_wrist"] > 35
+    offsets = evaluate_offsets(result, motion, (estimate, truth), range(20))
+    assert offsets.per_joint_without_offsets_mm["left_wrist"] > 35
     # Second difference of 4 cm to and fro: 4 * 4 cm.
-    assert found.acceleration_error_m_s2 == pytest.approx(0.16 * FPS**2 / 12)
+    assert offsets.acceleration_error_m_s2 == pytest.approx(0.16 * FPS**2 / 12)
 
 
 def test_the_acceleration_error_follows_the_stride():
     estimate, truth = (joints_of_poses(MODEL, poses(), FPS) for _ in range(2))
     truth.points[:, truth.names.index("left_wrist"), 0] += 0.5 * 3.0 * (np.arange(20) / FPS) ** 2  # 3 m/s^2
     for step in (1, 2, 5):
-        found = evaluate_joints(estimate, truth, range(0, 20, step))
-        assert found.fps == FPS / step
-        assert found.acceleration_error_m_s2 == pytest.approx(3.0 / 12)
+        evaluation = evaluate_joints(estimate, truth, range(0, 20, step))
+        assert evaluation.fps == FPS / step
+        assert evaluation.acceleration_error_m_s2 == pytest.approx(3.0 / 12)
     assert evaluate_joints(estimate, truth, range(2)).acceleration_error_m_s2 is None
 
 

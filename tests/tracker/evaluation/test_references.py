@@ -151,8 +151,8 @@ def test_own_names_by_a_map(tmp_path):
     with pytest.raises(FormatError):
         read_joints(tmp_path / "joints.trc", 25.0)
     (tmp_path / "map.toml").write_text('left_wrist = "A"\nright_wrist = "B"\n')
-    found = read_joints(tmp_path / "joints.trc", 25.0, tmp_path / "map.toml")
-    assert sorted(found.names) == ["left_wrist", "right_wrist"]
+    joints = read_joints(tmp_path / "joints.trc", 25.0, tmp_path / "map.toml")
+    assert sorted(joints.names) == ["left_wrist", "right_wrist"]
 
 
 @pytest.mark.parametrize("name", ["poses.c3d", "poses", "missing.trc", "missing.csv"])

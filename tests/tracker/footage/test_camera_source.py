@@ -25,8 +25,8 @@ def test_the_nearest_picture_is_found_as_by_trying_all(lost, ahead, rate):
     clock = Clock(ahead, rate, lost)
     taken = np.array([k + clock.ahead(k) for k in range(N)])
     for frame in range(N):
-        found = clock.nearest(frame, N)
-        assert abs(taken[found] - frame) == pytest.approx(np.abs(taken - frame).min(), abs=1e-12)
+        nearest = clock.nearest(frame, N)
+        assert abs(taken[nearest] - frame) == pytest.approx(np.abs(taken - frame).min(), abs=1e-12)
 
 
 @pytest.mark.parametrize("lost", LOSSES)

@@ -104,8 +104,8 @@ def test_next_chapter(tmp_path, name, following):
     for suffix in ("GX020042.MP4", "GH020042.MP4", "GP010042.MP4", "GP020042.MP4", "C0010.MP4", "MVI_0100.MP4"):
         (tmp_path / suffix).write_bytes(b"")
     (tmp_path / "DJI_0002.MP4").write_bytes(b"")
-    found = next_chapter(tmp_path / name)
-    assert (found and found.name) == following
+    chapter = next_chapter(tmp_path / name)
+    assert (chapter and chapter.name) == following
 
 
 def test_recording_of_chapters(tmp_path):

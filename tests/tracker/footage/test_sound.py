@@ -25,10 +25,10 @@ def recordings(delay_s, noise=0.3, seconds=6.0, seed=0):
 
 @pytest.mark.parametrize("delay_s", [0.01667, -0.4321, 0.00311, 1.25])
 def test_delay_of_the_same_sound(delay_s):
-    found = sound_delay(*recordings(delay_s))
-    assert found.is_clear
-    assert found.delay_s == pytest.approx(delay_s, abs=2e-5)
-    assert found.sigma_s < 0.001
+    delay = sound_delay(*recordings(delay_s))
+    assert delay.is_clear
+    assert delay.delay_s == pytest.approx(delay_s, abs=2e-5)
+    assert delay.sigma_s < 0.001
 
 
 def test_other_sound_is_not_clear():
@@ -72,9 +72,9 @@ def filmed(path, samples, rate=RATE, codec="aac"):
 def test_sound_of_videos(tmp_path):
     one, other = recordings(0.0437)
     read = [read_sound(filmed(tmp_path / f"{i}.mp4", 0.1 * s / s.std()), str(i)) for i, s in enumerate((one, other))]
-    found = sound_delay(*read)
-    assert found.is_clear
-    assert found.delay_s == pytest.approx(0.0437, abs=1e-4)
+    delay = sound_delay(*read)
+    assert delay.is_clear
+    assert delay.delay_s == pytest.approx(0.0437, abs=1e-4)
 
 
 @pytest.mark.parametrize("odd", [np.nan, np.inf])
@@ -93,17 +93,17 @@ def lit(share_by_frame, before=60.0, after=120.0, seed=0):
 
 @pytest.mark.parametrize("at", [5.0, 5.25, 7.7])
 def test_light_that_goes_on(at):
-    found = flash_of(lit([k + 1 - at for k in range(20)]))
-    assert found.is_clear
-    assert found.frame == pytest.approx(at, abs=0.05)
+    flash = flash_of(lit([k + 1 - at for k in range(20)]))
+    assert flash.is_clear
+    assert flash.frame == pytest.approx(at, abs=0.05)
 
 
 def test_person_and_noise_are_no_flash():
     levels = lit([0.0] * 20)
     for k in range(8, 20):
         levels[k][1, 1] += 60  # a bright shirt in the middle
-    found = flash_of(levels)
-    assert found is None or not found.is_clear
+    flash = flash_of(levels)
+    assert flash is None or not flash.is_clear
 
 
 def test_tiles_are_means():

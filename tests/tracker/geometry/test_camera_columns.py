@@ -31,17 +31,17 @@ def points(fisheye):
 @pytest.mark.parametrize(("distortion", "fisheye"), LENSES)
 def test_the_columns_are_the_derivatives(distortion, fisheye):
     camera, X = camera_with(distortion, fisheye), points(fisheye)
-    found = project_with_columns(camera, X)
-    np.testing.assert_allclose(found.px, camera.project(X), atol=1e-9)
-    shown = np.isfinite(found.px).all(axis=1)
+    projected = project_with_columns(camera, X)
+    np.testing.assert_allclose(projected.px, camera.project(X), atol=1e-9)
+    shown = np.isfinite(projected.px).all(axis=1)
     assert shown.sum() >= 30
     h = 1e-6
     for i in range(3):
         by = (camera.project(X + h * np.eye(3)[i]) - camera.project(X - h * np.eye(3)[i])) / (2 * h)
-        np.testing.assert_allclose(found.by_point[shown, :, i], by[shown], rtol=1e-5, atol=2e-3)
+        np.testing.assert_allclose(projected.by_point[shown, :, i], by[shown], rtol=1e-5, atol=2e-3)
     for step in np.eye(n_columns(camera)):
         by = (moved_camera(camera, h * step).project(X) - moved_camera(camera, -h * step).project(X)) / (2 * h)
-        np.testing.assert_allclose(found.by_camera[shown] @ step, by[shown], rtol=1e-5, atol=2e-3)
+        np.testing.assert_allclose(projected.by_camera[shown] @ step, by[shown], rtol=1e-5, atol=2e-3)
 
 
 @pytest.mark.parametrize("fisheye", [False, True])

@@ -111,8 +111,8 @@ def two_people(session):
 def test_people_are_matched_across_views_and_frames(rig):
     session, views = rig
     _, mixed, order = two_people(session)
-    found = match_people(views, views.undistorted(mixed[..., :2]), mixed[..., 2], 2)
-    same = found == order
+    matches = match_people(views, views.undistorted(mixed[..., :2]), mixed[..., 2], 2)
+    same = matches == order
     assert same.all() or (~same).all()
 
 
@@ -122,6 +122,6 @@ def test_a_detection_of_nobody_is_left_out(rig):
     both = np.concatenate([points, points], axis=2)
     both[:, :, 0] = (np.nan, np.nan, 0.0)
     both[:, 2, 0] = (100.0, 100.0, 0.9)  # a picture on the wall, seen by one view
-    found = match_people(views, views.undistorted(both[..., :2]), both[..., 2], 1)
-    assert (found[:, :, 1] == 0).all()
-    assert (found[:, :, 0] == -1).all()
+    matches = match_people(views, views.undistorted(both[..., :2]), both[..., 2], 1)
+    assert (matches[:, :, 1] == 0).all()
+    assert (matches[:, :, 0] == -1).all()

@@ -24,12 +24,12 @@ def distances(points, segments):
 
 
 def run(points, segments, reach):
-    found = sort_points(points.astype(np.float32), (WIDTH, HEIGHT))
-    out = np.empty(found.points.shape[1], np.float32)
+    order = sort_points(points.astype(np.float32), (WIDTH, HEIGHT))
+    out = np.empty(order.points.shape[1], np.float32)
     nearest_segment(
-        *found.points, found.rows, Segments(*segments.T.astype(np.float32).copy()), len(segments), reach, out
+        *order.points, order.rows, Segments(*segments.T.astype(np.float32).copy()), len(segments), reach, out
     )
-    return found, out
+    return order, out
 
 
 @settings(max_examples=60, deadline=None)

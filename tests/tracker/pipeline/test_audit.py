@@ -48,9 +48,9 @@ def estimate(session, store, monkeypatch):
     pose = store.pose("person", WRONG_FRAME).values.copy()
     pose[model.value_names.index("left_shoulder.elevation")] -= 1.5
     other = Hypothesis(PosedBody(model, pose), "limbs", 0.5)
-    found = Estimate(0.1, {19: LOST, WRONG_FRAME: {**LOST, "entry": MOVED, "others": (other,)}})
-    monkeypatch.setattr(audit, "estimate_run", found)
-    return found
+    held_estimate = Estimate(0.1, {19: LOST, WRONG_FRAME: {**LOST, "entry": MOVED, "others": (other,)}})
+    monkeypatch.setattr(audit, "estimate_run", held_estimate)
+    return held_estimate
 
 
 def audited(session, store, plan=PLAN):
@@ -59,7 +59,7 @@ def audited(session, store, plan=PLAN):
 
 def test_poses_are_assessed_and_stay(session, store, estimate):
     before = store.poses("person", FRAMES)
-    found = audited(session, store)
+    outcome = audited(session, store)
     (asked,) = estimate.asked
     assert (asked.stays, dict(asked.subjects.keyframes), sorted(asked.poses)) == (True, {}, [*FRAMES])
     for k in FRAMES:
@@ -69,9 +69,9 @@ def test_poses_are_assessed_and_stay(session, store, estimate):
     np.testing.assert_array_equal(
         asked.proposals[WRONG_FRAME, 0][0].pose, store.alternatives("person", WRONG_FRAME)[0].values
     )
-    assert sorted(found) == [*FRAMES]
+    assert sorted(outcome) == [*FRAMES]
     for k in set(FRAMES) - {19}:
-        pose = found[k].pose
+        pose = outcome[k].pose
         assert pose.status == ("lost" if k == WRONG_FRAME else "good")
         assert pose.errors is not None
         kept = replace(
@@ -80,10 +80,10 @@ def test_poses_are_assessed_and_stay(session, store, estimate):
         np.testing.assert_array_equal(kept.values, before[k].values)
         assert (kept.trace, kept.sources, kept.settings) == (before[k].trace, before[k].sources, before[k].settings)
         assert (kept.cost_px, before[k].cost_px) == (1.5, 1.0 + (k == WRONG_FRAME))  # by an earlier version
-    (other,) = found[WRONG_FRAME].alternatives
+    (other,) = outcome[WRONG_FRAME].alternatives
     assert other.model_revision == before[WRONG_FRAME].model_revision
-    assert not found[18].alternatives
-    assert found[WRONG_FRAME].pose.remark == "left arm may be elsewhere"
+    assert not outcome[18].alternatives
+    assert outcome[WRONG_FRAME].pose.remark == "left arm may be elsewhere"
 
 
 def test_a_keyframe_is_compared_as_others_are_and_only_its_assessment_is_stored(session, store, estimate):
@@ -98,16 +98,16 @@ def test_a_keyframe_is_compared_as_others_are_and_only_its_assessment_is_stored(
 
 def test_the_estimate_takes_the_place_of_poses_but_not_of_keyframes(session, store, estimate):
     before = store.poses("person", FRAMES)
-    found = audited(session, store, replace(PLAN, replaces=True))
+    outcome = audited(session, store, replace(PLAN, replaces=True))
     (asked,) = estimate.asked
     assert not asked.stays
     assert {k: list(own) for k, own in asked.subjects.keyframes.items()} == {19: [0]}
-    assert isinstance(found[19], AssessmentChange)
+    assert isinstance(outcome[19], AssessmentChange)
     for k in set(FRAMES) - {19}:
-        pose = found[k].pose
+        pose = outcome[k].pose
         assert pose.values[1] == pytest.approx(before[k].values[1] + 0.1)
         assert (pose.cost_px, pose.sources) == (1.5, before[k].sources)
-    assert found[WRONG_FRAME].pose.trace == (*before[WRONG_FRAME].trace, MOVED)
+    assert outcome[WRONG_FRAME].pose.trace == (*before[WRONG_FRAME].trace, MOVED)
 
 
 def test_a_pose_that_is_estimated_again_was_reviewed_or_interpolated_no_more(session, store, estimate):
@@ -115,10 +115,10 @@ def test_a_pose_that_is_estimated_again_was_reviewed_or_interpolated_no_more(ses
     own = store.pose("person", 18)
     between = replace(own, sources=("interpolated",) * len(own.values), settings={"method": "interpolate"})
     store.commit("put", [PoseChange("person", 18, between), MarkChange("person", 17, False, True)])
-    found = audited(session, store, replace(PLAN, replaces=True))
-    assert not found[17].pose.reviewed
-    assert set(found[18].pose.sources) == {"tracked"}
-    assert found[18].pose.settings == {"method": "chamfer", **asdict(PLAN.settings)}
+    outcome = audited(session, store, replace(PLAN, replaces=True))
+    assert not outcome[17].pose.reviewed
+    assert set(outcome[18].pose.sources) == {"tracked"}
+    assert outcome[18].pose.settings == {"method": "chamfer", **asdict(PLAN.settings)}
     assert audited(session, store)[17].pose.reviewed
 
 
@@ -128,13 +128,13 @@ def test_poses_of_an_earlier_body_are_compared_in_the_present_one(session, store
     before, former = store.poses("person", FRAMES), person.model
     longer = former.with_height(1.1 * former.height_m)
     resized = replace(session, people=(replace(person, model=longer),))
-    found = audited(resized, store, replace(PLAN, replaces=True))
+    outcome = audited(resized, store, replace(PLAN, replaces=True))
     (asked,) = estimate.asked
     held = retarget_pose(before[19].values, former, longer)
     assert not np.allclose(held, before[19].values)
     np.testing.assert_allclose(asked.subjects.keyframes[19][0], held)
-    np.testing.assert_array_equal(found[19].values, before[19].values)
-    revisions = {store.model_revision(found[k].pose.model_revision).toml for k in set(FRAMES) - {19}}
+    np.testing.assert_array_equal(outcome[19].values, before[19].values)
+    revisions = {store.model_revision(outcome[k].pose.model_revision).toml for k in set(FRAMES) - {19}}
     assert revisions == {format_model(longer)}
     stay = audited(resized, store)
     for k in set(FRAMES) - {19}:
@@ -149,9 +149,9 @@ def test_locked_dofs_stay_and_other_people_are_held(session, store, estimate):
     held, revision = person.model.neutral() + 0.2, store.add_model_revision("beside", format_model(person.model))
     store.commit("put", [PoseChange("beside", 18, PoseRecord(held, ("manual",) * len(held), revision, True))])
     store.set_setting("locked", {"person": ["torso.x"]})
-    found = audited(replace(session, people=(beside, person)), store, replace(PLAN, people=(1,)))
+    outcome = audited(replace(session, people=(beside, person)), store, replace(PLAN, people=(1,)))
     (asked,) = estimate.asked
-    assert {c.person for c in found.values()} == {"person"}
+    assert {c.person for c in outcome.values()} == {"person"}
     assert (asked.subjects.tracked, list(asked.subjects.keyframes)) == ((1,), [18])
     np.testing.assert_array_equal(asked.subjects.keyframes[18][0], held)
     np.testing.assert_array_equal(asked.poses[18][0], held)

@@ -165,10 +165,10 @@ def test_each_round_tracks_with_the_body_of_the_one_before(session, store, monke
 
     monkeypatch.setattr(body_acquisition, "_with_tracked", track)
     monkeypatch.setattr(body_acquisition, "acquire_from_contours", acquire)
-    found = acquire_body(session, None, 0, range(10), AcquisitionSettings(n_frames=2, rounds=4))
+    acquisition = acquire_body(session, None, 0, range(10), AcquisitionSettings(n_frames=2, rounds=4))
     assert tracked_with == pytest.approx([present.height_m, present.height_m + 0.1, present.height_m + 0.2])
     assert fitted_from == [present] * 3
-    assert found.cost_after_px == 4.0
+    assert acquisition.cost_after_px == 4.0
 
 
 @pytest.mark.parametrize("known", [True, False])

@@ -87,11 +87,11 @@ def test_feet_are_added_and_all_other_sizes_and_joints_stay(session, store):
 
 def test_back_to_a_body_without_feet(session, store):
     change_body(session, store, 0, "gavrila38")
-    found = change_body(load_session(session.folder), store, 0, "gavrila34")
-    assert format_model(found.body) == format_model(load_session(session.folder).people[0].model)
+    changed = change_body(load_session(session.folder), store, 0, "gavrila34")
+    assert format_model(changed.body) == format_model(load_session(session.folder).people[0].model)
     for name, sizes in dimensions_of(session.people[0].model).parts.items():
-        assert dimensions_of(found.body).parts[name].length_m == pytest.approx(sizes.length_m)
-    assert found.off_m < 1e-4
+        assert dimensions_of(changed.body).parts[name].length_m == pytest.approx(sizes.length_m)
+    assert changed.off_m < 1e-4
 
 
 def test_a_rigid_trunk_gives_no_sizes_to_one_that_bends():
@@ -100,9 +100,9 @@ def test_a_rigid_trunk_gives_no_sizes_to_one_that_bends():
     arm, trunk = sizes.parts["left_upper_arm"], sizes.parts["torso"]
     parts = {"left_upper_arm": arm._replace(length_m=0.4), "torso": trunk._replace(length_m=0.7)}
     person = with_dimensions(rigid, sizes._replace(parts={**sizes.parts, **parts}))
-    found = dimensions_of(with_sizes_of(load_model("gavrila38"), person))
-    assert found.parts["left_upper_arm"].length_m == pytest.approx(0.4)
-    assert found.parts["torso"] == dimensions_of(load_model("gavrila38", 1.7)).parts["torso"]
+    dimensions = dimensions_of(with_sizes_of(load_model("gavrila38"), person))
+    assert dimensions.parts["left_upper_arm"].length_m == pytest.approx(0.4)
+    assert dimensions.parts["torso"] == dimensions_of(load_model("gavrila38", 1.7)).parts["torso"]
 
 
 def test_the_same_body_is_refused_and_nothing_is_written(session, store):

@@ -132,8 +132,8 @@ def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_not
     generators = {**dict.fromkeys(GENERATORS, nothing), "mine": proposed}
     monkeypatch.setattr(first_pose, "GENERATORS", generators)
     said = []
-    found = find_first_poses_anywhere(session, OBSERVER, [0], [3], 0.05, said.append)
-    assert found.poses[0].start.source == "mine"
+    first = find_first_poses_anywhere(session, OBSERVER, [0], [3], 0.05, said.append)
+    assert first.poses[0].start.source == "mine"
     assert [text.split(":")[0] for text in said] == [f"frame 3, {name}" for name in generators]
 
 

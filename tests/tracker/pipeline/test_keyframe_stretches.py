@@ -77,16 +77,16 @@ def track(session, store, frames=range(11)):
 
 def test_poses_between_keyframes_say_how_far_the_passes_lie_apart(session, store):
     track(session, store)
-    found = store.poses("person", range(11))
-    seams = {k: record.seam_mm for k, record in found.items()}
+    poses = store.poses("person", range(11))
+    seams = {k: record.seam_mm for k, record in poses.items()}
     assert seams == {k: None if k in KEYFRAMES else 1000 * APART_M.get(k, 0.0) for k in range(11)}
-    assert found[3].settings["between"] == [0, 5]
-    assert [found[k].status for k in (2, 3, 8)] == ["good", "good", "lost"]
-    assert "uncertain: tracked from frames 5 and 10, it lies 300 mm apart" in found[8].remark
-    assert found[3].remark == ""
+    assert poses[3].settings["between"] == [0, 5]
+    assert [poses[k].status for k in (2, 3, 8)] == ["good", "good", "lost"]
+    assert "uncertain: tracked from frames 5 and 10, it lies 300 mm apart" in poses[8].remark
+    assert poses[3].remark == ""
     # half the square of the distance, along the axis on which they are apart
-    assert found[8].errors[0, 0, 0] - found[7].errors[0, 0, 0] == pytest.approx(0.3**2 / 2, rel=0.01)
-    assert {k: found[k].values[1] for k in (2, 3, 7, 8)} == pytest.approx(
+    assert poses[8].errors[0, 0, 0] - poses[7].errors[0, 0, 0] == pytest.approx(0.3**2 / 2, rel=0.01)
+    assert {k: poses[k].values[1] for k in (2, 3, 7, 8)} == pytest.approx(
         dict.fromkeys((2, 3, 7, 8), 0.01)
     )  # estimated
 

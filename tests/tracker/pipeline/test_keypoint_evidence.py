@@ -62,11 +62,11 @@ def test_people_are_found_on_a_frame_without_gross_errors(tmp_path):
         points[:7, 0, :, :, :2] += 80.0  # a view that is far off on most frames
 
     session, motions = imported(tmp_path, ("ann", "bob"), spoil=spoil)
-    found = find_by_keypoints(session, (0, 1), range(N), "net")
-    assert found.frame >= 7
-    assert set(found.poses) == {0, 1}
-    for i, first in found.poses.items():
-        assert off(first.start.body, motions[i], found.frame) < 0.05
+    start = find_by_keypoints(session, (0, 1), range(N), "net")
+    assert start.frame >= 7
+    assert set(start.poses) == {0, 1}
+    for i, first in start.poses.items():
+        assert off(first.start.body, motions[i], start.frame) < 0.05
         assert (first.status, first.start.source) == ("doubtful", "key points")
 
 
@@ -125,9 +125,9 @@ def test_evidence_is_of_the_cameras_of_the_run(tmp_path):
     session, _ = imported(tmp_path)
     views = [session.camera_names[i] for i in (3, 1)]
     seen_points = read_points(session, "net")
-    found = keypoint_evidence(session, seen_points, learn_seen_bodies(session, seen_points), views)
+    evidence = keypoint_evidence(session, seen_points, learn_seen_bodies(session, seen_points), views)
     camera = session.cameras[1].camera.pinhole
-    shown = found.in_view(4, 1, camera)[0]
+    shown = evidence.in_view(4, 1, camera)[0]
     points = read_points(session, "net")[0].known_to(session.people[0].model)
     expected = points.seen[4, 1] @ camera.K[:2, :2].T + camera.K[:2, 2]
     np.testing.assert_allclose(shown.positions_px, expected)

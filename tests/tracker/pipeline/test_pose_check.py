@@ -48,8 +48,8 @@ def assessed(run, values):
     session, poses, observer = run
     record = replace(poses[WRONG_FRAME].record, values=values, status="", limbs_lost=(), keyframe=True)
     known = {k: [p.body.values] for k, p in poses.items()} | {WRONG_FRAME: [values]}
-    found = compared_pose(session, observer, TrackSettings(), PoseInRun(WRONG_FRAME, 0, known))
-    return checked_pose(session.people[0].model, record, found)
+    comparison = compared_pose(session, observer, TrackSettings(), PoseInRun(WRONG_FRAME, 0, known))
+    return checked_pose(session.people[0].model, record, comparison)
 
 
 @pytest.mark.slow
@@ -89,7 +89,7 @@ def test_the_poses_around_are_compared_and_stay(run, monkeypatch):
         session, observer, TrackSettings(), PoseInRun(WRONG_FRAME, 0, known, [other], active),
         lambda stage, share, text="": shown.append((stage, share)),
     )  # fmt: skip
-    found = checked_pose(model, record, compared)
+    checked = checked_pose(model, record, compared)
     (asked,) = estimate.asked
     assert {at: [p.pose.tobytes() for p in own] for at, own in asked.proposals.items()} == {
         (WRONG_FRAME, 0): [other.tobytes()]
@@ -97,6 +97,6 @@ def test_the_poses_around_are_compared_and_stay(run, monkeypatch):
     assert sorted(asked.poses) == list(range(WRONG_FRAME - 8, WRONG_FRAME + 9))
     assert (asked.stays, asked.subjects.tracked, dict(asked.subjects.keyframes)) == (True, (0,), {})
     np.testing.assert_array_equal(asked.subjects.active_dofs[0], active)
-    assert (found.status, found.keyframe, found.values.tobytes()) == ("doubtful", True, record.values.tobytes())
-    assert found.remark == "left arm uncertain: elsewhere on 30% of the likely paths"
+    assert (checked.status, checked.keyframe, checked.values.tobytes()) == ("doubtful", True, record.values.tobytes())
+    assert checked.remark == "left arm uncertain: elsewhere on 30% of the likely paths"
     assert (len(shown), shown[-1]) == (17, ("comparing poses", 1.0))

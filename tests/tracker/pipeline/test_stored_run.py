@@ -64,9 +64,9 @@ def store(session):
 @pytest.fixture
 def estimate(monkeypatch):
     """Stands for the estimate: all poses move along y, frame 2 by another path."""
-    found = Estimate(MOVED_M, {2: {"entry": MOVED}})
-    monkeypatch.setattr(track_session, "estimate_run", found)
-    return found
+    held_estimate = Estimate(MOVED_M, {2: {"entry": MOVED}})
+    monkeypatch.setattr(track_session, "estimate_run", held_estimate)
+    return held_estimate
 
 
 def put(session, store, frame, x_m=0.0, source="manual", keyframe=True, index=0):

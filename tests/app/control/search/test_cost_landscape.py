@@ -15,21 +15,21 @@ def test_it_is_what_the_cost_says_one_by_one(name, controller):
     state, models = controller.state, controller.models
     views = controller.frames.evidence(0)
     dof = models[0].dof_names.index(name)
-    found = landscape(views, models, state.poses, state.settings, 0, dof)
-    assert len(found.values) == SAMPLES
-    assert found.current == state.poses[0][dof]
-    assert found.values[0] <= found.current <= found.values[-1]
+    grid = landscape(views, models, state.poses, state.settings, 0, dof)
+    assert len(grid.values) == SAMPLES
+    assert grid.current == state.poses[0][dof]
+    assert grid.values[0] <= grid.current <= grid.values[-1]
     low, high = models[0].limits[dof]
     if np.isfinite(low):
-        assert (found.values[0], found.values[-1]) == (pytest.approx(low), pytest.approx(high))
+        assert (grid.values[0], grid.values[-1]) == (pytest.approx(low), pytest.approx(high))
     cost = pose_cost(views, models, state.poses, state.settings)
     for i in range(0, SAMPLES, 20):
         pose = state.poses[0].copy()
-        pose[dof] = found.values[i]
+        pose[dof] = grid.values[i]
         one = cost((pose,))
-        assert found.totals_px[i] == pytest.approx(one.total_px, rel=1e-9)
-        np.testing.assert_allclose(found.view_costs_px[i], one.view_costs_px, rtol=1e-9)
-    assert found.current_px == pytest.approx(state.cost_px)
+        assert grid.totals_px[i] == pytest.approx(one.total_px, rel=1e-9)
+        np.testing.assert_allclose(grid.view_costs_px[i], one.view_costs_px, rtol=1e-9)
+    assert grid.current_px == pytest.approx(state.cost_px)
 
 
 def test_it_follows_the_pose_while_a_page_looks(controller):

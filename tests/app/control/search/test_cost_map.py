@@ -21,10 +21,10 @@ def dofs_of(controller):
 def test_it_is_what_the_score_says_one_by_one(controller):
     model, pose, dofs = controller.models[0], controller.state.poses[0], dofs_of(controller)
     views, bodies, settings = controller.frames.evidence(0), (PosedBody(model, pose),), controller.state.settings
-    found = cost_map(views, bodies, 0, dofs, settings)
-    assert found.nats.shape == (SAMPLES, SAMPLES)
-    assert found.current == tuple(pose[list(dofs)])
-    for dof, values in zip(dofs, (found.across, found.up), strict=True):
+    grid = cost_map(views, bodies, 0, dofs, settings)
+    assert grid.nats.shape == (SAMPLES, SAMPLES)
+    assert grid.current == tuple(pose[list(dofs)])
+    for dof, values in zip(dofs, (grid.across, grid.up), strict=True):
         assert values[0] >= model.limits[dof, 0] - 1e-9
         assert values[-1] <= model.limits[dof, 1] + 1e-9
         assert values[-1] - values[0] <= np.radians(120) + 1e-9
@@ -32,9 +32,9 @@ def test_it_is_what_the_score_says_one_by_one(controller):
     present = scorer.costs_with_priors(model, pose[None])[0]
     for row, column in ((0, 0), (7, 21), (30, 4)):
         other = pose.copy()
-        other[list(dofs)] = found.across[column], found.up[row]
+        other[list(dofs)] = grid.across[column], grid.up[row]
         cost = scorer.costs_with_priors(model, other[None])[0]
-        assert found.nats[row, column] == pytest.approx(cost - present, abs=1e-6)
+        assert grid.nats[row, column] == pytest.approx(cost - present, abs=1e-6)
 
 
 def test_it_follows_the_pose_while_a_page_looks_and_a_place_is_taken(opened):

@@ -33,9 +33,9 @@ class HeldEstimate(Estimate):
 @pytest.fixture
 def estimate(monkeypatch):
     """Stands for the estimate: each pose but keyframes moves by a step."""
-    found = Estimate(STEP_M)
-    monkeypatch.setattr(audit, "estimate_run", found)
-    return found
+    held_estimate = Estimate(STEP_M)
+    monkeypatch.setattr(audit, "estimate_run", held_estimate)
+    return held_estimate
 
 
 @pytest.fixture
@@ -122,9 +122,9 @@ def test_poses_that_change_meanwhile_keep_the_change(corrected, held):
     corrected.session_state.saver.write("clear", [PoseChange("person", 5, None)], None, by_program=True)
     held.go_on.set()
     assert done(corrected) == "estimated 6 frames"
-    found = heights(corrected)
-    assert (found[4], found[5], found[CORRECTED]) == (2.0, None, 1.0)
-    assert found[6] == pytest.approx(1.0 + STEP_M)
+    statures = heights(corrected)
+    assert (statures[4], statures[5], statures[CORRECTED]) == (2.0, None, 1.0)
+    assert statures[6] == pytest.approx(1.0 + STEP_M)
 
 
 def test_too_little_is_refused_at_once(corrected, estimate):

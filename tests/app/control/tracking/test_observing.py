@@ -81,10 +81,10 @@ def test_detected_people_are_stored_and_shown(controller, detector):
     n = controller.session.n_frames
     for name in ("detected", "detected 2"):
         controller.observing.detect()
-        found = at_rest(controller)
-        assert (found.message.strip(), found.failed) == (f"Detected people on {n} frames.", False)
-        assert found.shown.name == name
-    assert [s.name for s in found.sets] == ["detected", "detected 2"]
+        outcome = at_rest(controller)
+        assert (outcome.message.strip(), outcome.failed) == (f"Detected people on {n} frames.", False)
+        assert outcome.shown.name == name
+    assert [s.name for s in outcome.sets] == ["detected", "detected 2"]
 
 
 def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller, detector):
@@ -98,9 +98,9 @@ def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller,
 
     detector.look = look
     controller.observing.detect()
-    found = at_rest(controller)
-    assert found.message.startswith("Stopped; what was found is kept")
-    (some,) = found.sets
+    outcome = at_rest(controller)
+    assert outcome.message.startswith("Stopped; what was found is kept")
+    (some,) = outcome.sets
     assert 0 < some.n_frames < controller.session.n_frames
     controller.observing.detect()
     (whole,) = at_rest(controller).sets
@@ -141,9 +141,9 @@ def test_networks_that_are_missing_are_named_where_they_are_fetched(controller, 
     pytest.importorskip("ai_edge_litert")
     monkeypatch.setattr(observing, "default_folder", lambda: tmp_path)
     controller.observing.detect()
-    found = at_rest(controller)
-    assert found.failed
-    assert "docs/observations.md" in found.message
+    outcome = at_rest(controller)
+    assert outcome.failed
+    assert "docs/observations.md" in outcome.message
 
 
 def test_points_are_drawn_where_they_are_in_undistorted_pixels(imported):
@@ -240,8 +240,8 @@ def test_joints_are_taken_as_poses_in_one_entry_and_keyframes_stay(imported):
     drag(imported, "left_wrist", (6.0, -9.0))
     kept = imported.state.poses[0]
     imported.observing.take("openpose")
-    found = at_rest(imported)
-    assert not found.failed, found.message
+    outcome = at_rest(imported)
+    assert not outcome.failed, outcome.message
     assert imported.state.undo == "poses of openpose"
     assert (imported.state.poses[0] == kept).all()
     imported.navigation.seek(5)
@@ -258,8 +258,8 @@ def test_joints_are_taken_as_poses_in_one_entry_and_keyframes_stay(imported):
 @pytest.mark.slow
 def test_people_without_a_pose_are_placed_in_the_same_entry(imported):
     imported.observing.take("openpose")
-    found = at_rest(imported)
-    assert not found.failed, found.message
+    outcome = at_rest(imported)
+    assert not outcome.failed, outcome.message
     assert imported.state.undo == "poses of openpose"
     imported.history.undo()
     assert imported.state.undo is None

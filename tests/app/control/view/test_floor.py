@@ -93,8 +93,8 @@ def test_applied_it_is_kept_turns_who_stands_and_can_be_gone_back_from(opened, s
 def test_it_is_set_from_the_feet_and_says_so(monkeypatch, controller):
     with pytest.raises(TrackerError, match="expected poses whose feet show the floor, found none"):
         do(controller, "from_feet")
-    found = FeetFloor(GroundPlane(TILT[:, 2], HEIGHT_M), 0.004, 0.31, 12)
-    monkeypatch.setattr(floor_editing, "floor_from_feet", lambda people: found)
+    floor = FeetFloor(GroundPlane(TILT[:, 2], HEIGHT_M), 0.004, 0.31, 12)
+    monkeypatch.setattr(floor_editing, "floor_from_feet", lambda people: floor)
     do(controller, "from_feet")
     assert load_session(controller.session.folder).floor.offset_m == pytest.approx(HEIGHT_M, abs=1e-6)
     told = view_3d(controller, controller.state).floor

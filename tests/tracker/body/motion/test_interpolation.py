@@ -31,20 +31,20 @@ def test_the_ends_are_the_poses_themselves(model):
     rng = np.random.default_rng(3)
     for spread in np.linspace(0.6, 2.0, 20):
         start, end = random_pose(model, rng, spread), random_pose(model, rng, spread)
-        found = interpolate_pose(model, start, end, SHARES)
-        np.testing.assert_allclose(model.points_world(found[0]), model.points_world(start), atol=1e-9)
-        np.testing.assert_allclose(model.points_world(found[-1]), model.points_world(end), atol=1e-9)
+        path = interpolate_pose(model, start, end, SHARES)
+        np.testing.assert_allclose(model.points_world(path[0]), model.points_world(start), atol=1e-9)
+        np.testing.assert_allclose(model.points_world(path[-1]), model.points_world(end), atol=1e-9)
 
 
 def test_limbs_go_straight_and_stay_within_limits(model):
     rng = np.random.default_rng(4)
     start, end = random_pose(model, rng), random_pose(model, rng)
-    found = interpolate_pose(model, start, end, SHARES)
+    path = interpolate_pose(model, start, end, SHARES)
     limbs = model.dof_value[model.dof_joint > 0]
     straight = start[limbs] + SHARES[:, None] * (end - start)[limbs]
-    np.testing.assert_allclose(found[:, limbs], straight, atol=1e-12)
+    np.testing.assert_allclose(path[:, limbs], straight, atol=1e-12)
     far = interpolate_pose(model, random_pose(model, rng, 2.0), random_pose(model, rng, 2.0), SHARES)
-    for poses in (found, far):
+    for poses in (path, far):
         np.testing.assert_array_equal(poses, model.clip(poses))
 
 
@@ -69,8 +69,8 @@ def test_a_turn_over_the_seam_goes_the_short_way(model):
     twist = model.value_names.index(f"{model.joints[0].name}.twist")
     start, end = model.neutral(), model.neutral()
     start[twist], end[twist] = np.radians(170.0), np.radians(-170.0)
-    found = np.degrees(interpolate_pose(model, start, end, SHARES)[:, twist])
-    np.testing.assert_allclose(found, np.linspace(170.0, 190.0, 9), atol=1e-6)  # and no jump on the way
+    degrees = np.degrees(interpolate_pose(model, start, end, SHARES)[:, twist])
+    np.testing.assert_allclose(degrees, np.linspace(170.0, 190.0, 9), atol=1e-6)  # and no jump on the way
     back = np.degrees(interpolate_pose(model, end, start, SHARES)[:, twist])
     np.testing.assert_allclose(back, np.linspace(-170.0, -190.0, 9), atol=1e-6)
 

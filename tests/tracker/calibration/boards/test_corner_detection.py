@@ -28,9 +28,9 @@ def assert_at_corners(found, board, T, least):
 def test_corners_are_found_below_a_pixel(inverted, legacy):
     board = replace(CHARUCO, inverted=inverted, legacy=legacy, rows=4, columns=5)
     T = carried(board, 1, seed=2)[0]
-    found = CornerDetector(board).detect(drawn(board, CAMERA, T))
-    assert_at_corners(found, board, T, 12)
-    assert not found.from_behind
+    corners = CornerDetector(board).detect(drawn(board, CAMERA, T))
+    assert_at_corners(corners, board, T, 12)
+    assert not corners.from_behind
 
 
 def test_a_picture_in_colour_is_the_same():
@@ -67,5 +67,5 @@ def test_a_checkerboard_has_one_orientation(seed):
 
 def test_an_empty_picture_has_no_corners():
     for board in (CHARUCO, CHECKERS):
-        found = CornerDetector(board).detect(np.full((480, 640), 120, np.uint8))
-        assert len(found.ids) == len(found.px) == 0
+        corners = CornerDetector(board).detect(np.full((480, 640), 120, np.uint8))
+        assert len(corners.ids) == len(corners.px) == 0

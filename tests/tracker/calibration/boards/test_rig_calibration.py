@@ -237,14 +237,14 @@ def test_the_expected_error_is_that_of_drawn_cameras(rig):
         sigmas[start + FOCAL] = 1e-4
     world = rigid.inverse(rig.cameras[0].T_world_camera)
     points = rigid.apply(world, np.array([0.0, 0.0, 1.0]) + random.uniform(-0.4, 0.4, (60, 3)))
-    found = expected_error(cameras, np.diag(sigmas**2), points)
+    error = expected_error(cameras, np.diag(sigmas**2), points)
     errors = []
     for _ in range(60):
         step = sigmas * random.normal(size=ends[-1])
         drawn = [moved_camera(c, step[a:b]) for c, a, b in zip(cameras, ends, ends[1:], strict=False)]
         errors.append(rms_error_m(cameras, drawn, points))
-    assert np.median(errors) == pytest.approx(found.expected_m, rel=0.15)
-    inside = np.mean((np.array(errors) > found.low_m) & (np.array(errors) < found.high_m))
+    assert np.median(errors) == pytest.approx(error.expected_m, rel=0.15)
+    inside = np.mean((np.array(errors) > error.low_m) & (np.array(errors) < error.high_m))
     assert 0.8 <= inside <= 0.98
 
 
@@ -260,8 +260,8 @@ def test_moving_the_whole_rig_is_no_error(rig):
         moves[start + 3 : start + 6, :3] = -R @ rigid.skew(C)
     world = rigid.inverse(rig.cameras[0].T_world_camera)
     points = rigid.apply(world, np.array([0.0, 0.0, 1.0]) + np.random.default_rng(1).uniform(-0.4, 0.4, (40, 3)))
-    found = expected_error(cameras, moves @ moves.T, points)
-    assert found.high_m < 1e-6
+    error = expected_error(cameras, moves @ moves.T, points)
+    assert error.high_m < 1e-6
 
 
 def test_chosen_frames_are_bounded_and_diverse():

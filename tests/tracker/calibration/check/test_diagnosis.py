@@ -41,10 +41,10 @@ def test_a_known_fault_is_fitted_however_small_it_is():
     frames = viewed({2: off}, range(3))
     sizes = [SizeParameters(frames[0].bodies[0].model)]
     assert not diagnose(frames, sizes, FPS).kept
-    found = fit_fault(frames, sizes, FPS, Fault(2, "rotation"))
-    assert [k.fault for k in found.kept] == [Fault(2, "rotation")]
-    assert not np.delete(found.corrections, 2, axis=0).any()
-    left, sigma = with_step(-off, found.corrections[2])[ROTATION], found.sigmas(2)[ROTATION]
+    fitted = fit_fault(frames, sizes, FPS, Fault(2, "rotation"))
+    assert [k.fault for k in fitted.kept] == [Fault(2, "rotation")]
+    assert not np.delete(fitted.corrections, 2, axis=0).any()
+    left, sigma = with_step(-off, fitted.corrections[2])[ROTATION], fitted.sigmas(2)[ROTATION]
     assert np.all(sigma > 0)
     assert np.all(np.abs(left) < 4 * sigma)
 

@@ -25,13 +25,13 @@ def seen(sigma_px=0.0, gross=0.0, n_frames=4):
 @pytest.mark.slow
 def test_one_camera_and_one_coordinate_stay_where_they_were():
     joints = seen(1.0)
-    found = adjust_joints(CAMERAS, joints.observations(), joints.n_joints, Gauge(0, 2))
-    np.testing.assert_array_equal(found.cameras[0].T_world_camera, CAMERAS[0].T_world_camera)
-    ends, sigmas = column_ends(CAMERAS), np.sqrt(np.diag(found.fit.covariance))
+    adjusted = adjust_joints(CAMERAS, joints.observations(), joints.n_joints, Gauge(0, 2))
+    np.testing.assert_array_equal(adjusted.cameras[0].T_world_camera, CAMERAS[0].T_world_camera)
+    ends, sigmas = column_ends(CAMERAS), np.sqrt(np.diag(adjusted.fit.covariance))
     assert np.count_nonzero(sigmas[ends[0] : ends[1]]) == 0
     assert np.count_nonzero(sigmas[ends[1] : ends[2]][POSE]) == 6
     assert np.count_nonzero(sigmas[ends[2] : ends[3]][SHIFT]) == 2
-    assert found.fit.focal_sigmas.tolist() == [0, 0, 0]
+    assert adjusted.fit.focal_sigmas.tolist() == [0, 0, 0]
 
 
 @pytest.mark.slow
@@ -41,9 +41,9 @@ def test_errors_that_repeat_on_all_frames_count_once():
     offsets = 3 * np.random.default_rng(0).normal(size=(1, 3, joints.n_joints, 2))
     alone = adjust_joints(CAMERAS, joints.observations(), joints.n_joints, Gauge(0, 2))
     shifted = replace(joints, px=joints.px + offsets)
-    found = adjust_joints(CAMERAS, shifted.observations(), joints.n_joints, Gauge(0, 2))
+    adjusted = adjust_joints(CAMERAS, shifted.observations(), joints.n_joints, Gauge(0, 2))
     assert alone.share < 1.3
-    assert 4 < found.share < 8.5
+    assert 4 < adjusted.share < 8.5
 
 
 def test_cameras_that_see_no_joint_together_are_not_adjusted():
@@ -79,8 +79,8 @@ def test_lenses_of_one_model_pull_each_other():
 def test_a_focal_length_comes_from_the_joints_not_from_the_mean():
     joints = seen(0.5, n_frames=8)
     lenses = UnknownLenses(tuple(blanks(CAMERAS)), ((0, 1, 2),))
-    found = adjust_joints(CAMERAS, joints.observations(), joints.n_joints, Gauge(0, 2), lenses)
-    assert [c.K[0, 0] for c in found.cameras] == pytest.approx([500] * 3, rel=0.03)
+    adjusted = adjust_joints(CAMERAS, joints.observations(), joints.n_joints, Gauge(0, 2), lenses)
+    assert [c.K[0, 0] for c in adjusted.cameras] == pytest.approx([500] * 3, rel=0.03)
 
 
 def test_a_common_scale_is_no_error_where_the_scale_is_unknown():

@@ -27,19 +27,19 @@ def flawed(rows, camera, flaw, keeps_hull=False):
 def test_cameras_are_found_from_silhouettes_alone(has_lenses):
     rows, _ = outlined(CAMERAS, 24, noise_px=0.3)
     lenses = CAMERAS if has_lenses else blanks(CAMERAS)
-    found = calibrate_by_silhouettes(rows, lenses, STATURE_M, has_lenses)
-    a, b = (np.array([c.center_world for c in cameras]) for cameras in (found.cameras, CAMERAS))
+    calibration = calibrate_by_silhouettes(rows, lenses, STATURE_M, has_lenses)
+    a, b = (np.array([c.center_world for c in cameras]) for cameras in (calibration.cameras, CAMERAS))
     scale, R, t = aligned(a, b)
     assert np.linalg.norm(scale * a @ R.T + t - b, axis=1).max() < 0.1
     assert np.degrees(np.arccos(R[2, 2])) < 5
     assert scale == pytest.approx(1.0, abs=0.15)  # the head of spheres is low
-    assert np.median(found.held_out.px) < 1.5
-    assert found.volume.expected_m < 0.02
-    focal = np.array([c.K[0, 0] for c in found.cameras])
+    assert np.median(calibration.held_out.px) < 1.5
+    assert calibration.volume.expected_m < 0.02
+    focal = np.array([c.K[0, 0] for c in calibration.cameras])
     assert np.all(np.abs(focal / FOCAL_PX - 1) < (1e-9 if has_lenses else 0.03))
-    assert found.points == "frontier points"
-    assert abs(scale - 1) < 2 * found.scale_sigma
-    assert found.scale_sigma > 0.04  # ends of silhouettes are no points of the body
+    assert calibration.points == "frontier points"
+    assert abs(scale - 1) < 2 * calibration.scale_sigma
+    assert calibration.scale_sigma > 0.04  # ends of silhouettes are no points of the body
 
 
 @pytest.mark.parametrize(

@@ -80,11 +80,11 @@ def girths(body):
 @pytest.mark.parametrize("stoutness", [1.2, pytest.param(0.85, marks=pytest.mark.slow)])
 def test_height_and_girths_of_a_person_are_found(stoutness):
     person, model = person_of(stoutness), load_model("gavrila22", 1.78)
-    found = fit_sizes_to_voxels(SizeParameters(model), frames_of(person, model, 4), VoxelSizeSettings())
-    assert abs(found.body.height_m / stature_m(person) - 1) < 0.03
-    was, now = (np.abs(girths(b) / girths(person) - 1) for b in (model, found.body))
+    fit = fit_sizes_to_voxels(SizeParameters(model), frames_of(person, model, 4), VoxelSizeSettings())
+    assert abs(fit.body.height_m / stature_m(person) - 1) < 0.03
+    was, now = (np.abs(girths(b) / girths(person) - 1) for b in (model, fit.body))
     assert now.mean() < 0.04 < was.mean()
-    assert found.overlap_after > found.overlap_before + 0.05
+    assert fit.overlap_after > fit.overlap_before + 0.05
 
 
 @pytest.mark.slow
@@ -115,12 +115,12 @@ def test_derivatives_agree_with_differences():
 def test_the_fit_to_contours_starts_there():
     person, model = person_of(1.2), load_model("gavrila22", 1.78)
     parameters = SizeParameters(model)
-    found = fit_sizes_to_voxels(parameters, frames_of(person, model, 1), VoxelSizeSettings(rounds=1))
-    same = fit_sizes_to_contours(parameters, [], SizeFitSettings(rounds=()), found.start)
-    np.testing.assert_array_equal(same.sizes, found.sizes)
-    np.testing.assert_array_equal(same.covariance, found.covariance)
+    fit = fit_sizes_to_voxels(parameters, frames_of(person, model, 1), VoxelSizeSettings(rounds=1))
+    same = fit_sizes_to_contours(parameters, [], SizeFitSettings(rounds=()), fit.start)
+    np.testing.assert_array_equal(same.sizes, fit.sizes)
+    np.testing.assert_array_equal(same.covariance, fit.covariance)
     assert same.n_evaluations == 0
-    assert set(found.start.poses) == {0}
+    assert set(fit.start.poses) == {0}
 
 
 def test_nobody_is_seen():

@@ -60,11 +60,11 @@ def test_a_known_superquadric_is_found():
     views = noisy(own_evidence([PosedBody(true, true.neutral())], ROUND[:2]))
     sighted = SightedPerson(0, views, (PosedBody(model, model.neutral()),), 0)
     parameters = SizeParameters(model, coupled=False)  # coupled sides leave the taper from side to side
-    found = search_shapes(parameters, sighted, ChamferSearchSettings())
-    shape, expected = parameters.body(found.sizes).shapes[0], true.shapes[0]
+    result = search_shapes(parameters, sighted, ChamferSearchSettings())
+    shape, expected = parameters.body(result.sizes).shapes[0], true.shapes[0]
     np.testing.assert_allclose(shape.half_axes, expected.half_axes, rtol=0.03)
     np.testing.assert_allclose(shape.taper, expected.taper, atol=0.04)
-    assert found.chamfer_after_m < 0.01 < found.chamfer_before_m
+    assert result.chamfer_after_m < 0.01 < result.chamfer_before_m
 
 
 @pytest.mark.slow
@@ -74,14 +74,14 @@ def test_the_girths_of_another_person_are_found(model):
     sizes[~parameters.of_kinds("girth")] = 0.0
     person, pose = parameters.body(sizes), in_posture(model)
     views = noisy(own_evidence([PosedBody(person, pose)], ROUND[:2]))
-    found = search_shapes(
+    result = search_shapes(
         parameters, SightedPerson(0, views, (PosedBody(model, pose),), 0), ChamferSearchSettings()
     )  # fmt: skip
-    was, now, true = (dimensions_of(b).parts for b in (model, parameters.body(found.sizes), person))
+    was, now, true = (dimensions_of(b).parts for b in (model, parameters.body(result.sizes), person))
     parts = ("torso", "head", "left_upper_arm", "left_thigh", "left_calf")
     off = [np.mean([np.abs(np.log(np.divide(d[p].girths_m, true[p].girths_m))) for p in parts]) for d in (was, now)]
     assert off[1] < 0.04 < off[0]
-    body = parameters.body(found.sizes)
+    body = parameters.body(result.sizes)
     np.testing.assert_allclose(body.points_world(pose), model.points_world(pose))  # joints stay
 
 

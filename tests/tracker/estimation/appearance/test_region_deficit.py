@@ -12,8 +12,8 @@ def evidence(model, n=40, usual=50.0, spread=5.0):
 
 
 def of_limb(model, nats, name):
-    found = elsewhere_nats(nats, [model])
-    of_limbs = np.take_along_axis(found, worst_parts(found, [model]), axis=1)
+    elsewhere = elsewhere_nats(nats, [model])
+    of_limbs = np.take_along_axis(elsewhere, worst_parts(elsewhere, [model]), axis=1)
     return of_limbs[:, [x.name for x in limbs(model)].index(name)]
 
 

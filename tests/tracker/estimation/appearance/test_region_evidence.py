@@ -83,8 +83,10 @@ def test_a_limb_scorer_is_a_score_of_all_parts(run):
 
 def test_limbs_that_are_wrong_are_likelier_elsewhere(run):
     """Although they were learnt from; the other limbs are not."""
-    found = elsewhere_nats(np.array([run.score(k, b).nats.sum(axis=0) for k, b in enumerate(run.tracked)]), [run.model])
-    nats = np.take_along_axis(found, worst_parts(found, [run.model]), axis=1)
+    elsewhere = elsewhere_nats(
+        np.array([run.score(k, b).nats.sum(axis=0) for k, b in enumerate(run.tracked)]), [run.model]
+    )
+    nats = np.take_along_axis(elsewhere, worst_parts(elsewhere, [run.model]), axis=1)
     names = [x.name for x in limbs(run.model)]
     leg = nats[:, names.index("right_calf")]
     assert leg[run.wrong].min() > 10 > 5 > leg[~run.wrong].max()

@@ -45,9 +45,9 @@ def run(balls, frames, start, **options):
 
 def test_two_people_are_followed(balls):
     _, values, _ = balls
-    found = run(balls, range(5), values[0])
-    assert [f.frame for f in found] == [0, 1, 2, 3, 4]
-    for k, estimate in enumerate(found):
+    estimates = run(balls, range(5), values[0])
+    assert [f.frame for f in estimates] == [0, 1, 2, 3, 4]
+    for k, estimate in enumerate(estimates):
         np.testing.assert_allclose(estimate.poses, values[k], atol=1e-9)
         assert estimate.cost_px < 0.5
         assert estimate.cost_px == pytest.approx(np.mean(estimate.view_costs_px))
@@ -56,9 +56,9 @@ def test_two_people_are_followed(balls):
 
 def test_backwards(balls):
     _, values, _ = balls
-    found = run(balls, [4, 3, 2], values[4])
-    assert [f.frame for f in found] == [4, 3, 2]
-    np.testing.assert_allclose(found[-1].poses, values[2], atol=1e-9)
+    estimates = run(balls, [4, 3, 2], values[4])
+    assert [f.frame for f in estimates] == [4, 3, 2]
+    np.testing.assert_allclose(estimates[-1].poses, values[2], atol=1e-9)
 
 
 def test_keyframes_are_taken_as_they_are_and_tracking_goes_on_from_them(balls):
@@ -67,13 +67,13 @@ def test_keyframes_are_taken_as_they_are_and_tracking_goes_on_from_them(balls):
     # wandered out of reach of the search until the keyframe brings it back.
     keyframe = values[2, 0] + (0, 0, 0.013, 0.02, 0, 0)
     lost = values[0] + np.array([[0, -0.6, 0, 0, 0, 0], [0] * 6])
-    found = run(balls, range(5), lost, keyframes={2: {0: keyframe}})
-    assert np.linalg.norm(found[1].poses[0] - values[1, 0]) > 0.3
-    np.testing.assert_array_equal(found[2].poses[0], keyframe)
+    estimates = run(balls, range(5), lost, keyframes={2: {0: keyframe}})
+    assert np.linalg.norm(estimates[1].poses[0] - values[1, 0]) > 0.3
+    np.testing.assert_array_equal(estimates[2].poses[0], keyframe)
     for k in (3, 4):
-        np.testing.assert_allclose(found[k].poses[0] - values[k, 0], keyframe - values[2, 0], atol=0.051)
+        np.testing.assert_allclose(estimates[k].poses[0] - values[k, 0], keyframe - values[2, 0], atol=0.051)
     for k in range(5):  # the other one is searched throughout
-        np.testing.assert_allclose(found[k].poses[1], values[k, 1], atol=1e-9)
+        np.testing.assert_allclose(estimates[k].poses[1], values[k, 1], atol=1e-9)
 
 
 def test_a_frame_of_keyframes_alone_is_not_searched(balls):
@@ -86,8 +86,8 @@ def test_a_frame_of_keyframes_alone_is_not_searched(balls):
 
 def test_whom_to_track(balls):
     _, values, _ = balls
-    found = run(balls, range(1, 4), values[0], tracked=[1])
-    for k, estimate in enumerate(found, start=1):
+    estimates = run(balls, range(1, 4), values[0], tracked=[1])
+    for k, estimate in enumerate(estimates, start=1):
         np.testing.assert_array_equal(estimate.poses[0], values[0, 0])  # stands where it was
         np.testing.assert_allclose(estimate.poses[1], values[k, 1], atol=1e-9)
 
@@ -231,8 +231,8 @@ def test_a_keyframe_moves_what_is_locked_from_there_on(balls):
     _, values, _ = balls
     keyframe = values[2, 0] + (0, 0, 0.2, 0, 0, 0)
     free = [np.array([True, True, False] + [False] * 3), np.ones(6, dtype=bool)]
-    found = run(balls, range(5), values[0], keyframes={2: {0: keyframe}}, active_dofs=free)
-    assert [f.poses[0][2] for f in found] == [0, 0, 0.2, 0.2, 0.2]
+    estimates = run(balls, range(5), values[0], keyframes={2: {0: keyframe}}, active_dofs=free)
+    assert [f.poses[0][2] for f in estimates] == [0, 0, 0.2, 0.2, 0.2]
 
 
 @pytest.mark.slow

@@ -103,9 +103,9 @@ def test_held_unknowns_do_not_move():
 def test_an_own_unknown_that_no_residual_depends_on_stays():
     curves = Curves()
     curves.A[2, :, N + 1] = 0.0  # as the angle of a limb that no view shows
-    found = solve_bundle(curves, START, tolerance=1e-9)
-    gradient, hessian = found.equations.held(*curves.free(None, None)).reduced()
-    assert found.state[1][2, 1] == 0
+    solution = solve_bundle(curves, START, tolerance=1e-9)
+    gradient, hessian = solution.equations.held(*curves.free(None, None)).reduced()
+    assert solution.state[1][2, 1] == 0
     assert np.abs(np.linalg.solve(hessian, gradient)).max() < 1e-3
 
 
@@ -117,10 +117,10 @@ def test_the_minimum_is_scipys():
         return np.concatenate([problem.residuals(state, g)[0] for g in range(GROUPS)])
 
     expected = least_squares(residuals, np.zeros(N + GROUPS * M), xtol=1e-12, ftol=1e-12)
-    found = solve_bundle(problem, START, tolerance=1e-12)
-    assert found.cost == pytest.approx(expected.cost, rel=1e-6)
-    np.testing.assert_allclose(found.state[0], expected.x[:N], atol=1e-4)
-    assert found.cost < 0.5 * problem.linearize(START).cost
+    solution = solve_bundle(problem, START, tolerance=1e-12)
+    assert solution.cost == pytest.approx(expected.cost, rel=1e-6)
+    np.testing.assert_allclose(solution.state[0], expected.x[:N], atol=1e-4)
+    assert solution.cost < 0.5 * problem.linearize(START).cost
 
 
 def test_a_report_can_stop_it():
@@ -136,12 +136,12 @@ def test_a_fit_settles_where_the_gradient_vanishes_though_its_cost_is_rough():
     smooth, rough = solve_bundle(Curves(), START), Rough(jump=1e3)
     assert solve_bundle(rough, START).evaluations > 3
     np.testing.assert_array_equal(solve_bundle(rough, START).state[0], START[0])
-    found = settle_bundle(rough, START, 50, 1e-6)
-    np.testing.assert_allclose(found.state[0], smooth.state[0], atol=1e-2)
-    assert found.cost == pytest.approx(smooth.cost + 1e3, rel=1e-4)
+    solution = settle_bundle(rough, START, 50, 1e-6)
+    np.testing.assert_allclose(solution.state[0], smooth.state[0], atol=1e-2)
+    assert solution.cost == pytest.approx(smooth.cost + 1e3, rel=1e-4)
 
 
 def test_a_fit_does_not_settle_where_steps_promise_more_and_more():
-    found = settle_bundle(Diverging(), START, 50, 1e-6)
-    assert found.cost <= Diverging().linearize(START).cost
-    assert found.evaluations == 1
+    solution = settle_bundle(Diverging(), START, 50, 1e-6)
+    assert solution.cost <= Diverging().linearize(START).cost
+    assert solution.evaluations == 1

@@ -64,18 +64,18 @@ def test_against_rows_built_one_by_one(model, match, seed):
     views, body, _ = staged(model, seed)
     views = without_ties(views, [body], match, THETA)
     oracle = MatchOracle(views, [body], 0, match, THETA)
-    found = normal(ContourResiduals(views, [body], 0, match, THETA), body)
+    equations = normal(ContourResiduals(views, [body], 0, match, THETA), body)
     residuals, J = oracle.rows(body.values)
     assert len(residuals) > 100
-    assert found.cost == pytest.approx(oracle.cost(body.values), rel=1e-5)
+    assert equations.cost == pytest.approx(oracle.cost(body.values), rel=1e-5)
     scale = np.sqrt(np.diag(J.T @ J) + 1e-4 * (J.T @ J).max())
-    np.testing.assert_allclose(found.hessian / np.outer(scale, scale), J.T @ J / np.outer(scale, scale), atol=1e-2)
-    np.testing.assert_allclose(found.gradient / scales(found), J.T @ residuals / scales(found), atol=1e-3)
+    np.testing.assert_allclose(equations.hessian / np.outer(scale, scale), J.T @ J / np.outer(scale, scale), atol=1e-2)
+    np.testing.assert_allclose(equations.gradient / scales(equations), J.T @ residuals / scales(equations), atol=1e-3)
     # The gradient is the derivative of what the frozen matches cost.
     h = 1e-6
     sides = [[oracle.cost(model.retract(body.values, s * h * e)) for s in (1, -1)] for e in np.eye(model.n_dofs)]
     numeric = np.array([(after - before) / (2 * h) for after, before in sides])
-    np.testing.assert_allclose(found.gradient / scales(found), numeric / scales(found), atol=1e-3)
+    np.testing.assert_allclose(equations.gradient / scales(equations), numeric / scales(equations), atol=1e-3)
 
 
 @pytest.mark.slow
@@ -84,9 +84,9 @@ def test_against_rows_built_one_by_one(model, match, seed):
 def test_hessian_is_positive_semidefinite(model, match):
     for seed in range(4):
         views, body, _ = staged(model, seed, 17.0, 0.1)
-        found = normal(ContourResiduals(views, [body], 0, match), body)
-        np.testing.assert_array_equal(found.hessian, found.hessian.T)
-        assert np.linalg.eigvalsh(found.hessian).min() > -1e-9 * found.hessian.max()
+        equations = normal(ContourResiduals(views, [body], 0, match), body)
+        np.testing.assert_array_equal(equations.hessian, equations.hessian.T)
+        assert np.linalg.eigvalsh(equations.hessian).min() > -1e-9 * equations.hessian.max()
 
 
 @pytest.mark.slow
@@ -103,11 +103,11 @@ def test_gradient_is_the_slope_of_the_cost(model, match):
     for seed in range(4):
         views, body, _ = staged(model, seed)
         contour = ContourResiduals(views, [body], 0, match)
-        found = normal(contour, body)
+        equations = normal(contour, body)
         sides = [[model.retract(body.values, s * d) for s in (1, -1)] for d in np.diag(steps)]
         costs = contour.costs(np.array(sides).reshape(-1, len(body.values))).reshape(-1, 2)
         numeric = (costs[:, 0] - costs[:, 1]) / (2 * steps)
-        slopes.append([numeric / scales(found), found.gradient / scales(found)])
+        slopes.append([numeric / scales(equations), equations.gradient / scales(equations)])
     numeric, gradient = np.swapaxes(slopes, 0, 1).reshape(2, -1)
     assert np.sqrt(np.mean((numeric - gradient) ** 2)) < 0.1
     assert numeric @ gradient / (gradient @ gradient) == pytest.approx(1, abs=0.25)
@@ -124,11 +124,11 @@ def test_the_others_hide_and_draw_edges(gavrila, person, match):
     views = own_evidence([PosedBody(m, p) for m, p in zip(models, poses, strict=True)], cameras_around())
     bodies = [PosedBody(m, shaken(m, p, rng, 0.06, 0.02)) for m, p in zip(models, poses, strict=True)]
     oracle = MatchOracle(views, bodies, person, match, THETA)
-    found = normal(ContourResiduals(views, bodies, person, match, THETA), bodies[person])
+    equations = normal(ContourResiduals(views, bodies, person, match, THETA), bodies[person])
     residuals, J = oracle.rows(bodies[person].values)
-    assert found.cost == pytest.approx(oracle.cost(bodies[person].values), rel=1e-5)
-    np.testing.assert_allclose(found.gradient / scales(found), J.T @ residuals / scales(found), atol=1e-3)
-    np.testing.assert_allclose(found.hessian, J.T @ J, atol=2e-3 * (J.T @ J).max())
+    assert equations.cost == pytest.approx(oracle.cost(bodies[person].values), rel=1e-5)
+    np.testing.assert_allclose(equations.gradient / scales(equations), J.T @ residuals / scales(equations), atol=1e-3)
+    np.testing.assert_allclose(equations.hessian, J.T @ J, atol=2e-3 * (J.T @ J).max())
     # Alone it would show more, and explain more.
     together, alone = (
         ContourResiduals(views, b, i).part_costs(bodies[person].values)
@@ -262,12 +262,12 @@ def test_a_silhouette_pulls_as_far_as_it_is_trusted(trust):
 
 def test_views_without_edges_have_no_say(gavrila):
     views, body, _ = staged(gavrila)
-    found = normal(ContourResiduals(views[1:], [body]), body)
+    equations = normal(ContourResiduals(views[1:], [body]), body)
     blind = view_evidence(views[0].camera, np.zeros((480, 640), dtype=bool))
     for mixed in ((blind, *views[1:]), (views[1], blind, views[2]), (*views[1:], blind, blind)):
         match = ContourResiduals(mixed, [body])
         again = normal(match, body)
-        for a, b in zip(again, found, strict=True):
+        for a, b in zip(again, equations, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12)
         for blank in (i for i, v in enumerate(mixed) if v is blind):
             costs = match.part_costs(body.values)

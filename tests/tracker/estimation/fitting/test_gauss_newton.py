@@ -62,7 +62,7 @@ def test_blocks_against_finite_differences(kind, model, seed):
     rng = np.random.default_rng(seed)
     values = shaken(model, model.neutral(), rng, 0.3, 0.5)
     block = block_of(kind, model, values, rng)
-    found = block.linearize(model, values, model.kinematics(values))
+    equations = block.linearize(model, values, model.kinematics(values))
 
     def normal(step):
         moved = model.retract(values, step)
@@ -71,7 +71,7 @@ def test_blocks_against_finite_differences(kind, model, seed):
     h = 1e-5
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
     gradient = np.array([a.cost - b.cost for a, b in sides]) / (2 * h)
-    np.testing.assert_allclose(found.gradient, gradient, atol=(0.02 if model is ARM and kind != "points" else 1e-7))
+    np.testing.assert_allclose(equations.gradient, gradient, atol=(0.02 if model is ARM and kind != "points" else 1e-7))
     # Where nothing is left over, Gauss-Newton's second derivative is the second derivative.
     if isinstance(block, PointTargets):
         block = PointTargets(block.points, model.points_world(values)[block.points], block.weights)

@@ -42,10 +42,10 @@ def test_a_body_within_another_is_pushed_out():
 def test_bodies_that_only_touch_are_left_alone():
     for x in (0.07, 0.2, 3.0):  # flesh gives way: two fifths of the radius
         bodies = [at(ROD, 0, 0, 0), at(ROD, x, 0, 0)]
-        found = normal(BodyPenetration(bodies, 0, 1.0), bodies[0])
-        assert found.cost == 0
-        assert not found.gradient.any()
-        assert not found.hessian.any()
+        equations = normal(BodyPenetration(bodies, 0, 1.0), bodies[0])
+        assert equations.cost == 0
+        assert not equations.gradient.any()
+        assert not equations.hessian.any()
 
 
 def test_a_thin_part_within_a_thick_one_is_felt_from_both():

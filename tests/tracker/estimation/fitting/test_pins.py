@@ -28,7 +28,7 @@ def test_the_pull_of_pins_against_finite_differences(model, seed):
     values = shaken(model, model.neutral(), rng, 0.4, 0.3)
     names = rng.choice(model.point_names, 3, replace=False)
     block = pin_block(model, CAMERAS, seen(model, values, names, CAMERAS, noise_px=20.0, seed=seed))
-    found = block.linearize(model, values, model.kinematics(values))
+    equations = block.linearize(model, values, model.kinematics(values))
 
     def normal(step):
         moved = model.retract(values, step)
@@ -37,7 +37,7 @@ def test_the_pull_of_pins_against_finite_differences(model, seed):
     h = 1e-6
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
     gradient = np.array([a.cost - b.cost for a, b in sides]) / (2 * h)
-    np.testing.assert_allclose(found.gradient, gradient, rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(equations.gradient, gradient, rtol=1e-5, atol=1e-3)
     # Without anything left over, Gauss-Newton's second derivative is the second derivative.
     block = pin_block(model, CAMERAS, seen(model, values, names, CAMERAS))
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
@@ -68,9 +68,9 @@ def test_behind_a_camera_pins_stay_finite_and_exact():
 
     h = 1e-6 * np.eye(GAVRILA.n_dofs)
     gradient = np.array([cost(e) - cost(-e) for e in h]) / 2e-6
-    found = block.linearize(GAVRILA, values, GAVRILA.kinematics(values))
-    assert np.isfinite(found.cost)
-    np.testing.assert_allclose(found.gradient, gradient, rtol=1e-4, atol=1e-3 * np.abs(gradient).max())
+    equations = block.linearize(GAVRILA, values, GAVRILA.kinematics(values))
+    assert np.isfinite(equations.cost)
+    np.testing.assert_allclose(equations.gradient, gradient, rtol=1e-4, atol=1e-3 * np.abs(gradient).max())
 
 
 @pytest.mark.parametrize("model", [GAVRILA, ARM], ids=lambda m: m.name)

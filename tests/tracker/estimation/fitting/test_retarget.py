@@ -30,12 +30,12 @@ def off_m(values, becomes, was_values, was):
 def test_joints_stay_where_they_are_as_far_as_the_bones_allow(bodies, seed):
     was, becomes = bodies
     values = posed(was, seed)
-    found = retarget_pose(values, was, becomes)
+    retargeted = retarget_pose(values, was, becomes)
     assert off_m(values, becomes, values, was).max() > 0.014
     # A bone that is 15 mm longer leaves 7 mm at each end at best, unless others make room.
-    assert off_m(found, becomes, values, was).mean() < 0.007
-    assert off_m(found, becomes, values, was).max() < 0.014
-    np.testing.assert_allclose(becomes.clip(found), found, atol=1e-12)
+    assert off_m(retargeted, becomes, values, was).mean() < 0.007
+    assert off_m(retargeted, becomes, values, was).max() < 0.014
+    np.testing.assert_allclose(becomes.clip(retargeted), retargeted, atol=1e-12)
 
 
 def test_the_same_body_keeps_the_pose_to_the_last_bit(bodies):
@@ -48,10 +48,10 @@ def test_locked_dofs_stay(bodies):
     was, becomes = bodies
     values = posed(was, 1)
     free = np.array([not name.startswith("left_elbow") for name in was.dof_names])
-    found = retarget_pose(values, was, becomes, active_dofs=free)
+    retargeted = retarget_pose(values, was, becomes, active_dofs=free)
     still = was.dof_value[~free]
-    np.testing.assert_array_equal(found[still], values[still])
-    assert not np.array_equal(found, values)
+    np.testing.assert_array_equal(retargeted[still], values[still])
+    assert not np.array_equal(retargeted, values)
 
 
 def test_pins_draw_a_joint_away_from_where_it_was(bodies):

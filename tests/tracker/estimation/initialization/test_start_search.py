@@ -34,8 +34,8 @@ def test_a_trunk_that_turned_the_wrong_way_is_found_again(monkeypatch, seed):
     problem = FrameProblem(views, [PersonPrior(MODEL, wrong.values)], TrackSettings())
     refined = problem.converge(0, problem.refine(0, (wrong,))).body
     assert off_m(refined, truth) > 0.2
-    found = search_around(SimpleNamespace(), (wrong,), 0, TrackSettings())
-    assert off_m(found, truth) < 0.02
+    result = search_around(SimpleNamespace(), (wrong,), 0, TrackSettings())
+    assert off_m(result, truth) < 0.02
 
 
 @pytest.mark.parametrize(("steps_m", "n_rounds"), [((0.3, 0.05), 2), ((0.05,), 1), ((0.3, 0.3, 0.3), 2)])
@@ -49,7 +49,7 @@ def test_the_search_ends_where_nothing_moves(monkeypatch, steps_m, n_rounds):
     monkeypatch.setattr(start_search, "read_views", lambda *_: ())
     monkeypatch.setattr(start_search, "FrameProblem", lambda *_: None)
     monkeypatch.setattr(start_search, "search_start", searched)
-    found = search_around(SimpleNamespace(), (PosedBody(MODEL, MODEL.neutral()),), 0, TrackSettings())
+    result = search_around(SimpleNamespace(), (PosedBody(MODEL, MODEL.neutral()),), 0, TrackSettings())
     assert len(draws) == n_rounds
     assert min(draws) > 0
-    assert found.values[0] == pytest.approx(sum(steps_m[:n_rounds]))
+    assert result.values[0] == pytest.approx(sum(steps_m[:n_rounds]))

@@ -24,20 +24,20 @@ def directions(model, pose):
 def test_limbs_keep_their_directions(body):
     source, character = MODELS["gavrila34"], load_model(body, 1.2)
     pose = posed(source, 3)
-    found = drive_character(pose, source, character, FLOOR)
-    before, after = directions(source, pose), directions(character, found)
+    driven = drive_character(pose, source, character, FLOOR)
+    before, after = directions(source, pose), directions(character, driven)
     common = before.keys() & after.keys()
     assert len(common) == 8
     off = [np.degrees(np.arccos(np.clip(before[n] @ after[n], -1, 1))) for n in common]
     assert np.mean(off) < 6
-    np.testing.assert_array_equal(character.clip(found), found)
+    np.testing.assert_array_equal(character.clip(driven), driven)
 
 
 def test_the_same_body_has_the_same_pose():
     source = MODELS["gavrila34"]
     pose = posed(source, 1)
-    found = drive_character(pose, source, source, FLOOR)
-    np.testing.assert_allclose(source.points_world(found), source.points_world(pose), atol=0.002)
+    driven = drive_character(pose, source, source, FLOOR)
+    np.testing.assert_allclose(source.points_world(driven), source.points_world(pose), atol=0.002)
 
 
 def test_the_character_stands_on_the_floor_where_the_person_does():

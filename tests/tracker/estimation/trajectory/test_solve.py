@@ -52,14 +52,14 @@ def test_no_other_path_costs_less(monkeypatch):
     motion = MotionModel(groups, np.full(len(groups), 1e-4))
     monkeypatch.setattr(MotionModel, "learned", lambda *_: motion)
     path = path_of(poses, evidence)
-    found = solved(path)
+    solution = solved(path)
 
     def cost(steps):
-        moved = zip(found, steps.reshape(T, -1), strict=True)
+        moved = zip(solution, steps.reshape(T, -1), strict=True)
         return cost_of(path, [MODEL.clip(MODEL.retract(pose, step)) for pose, step in moved], motion)
 
     monkeypatch.setattr(solve._Solver, "_learn", lambda self, here, inverse: setattr(self, "motion", motion))
-    found = solved(path)  # without the variance that learning adds
+    solution = solved(path)  # without the variance that learning adds
     start = np.zeros(T * MODEL.n_dofs)
     best = minimize(cost, start, method="L-BFGS-B", options={"maxiter": 20})
     assert cost(start) < cost_of(path, poses, motion) - 10

@@ -106,9 +106,9 @@ def test_sizes_of_a_part_that_is_merged_with_another_count_less():
 
 def test_derivative_of_measured_rotations():
     state, other = some_state(5), some_state(6)
-    found = linearize_rotations(state, other.rotations, 0.1)
+    linearized = linearize_rotations(state, other.rotations, 0.1)
     expected = -differences(state, lambda s: linearize_rotations(s, other.rotations, 0.1).residual)
-    np.testing.assert_allclose(found.jacobian, expected, atol=1e-5)
+    np.testing.assert_allclose(linearized.jacobian, expected, atol=1e-5)
 
 
 @pytest.mark.slow
@@ -148,10 +148,10 @@ def simulated_innovations(process, noise, seed):
         turned = truth.rotations @ rigid.so3_exp(NOISE.turn * rng.normal(size=(N_PARTS, 3)))
 
         def measure(s, centers=truth.centers + offsets, rotations=turned):
-            found = linearize_rotations(s, rotations, noise.turn)
-            H = np.concatenate([s.center_jacobian.reshape(3 * N_PARTS, -1), found.jacobian])
+            linearized = linearize_rotations(s, rotations, noise.turn)
+            H = np.concatenate([s.center_jacobian.reshape(3 * N_PARTS, -1), linearized.jacobian])
             R = np.diag(np.repeat([noise.across_m**2, noise.turn**2], 3 * N_PARTS))
-            return LinearizedMeasurement(np.concatenate([(centers - s.centers).ravel(), found.residual]), H, R)
+            return LinearizedMeasurement(np.concatenate([(centers - s.centers).ravel(), linearized.residual]), H, R)
 
         result = update(predict(state, dt, process), measure)
         state, n_rows = result.state, result.n_rows

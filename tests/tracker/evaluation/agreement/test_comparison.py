@@ -141,8 +141,8 @@ def test_the_mean_pose_is_the_middle(name):
     model = MODELS[name]
     middle = random_poses(model, 2, seed=4)[1]
     step = 0.2 * np.random.default_rng(2).normal(size=model.n_dofs)
-    found = mean_pose(model, [model.retract(middle, step), model.retract(middle, -step)])
-    assert np.allclose(model.points_world(found), model.points_world(middle), atol=1e-7)
+    mean = mean_pose(model, [model.retract(middle, step), model.retract(middle, -step)])
+    assert np.allclose(model.points_world(mean), model.points_world(middle), atol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["gavrila22", "mikic10"])

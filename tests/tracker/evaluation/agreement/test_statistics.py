@@ -16,9 +16,9 @@ def test_icc_is_that_of_the_published_example():
 
 
 def test_mean_squares_are_those_of_the_published_table():
-    found = mean_squares(SHROUT_FLEISS)
-    assert (found.rows, found.columns, found.error) == pytest.approx((11.241667, 32.486111, 1.019444), abs=1e-6)
-    assert found.typical_error == pytest.approx(np.sqrt(1.0194444))
+    squares = mean_squares(SHROUT_FLEISS)
+    assert (squares.rows, squares.columns, squares.error) == pytest.approx((11.241667, 32.486111, 1.019444), abs=1e-6)
+    assert squares.typical_error == pytest.approx(np.sqrt(1.0194444))
 
 
 @pytest.mark.parametrize(("n", "k"), [(30, 2), (12, 3), (5, 4)])
@@ -62,11 +62,11 @@ def test_limits_of_agreement_and_their_intervals():
     """Bland & Altman 1986, lung function: bias -2.1 l/min, SD 38.8, n 17; the t value of 16 is 2.12."""
     raw = np.random.default_rng(0).normal(size=17)
     differences = -2.1 + 38.8 * (raw - raw.mean()) / raw.std(ddof=1)
-    found = limits_of_agreement(differences)
-    assert (found.bias, found.lower, found.upper) == pytest.approx((-2.1, -78.15, 73.95), abs=0.01)
-    assert found.bias_interval == pytest.approx((-22.0, 17.8), abs=0.1)
+    limits = limits_of_agreement(differences)
+    assert (limits.bias, limits.lower, limits.upper) == pytest.approx((-2.1, -78.15, 73.95), abs=0.01)
+    assert limits.bias_interval == pytest.approx((-22.0, 17.8), abs=0.1)
     half = 2.12 * 38.8 * np.sqrt(1 / 17 + 1.96**2 / 32)
-    assert found.lower_interval == pytest.approx((-78.15 - half, -78.15 + half), abs=0.05)
+    assert limits.lower_interval == pytest.approx((-78.15 - half, -78.15 + half), abs=0.05)
 
 
 def test_too_few_or_equal_values():

@@ -11,8 +11,8 @@ def test_the_probability_is_that_of_many_draws(distance_m, sigma_m):
     true = np.random.default_rng(0).normal(0.0, sigma_m, (100_000, 3))
     step = distance_m * np.array([0.6, 0.0, 0.8])
     expected = np.mean(np.linalg.norm(true - step, axis=1) > OFF_M)
-    found = probability_beyond(step, sigma_m**2 * np.eye(3))
-    assert float(found) == pytest.approx(expected, abs=0.006)
+    probability = probability_beyond(step, sigma_m**2 * np.eye(3))
+    assert float(probability) == pytest.approx(expected, abs=0.006)
 
 
 def test_a_tracked_limb_that_is_lost_tells_nothing():

@@ -11,9 +11,9 @@ def person(size=(480, 640)):
 
 
 def test_a_clean_silhouette_stays():
-    found = clean_silhouette(person())
-    assert np.array_equal(found.mask, person())
-    assert found.quality == 1.0
+    cleaned = clean_silhouette(person())
+    assert np.array_equal(cleaned.mask, person())
+    assert cleaned.quality == 1.0
 
 
 def test_specks_and_small_holes_go_and_lower_the_quality():
@@ -21,9 +21,9 @@ def test_specks_and_small_holes_go_and_lower_the_quality():
     changed[10:14, 10:14] = True
     changed[200:212, 290:300] = False
     changed[250, 250:350] = False  # a body that is cut in two by a thin line
-    found = clean_silhouette(changed)
-    assert np.array_equal(found.mask, person())
-    assert 0.95 < found.quality < 1.0
+    cleaned = clean_silhouette(changed)
+    assert np.array_equal(cleaned.mask, person())
+    assert 0.95 < cleaned.quality < 1.0
 
 
 def test_a_gap_between_arm_and_trunk_stays_open():
@@ -43,9 +43,9 @@ def test_two_people_stay():
 def test_nobody(specks):
     changed = np.zeros((480, 640), bool)
     changed[: 10 * specks : 10, 5] = True
-    found = clean_silhouette(changed)
-    assert not found.mask.any()
-    assert found.quality == 0.0
+    cleaned = clean_silhouette(changed)
+    assert not cleaned.mask.any()
+    assert cleaned.quality == 0.0
 
 
 def test_the_quality_falls_with_noise():

@@ -33,9 +33,9 @@ def written(folder, lay, rig=RIG):
 
 
 def assert_places(path, places=PLACES, **options):
-    found = read_cameras(path, **options)
-    np.testing.assert_allclose([e.T_world_camera for e in found.entries], places, atol=1e-6)
-    return found
+    reading = read_cameras(path, **options)
+    np.testing.assert_allclose([e.T_world_camera for e in reading.entries], places, atol=1e-6)
+    return reading
 
 
 def in_full(value):

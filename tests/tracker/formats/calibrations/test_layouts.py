@@ -62,13 +62,13 @@ def test_each_layout_has_a_writer_here():
 def test_each_layout_is_read_as_its_program_means_it(tmp_path, name):
     rig = rig_of(name)
     path = WRITERS[name](tmp_path, rig)
-    found = read_cameras(path)
-    first = assert_same(found.entries, rig)
+    reading = read_cameras(path)
+    first = assert_same(reading.entries, rig)
     if not name.startswith("Kalibr"):  # which knows no world
         np.testing.assert_allclose(first.T_world_camera, rig[0].T_world_camera, atol=1e-9)
-    assert found.left_out == {}
-    assert [e.name for e in found.entries][:2] in NAMES
-    assert all(e.size in ((640, 480), None) for e in found.entries)
+    assert reading.left_out == {}
+    assert [e.name for e in reading.entries][:2] in NAMES
+    assert all(e.size in ((640, 480), None) for e in reading.entries)
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -105,9 +105,9 @@ def test_qualisys_by_pose2sim_counts_the_lens_in_64ths(tmp_path):
 def test_a_camera_turned_in_qtm_is_left_out_by_name(tmp_path):
     path = qualisys(tmp_path, RIG)
     path.write_text(path.read_text().replace('viewrotation="0"', 'viewrotation="90"', 1))
-    found = read_cameras(path)
-    assert len(found.entries) == 3
-    assert "turned by 90 degrees" in found.left_out["cam0"]
+    reading = read_cameras(path)
+    assert len(reading.entries) == 3
+    assert "turned by 90 degrees" in reading.left_out["cam0"]
 
 
 def test_the_lens_of_vicon_is_refused_by_name(tmp_path):

@@ -202,9 +202,9 @@ def test_half_a_pose_is_no_absent_pose(tmp_path, pose, named):
 def test_a_camera_without_a_pose_is_left_out(tmp_path, absent):
     rows = {c.name: {"K": c.K, "size": c.size} | dict(zip("Rt", parts(c)[2:], strict=True)) for c in RIG}
     path = to_json(tmp_path / "c.json", rows | {"new": {"K": RIG[0].K, "size": [640, 480], **absent}})
-    found = read_cameras(path)
-    assert [e.name for e in found.entries] == ["cam0", "cam1", "cam2"]
-    assert found.notes[0] == "Camera 'new' is left out: the calibration has no pose for it."
+    reading = read_cameras(path)
+    assert [e.name for e in reading.entries] == ["cam0", "cam1", "cam2"]
+    assert reading.notes[0] == "Camera 'new' is left out: the calibration has no pose for it."
     path = to_json(path, {"new": {"K": RIG[0].K, "size": [640, 480], **absent}})
     with pytest.raises(CalibrationError, match=r"'new': expected its pose .*, found the lens alone"):
         read_cameras(path)

@@ -56,10 +56,10 @@ def assert_read(path, rig, **options):
     ],
 )
 def test_lenses_of_skeletool_are_left_out_by_name(tmp_path, change, reason):
-    found = read_cameras(changed(skeletool(tmp_path, rig_for(skeletool, RIG)), change))
-    assert [e.name for e in found.entries] == ["cam1", "cam2"]
+    reading = read_cameras(changed(skeletool(tmp_path, rig_for(skeletool, RIG)), change))
+    assert [e.name for e in reading.entries] == ["cam1", "cam2"]
 
-    assert re.search(reason, found.left_out["cam0"])
+    assert re.search(reason, reading.left_out["cam0"])
 
 
 def test_a_camera_of_skeletool_is_there_once(tmp_path):

@@ -47,9 +47,9 @@ def test_millimetres_are_offered_before_farther_centimetres(tmp_path):
 
 @pytest.mark.parametrize(("factor", "units"), [(1, None), (100, "cm"), (1000, "mm")])
 def test_the_right_unit(tmp_path, factor, units):
-    found = read_cameras(opencv_words(tmp_path, in_units(factor)), units)
-    np.testing.assert_allclose([e.T_world_camera for e in found.entries], ring(4), atol=1e-9)
-    assert found.notes == ()
+    reading = read_cameras(opencv_words(tmp_path, in_units(factor)), units)
+    np.testing.assert_allclose([e.T_world_camera for e in reading.entries], ring(4), atol=1e-9)
+    assert reading.notes == ()
 
 
 def test_squares_of_the_board_are_noted_and_no_unit_is_advised(tmp_path):
@@ -78,8 +78,8 @@ def test_the_unit_that_a_file_states(tmp_path, word, per_metre, place):
     said = {"units": word}
     whole = {"file": {"cameras": rows, **said}, "metadata": {"cameras": rows, "metadata": said}}
     path.write_text(json.dumps(whole.get(place, {name: row | said for name, row in rows.items()})))
-    found = read_cameras(path)
-    np.testing.assert_allclose([e.T_world_camera for e in found.entries], ring(4), atol=1e-9)
+    reading = read_cameras(path)
+    np.testing.assert_allclose([e.T_world_camera for e in reading.entries], ring(4), atol=1e-9)
     with pytest.raises(CalibrationError, match="unit is another"):  # the user's word goes before the file's
         read_cameras(path, "mm" if word == "cm" else "m")
 

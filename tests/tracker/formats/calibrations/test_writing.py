@@ -24,9 +24,9 @@ def test_a_layout_is_read_back(tmp_path, layout, distortion, fisheye):
     expected = rig(distortion, fisheye)
     path = tmp_path / "calibration"
     write_layout(path, layout, expected)
-    found = read_cameras(path)
-    assert found.left_out == {}
-    for i, (entry, camera) in enumerate(zip(found.entries, expected, strict=True)):
+    reading = read_cameras(path)
+    assert reading.left_out == {}
+    for i, (entry, camera) in enumerate(zip(reading.entries, expected, strict=True)):
         assert entry.name == NAMES.get(layout, "cam{}").format(i)
         assert entry.size == camera.size
         assert entry.fisheye == camera.fisheye

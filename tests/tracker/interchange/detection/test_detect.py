@@ -25,16 +25,16 @@ def run(session, detector, frames=range(N), name="net", report=lambda *_: None):
 
 def errors_m(session, motions, name="net", frames=range(N)):
     """Distances of the triangulated points from the truth, by whichever order of the people is nearer, metres."""
-    found = triangulate_observations(load_observations(session, name), [c.camera for c in session.cameras])
+    triangulation = triangulate_observations(load_observations(session, name), [c.camera for c in session.cameras])
     truth = np.stack(motions, axis=1)[frames]
-    own = found.joints.joints_world[frames]
+    own = triangulation.joints.joints_world[frames]
     return min((np.linalg.norm(own[:, order] - truth, axis=-1) for order in ([0, 1], [1, 0])), key=np.nanmean)
 
 
 def test_people_are_found_and_placed(couple):
     session, motions = couple
-    found = run(session, FakeDetector(seen(session, motions, noise_px=1.0)))
-    assert (found.is_complete, found.n_figures, found.notes) == (True, (N,) * 4, ())
+    outcome = run(session, FakeDetector(seen(session, motions, noise_px=1.0)))
+    assert (outcome.is_complete, outcome.n_figures, outcome.notes) == (True, (N,) * 4, ())
     assert np.nanmax(errors_m(session, motions)) < 0.05
 
 
@@ -70,8 +70,8 @@ def test_a_stopped_detection_goes_on_and_ends_like_one_that_was_not(couple):
         if share > 0.5:
             raise KeyboardInterrupt
 
-    found = run(session, detector, report=stop)
-    assert (found.is_complete, found.frames) == (False, range(7))
+    outcome = run(session, detector, report=stop)
+    assert (outcome.is_complete, outcome.frames) == (False, range(7))
     with pytest.raises(TrackerError, match="taken by those of detection, fake"):
         run(session, detector, range(3))
     assert run(session, detector).is_complete
@@ -98,17 +98,19 @@ def test_a_detection_that_sees_nobody_stores_nothing(couple):
 ])  # fmt: skip
 def test_other_numbers_of_people_are_noted(tmp_path, couple, people, expected):
     session = make_session(tmp_path / "other", N, people=people)
-    found = run(session, FakeDetector(seen(session, couple[1])))
-    assert (found.n_people, found.notes[0]) == (2, expected)
+    outcome = run(session, FakeDetector(seen(session, couple[1])))
+    assert (outcome.n_people, outcome.notes[0]) == (2, expected)
 
 
 def run_alone(folder, points, **missed):
     """Detect people in a session of one person, and triangulate the person who is taken."""
     session = make_session(folder / "alone", len(points), people=("ann",))
     detector = FakeDetector(points, **missed)
-    found = run(session, detector, range(len(points)))
+    outcome = run(session, detector, range(len(points)))
     observations = load_observations(session, "net")
-    return found, triangulate_observations(observations, [c.camera for c in session.cameras]).joints.joints_world[:, 0]
+    return outcome, triangulate_observations(observations, [c.camera for c in session.cameras]).joints.joints_world[
+        :, 0
+    ]
 
 
 def test_a_bystander_whom_two_views_see_is_no_person_of_the_recording(tmp_path, couple):
@@ -139,8 +141,8 @@ def test_a_view_that_places_people_somewhat_apart_sees_the_same_people(couple):
     points, aside = seen(session, motions), seen(session, [m + np.array([0.0, 0.0, 0.3]) for m in motions])
     points[:, 0], points[0, 2] = aside[:, 0], aside[0, 2]
     n_people = run(session, FakeDetector(points)).n_people
-    found = triangulate_observations(load_observations(session, "net"), [c.camera for c in session.cameras])
-    assert (found.identities >= 0).all()
+    triangulation = triangulate_observations(load_observations(session, "net"), [c.camera for c in session.cameras])
+    assert (triangulation.identities >= 0).all()
     assert n_people == 2
 
 
@@ -168,8 +170,8 @@ def test_someone_who_enters_late_is_found(couple):
     points = seen(session, [np.repeat(m, 4, axis=0) for m in motions])[: 4 * N]
     points[:20, :, 1] = -1000.0
     session = make_session(session.folder.parent / "long", 4 * N, people=("ann", "ben"))
-    found = run(session, FakeDetector(points), range(4 * N))
+    outcome = run(session, FakeDetector(points), range(4 * N))
     px = load_observations(session, "net").points.points_px
     first = np.isfinite(px[:, :, 1, 0, 0]).all(axis=1).argmax()
     assert 20 <= first <= 20 + 0.5 * session.fps
-    assert found.notes == (f"a person is seen on frames {first} to {4 * N - 1} alone",)
+    assert outcome.notes == (f"a person is seen on frames {first} to {4 * N - 1} alone",)

@@ -148,20 +148,20 @@ def _renamed(body, name):
 def test_recordings_are_divided_alike_in_any_order():
     names = [f"take_{i}" for i in range(20)]
     choice = parse_splits(["70:15:15", "take_3=test", "take_4=validation"], "--split")
-    found = divide(names, choice)
-    assert sorted(n for some in found.values() for n in some) == sorted(names)
-    assert {s: len(n) for s, n in found.items()} == {"train": 12, "validation": 4, "test": 4}
-    assert "take_3" in found["test"]
-    assert "take_4" in found["validation"]
+    stretches = divide(names, choice)
+    assert sorted(n for some in stretches.values() for n in some) == sorted(names)
+    assert {s: len(n) for s, n in stretches.items()} == {"train": 12, "validation": 4, "test": 4}
+    assert "take_3" in stretches["test"]
+    assert "take_4" in stretches["validation"]
     again = divide(names[::-1], choice)
-    assert {s: set(n) for s, n in again.items()} == {s: set(n) for s, n in found.items()}
+    assert {s: set(n) for s, n in again.items()} == {s: set(n) for s, n in stretches.items()}
     assert divide(names, SplitChoice()) == {"train": names, "validation": [], "test": []}
 
 
 @pytest.mark.parametrize(("n", "expected"), [(1, [1, 0, 0]), (2, [2, 0, 0]), (3, [1, 1, 1]), (10, [7, 2, 1])])
 def test_each_split_with_a_share_gets_a_recording_if_there_are_enough(n, expected):
-    found = divide([f"r{i}" for i in range(n)], SplitChoice((70, 15, 15)))
-    assert [len(found[s]) for s in SPLITS] == expected
+    stretches = divide([f"r{i}" for i in range(n)], SplitChoice((70, 15, 15)))
+    assert [len(stretches[s]) for s in SPLITS] == expected
 
 
 @pytest.mark.parametrize(

@@ -51,19 +51,19 @@ def written(tmp_path):
 @pytest.mark.slow
 def test_xarray_finds_the_joint_centers_and_their_provenance(written):
     session, truth, paths = written
-    found = foreign("xarray").open_dataset(paths[0])
-    assert found.position.dims == DIMENSIONS
-    assert found.confidence.dims == ("time", "keypoints", "individuals")
-    assert [found.attrs[k] for k in ("ds_type", "fps", "time_unit", "source_software")] == [
+    dataset = foreign("xarray").open_dataset(paths[0])
+    assert dataset.position.dims == DIMENSIONS
+    assert dataset.confidence.dims == ("time", "keypoints", "individuals")
+    assert [dataset.attrs[k] for k in ("ds_type", "fps", "time_unit", "source_software")] == [
         "poses", FPS, "seconds", "Quadrille"
     ]  # fmt: skip
-    assert found.space.values.tolist() == ["x", "y", "z"]
-    assert found.individuals.values.tolist() == ["ann", "bob"]
-    np.testing.assert_allclose(found.time, np.arange(2, 7) / FPS)
+    assert dataset.space.values.tolist() == ["x", "y", "z"]
+    assert dataset.individuals.values.tolist() == ["ann", "bob"]
+    np.testing.assert_allclose(dataset.time, np.arange(2, 7) / FPS)
     T = file_from_world(session, "y-up")
     for i, name in enumerate(("ann", "bob")):
         for frame in range(2, 7):
-            at = found.sel(individuals=name).isel(time=frame - 2)
+            at = dataset.sel(individuals=name).isel(time=frame - 2)
             assert int(at.frame) == frame
             if frame not in truth[i]:
                 assert np.isnan(at.position).all()
@@ -72,22 +72,22 @@ def test_xarray_finds_the_joint_centers_and_their_provenance(written):
             body = truth[i][frame]
             places = at.position.sel(keypoints=list(body.model.point_names)).transpose("keypoints", "space")
             np.testing.assert_allclose(places, rigid.apply(T, body.joint_centers_world), atol=1e-4)
-    assert found.status.sel(individuals="bob").values.tolist() == ["good", "good", "good", "lost", "good"]
-    assert set(np.unique(found.point_source)) == {"", "tracked", "manual"}
+    assert dataset.status.sel(individuals="bob").values.tolist() == ["good", "good", "good", "lost", "good"]
+    assert set(np.unique(dataset.point_source)) == {"", "tracked", "manual"}
 
 
 @pytest.mark.slow
 def test_points_of_all_views_are_where_the_footage_shows_them(written):
     session, truth, paths = written
-    found = foreign("xarray").open_dataset(paths[1])
-    assert found.position.dims == ("view", *DIMENSIONS)
-    assert found.attrs["space_unit"] == "pixels"
+    dataset = foreign("xarray").open_dataset(paths[1])
+    assert dataset.position.dims == ("view", *DIMENSIONS)
+    assert dataset.attrs["space_unit"] == "pixels"
     n_checked = 0
     for source in session.cameras:
         for frame, body in truth[0].items():
             if not 2 <= frame < 7:
                 continue
-            at = found.sel(view=source.camera.name, individuals="ann").isel(time=frame - 2)
+            at = dataset.sel(view=source.camera.name, individuals="ann").isel(time=frame - 2)
             for name, place in zip(body.model.point_names, body.joint_centers_world, strict=True):
                 px = at.position.sel(keypoints=name).values
                 assert (int(at.visibility.sel(keypoints=name)) > 0) == bool(np.isfinite(px).all())

@@ -86,8 +86,8 @@ def test_coordinates_have_the_limits_of_the_joints(tmp_path, opensim):
     model = opensim.Model(str(paths[1]))
     for name, limits in {"left_elbow_extension": (0, 155), "right_hip_flexion": (-45, 140)}.items():
         coordinate = model.getCoordinateSet().get(name)
-        found = np.degrees([coordinate.getRangeMin(), coordinate.getRangeMax()])
-        np.testing.assert_allclose(found, limits, atol=1e-6)
+        degrees = np.degrees([coordinate.getRangeMin(), coordinate.getRangeMax()])
+        np.testing.assert_allclose(degrees, limits, atol=1e-6)
         assert not coordinate.getDefaultClamped()
 
 

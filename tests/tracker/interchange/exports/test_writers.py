@@ -165,11 +165,11 @@ def test_keypoints_are_where_the_footage_shows_them(tmp_path, couple):
         camera = next(c.camera for c in session.cameras if c.camera.name == image["camera"])
         assert image["file_name"] == f"{camera.name}/{image['frame']:06d}.jpg"
         here = [i for i in (0, 1) if image["frame"] in truth[i]]
-        found = coco.loadAnns(coco.getAnnIds(imgIds=image["id"]))
-        assert sorted((a["track_id"], a["category_id"]) for a in found) == sorted(
+        annotations = coco.loadAnns(coco.getAnnIds(imgIds=image["id"]))
+        assert sorted((a["track_id"], a["category_id"]) for a in annotations) == sorted(
             (i, c) for i in here for c in (1, 2 + i)
         )
-        for row in found:
+        for row in annotations:
             body = truth[row["track_id"]][image["frame"]]
             names = coco.loadCats(row["category_id"])[0]["keypoints"]
             triples = np.array(row["keypoints"]).reshape(-1, 3)
@@ -268,11 +268,11 @@ def test_one_set_of_keypoints_of_one_person_whom_others_occlude(tmp_path, couple
     writers.write_keypoints(motion, ExportOptions(keypoints=keypoints), [tmp_path / "k.json"], no_tick)
     coco = COCO(str(tmp_path / "k.json"))
     assert [c["name"] for c in coco.loadCats(coco.getCatIds())] == names
-    found = coco.loadAnns(coco.getAnnIds())
-    assert {a["person"] for a in found} == {"ann"}
+    annotations = coco.loadAnns(coco.getAnnIds())
+    assert {a["person"] for a in annotations} == {"ann"}
     cameras = [c.camera for c in session.cameras]
     alone = [view[0] for f in (1, 2) for view in keypoints_in_views([truth[0][f]], cameras)]
-    n_visible = sum(v == 2 for a in found for v in a["keypoints"][2::3])
+    n_visible = sum(v == 2 for a in annotations for v in a["keypoints"][2::3])
     points = coco.loadCats(coco.getCatIds())[0]["keypoints"]
     at = [truth[0][1].model.point_names.index(p) for p in points if p in truth[0][1].model.point_names]
     assert 0 < n_visible < sum(np.count_nonzero(seen.visibility[at] == 2) for seen in alone)

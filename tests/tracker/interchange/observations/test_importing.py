@@ -82,10 +82,10 @@ def test_exchanged_sides_are_reported_and_mended(session, tmp_path):
         pair = [BODY_25.points.index(left), BODY_25.points.index(right)]
         points[5, 2][:, pair] = points[5, 2][:, pair[::-1]]
     observations = planned(session, write_openpose(tmp_path / "k", session.camera_names, points)).observations
-    found = triangulate_observations(observations, [c.camera for c in session.cameras])
-    assert np.argwhere(found.is_exchanged).tolist() == [[5, 0, 2, 1]]
+    triangulation = triangulate_observations(observations, [c.camera for c in session.cameras])
+    assert np.argwhere(triangulation.is_exchanged).tolist() == [[5, 0, 2, 1]]
     knee = BODY_25.points.index("LKnee")
-    assert np.abs(found.joints.joints_world[:, 0, knee] - TRUTH[:, knee]).max() < 1e-3
+    assert np.abs(triangulation.joints.joints_world[:, 0, knee] - TRUTH[:, knee]).max() < 1e-3
 
 
 @pytest.mark.parametrize("layout", ["flat", "suffix", "nested"])

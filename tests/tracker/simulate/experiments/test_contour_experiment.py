@@ -69,19 +69,19 @@ def test_errors_count_observable_angles_only():
     errors = np.radians([[1.0, 5.0, 20.0], [2.0, 8.0, 0.0]])
     observable = np.array([[True, True, False], [False, False, False]])
     px = np.zeros(2)
-    found = RunResult(np.zeros((2, 3)), errors, observable, px, px, px)
-    assert np.degrees(found.mean_error) == pytest.approx(3.0)
-    np.testing.assert_allclose(np.degrees(found.frame_errors), [3.0, np.nan])
-    assert found.lost_frames == 0
-    assert found._replace(errors=2 * errors).lost_frames == 1
+    result = RunResult(np.zeros((2, 3)), errors, observable, px, px, px)
+    assert np.degrees(result.mean_error) == pytest.approx(3.0)
+    np.testing.assert_allclose(np.degrees(result.frame_errors), [3.0, np.nan])
+    assert result.lost_frames == 0
+    assert result._replace(errors=2 * errors).lost_frames == 1
 
 
 def test_a_tracker_follows_the_own_shape():
     scene = make_scene(SMALL, "own shape", 3)
-    found = track_scene(scene, QUICK)
-    assert np.degrees(found.mean_error) < 1.5
-    assert np.all(found.after_px < 0.6)
-    assert found.before_px[1:].mean() > 2 * found.after_px.mean()
+    result = track_scene(scene, QUICK)
+    assert np.degrees(result.mean_error) < 1.5
+    assert np.all(result.after_px < 0.6)
+    assert result.before_px[1:].mean() > 2 * result.after_px.mean()
 
 
 @pytest.mark.slow

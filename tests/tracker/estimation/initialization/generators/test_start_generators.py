@@ -79,8 +79,8 @@ def test_raised_arms_do_not_make_a_person_taller(arms_deg):
     voxels, joints = figure(arms_deg=arms_deg)
     top = joints["head"] + (0.0, 0.0, 0.125)
     soles_m = joints["left_ankle"][2] - 0.07
-    found = standing_height(scene(voxels), UP, top, find_head(voxels, neighbor_graph(voxels)))
-    assert found == pytest.approx(top[2] - soles_m, abs=0.03)
+    height_m = standing_height(scene(voxels), UP, top, find_head(voxels, neighbor_graph(voxels)))
+    assert height_m == pytest.approx(top[2] - soles_m, abs=0.03)
 
 
 @pytest.mark.slow
@@ -95,8 +95,8 @@ def test_shoes_that_a_shadow_hides_do_not_make_a_person_smaller():
     assert standing_height(barefoot._replace(silhouettes=shaded), UP, top) == pytest.approx(top[2] - floor_m, abs=0.01)
     # Where one view shows the floor below the feet, the person stands on something or jumps.
     shaded[0] = barefoot.silhouettes[0]
-    found = standing_height(barefoot._replace(silhouettes=shaded), UP, top)
-    assert found == pytest.approx(top[2] - floor_m - 0.10, abs=0.03)
+    height_m = standing_height(barefoot._replace(silhouettes=shaded), UP, top)
+    assert height_m == pytest.approx(top[2] - floor_m - 0.10, abs=0.03)
 
 
 @pytest.mark.slow
