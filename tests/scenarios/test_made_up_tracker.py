@@ -19,6 +19,8 @@ from tracker.errors import TrackerError
 from tracker.estimation.by_frame.options import WHOLE_RUN
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.method import Method, Option, PaperMode
+from tracker.evidence.observer import Observer
+from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain
 from tracker.pipeline.methods import METHODS, all_options
@@ -55,15 +57,14 @@ def sonar(monkeypatch):
 def test_the_chain_drives_it(sonar, tmp_path):
     session = load_session(shutil.copytree(SAMPLE, tmp_path / "session"))
     session.annotations_path.unlink(missing_ok=True)
-    observer = SimpleNamespace(cameras=session.cameras, with_cameras=lambda chosen: None)
     sink = SimpleNamespace(report=lambda stage, share, text="": None, take=lambda run, step: None)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with closing(AnnotationStore(session.annotations_path)) as store, Recording(session.cameras) as recording:
         values = session.people[0].model.neutral()
         revision = store.add_model_revision("person", format_model(session.people[0].model))
         record = PoseRecord(values, ("manual",) * len(values), revision)
         store.commit("put", [PoseChange("person", 2, record)])
         plan = TrackPlan(range(5), (0,), SonarSettings())
-        run_chain(ChainPlan(plan), StoredSession(session, store, observer), sink)
+        run_chain(ChainPlan(plan), StoredSession(session, store, Observer(session.cameras, recording)), sink)
         assert [row.frame for row in store.frames("person")] == [0, 1, 2, 3, 4]
         record = store.pose("person", 4)
         assert record.settings["method"] == "sonar"
