@@ -1,48 +1,10 @@
 """The descriptor of the chamfer tracker."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 from tracker.estimation.by_frame.options import ORDER, RECOVER, THETA, WHOLE_RUN, WINDOW
 from tracker.estimation.chamfer.constants import PAPER_BODY
-from tracker.estimation.tracking.method import Method, Option, PaperMode
-
-if TYPE_CHECKING:
-    from tracker.body.model import BodyModel
-    from tracker.estimation.chamfer.settings import TrackSettings
-    from tracker.estimation.chamfer.tracker import ChamferTracker
-
-
-def _settings() -> "TrackSettings":
-    from tracker.estimation.chamfer.settings import TrackSettings
-
-    return TrackSettings()
-
-
-def _paper_settings() -> "TrackSettings":
-    from tracker.estimation.chamfer.paper import paper_settings
-
-    return paper_settings()
-
-
-def _require_paper_body(bodies: "Mapping[str, BodyModel]") -> None:
-    from tracker.estimation.chamfer.paper import require_paper_body
-
-    require_paper_body(bodies)
-
-
-def _tracker(settings: "TrackSettings") -> "ChamferTracker":
-    from tracker.estimation.chamfer.tracker import ChamferTracker
-
-    return ChamferTracker(settings)
-
-
-def _at_stride(settings: Any, stride: int) -> Any:
-    from tracker.estimation.by_frame.settings import at_stride
-
-    return at_stride(settings, stride)
-
+from tracker.estimation.tracking.method import Method, Option, PaperMode, later
 
 ESTIMATE = Option(
     "estimate", "Estimation",
@@ -54,6 +16,8 @@ ESTIMATE = Option(
 CHAMFER = Method(
     "chamfer", "Chamfer matching",
     "edges; predicted, refined by Gauss-Newton, and searched if that does not suffice",
-    _settings, _tracker, (ESTIMATE, ORDER, WINDOW, RECOVER, WHOLE_RUN, THETA),
-    PaperMode("Gavrila and Davis 1996", _paper_settings, PAPER_BODY, _require_paper_body), _at_stride,
+    later(__package__, "settings", "TrackSettings"), later(__package__, "tracker", "ChamferTracker"),
+    (ESTIMATE, ORDER, WINDOW, RECOVER, WHOLE_RUN, THETA),
+    PaperMode("Gavrila and Davis 1996", later(__package__, "paper", "paper_settings"), PAPER_BODY,
+    later(__package__, "paper", "require_paper_body")), later("tracker.estimation.by_frame", "settings", "at_stride"),
 )  # fmt: skip

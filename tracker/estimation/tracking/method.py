@@ -6,6 +6,7 @@ the tracker when they are called, so that help needs no kernels.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from tracker.errors import TrackerError
@@ -69,6 +70,11 @@ class Option:
             expected = f"{'a whole number' if self.kind == 'whole' else 'a number'} "
             expected += "above 0" if self.limits is None else f"from {low:g} to {high:g}"
         raise TrackerError(f"expected {expected} as '{self.name}', found {value!r}; correct it")
+
+
+def later(room: str | None, module: str, name: str) -> Callable[..., Any]:
+    """Return a function that calls one of a room's module, which is imported then: a descriptor needs no kernels."""
+    return lambda *arguments: getattr(import_module(f"{room}.{module}"), name)(*arguments)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
+from tracker.errors import Remedy, TrackerError
+from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
 
 Keyframes = Mapping[int, Mapping[int, Array]]
@@ -46,3 +48,24 @@ class Subjects:
     def keyframes_at(self, frame: int) -> Mapping[int, Array]:
         """Return the keyframes of a frame by person."""
         return self.keyframes.get(frame, {})
+
+
+def require_body(preset: str, shape: type, bodies: Mapping[str, BodyModel]) -> None:
+    """Check that people have the body of a paper, of any sizes.
+
+    Args:
+        preset: name of the body.
+        shape: kind of the shapes of its parts.
+        bodies: by name of the person.
+
+    Raises:
+        TrackerError: a person has another body.
+    """
+    dofs = load_model(preset).dof_names
+    for name, body in bodies.items():
+        if body.dof_names != dofs or not all(isinstance(s, shape) for s in body.shapes):
+            raise TrackerError(
+                f"expected the paper's body {preset} of '{name}', found {body.name} of {body.n_dofs} degrees of "
+                "freedom",
+                Remedy("paper_body", body=preset),
+            )

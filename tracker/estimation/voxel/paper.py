@@ -3,16 +3,13 @@
 The paper leaves some choices open; docs/trackers.md lists them.
 """
 
-from collections.abc import Mapping
-from functools import cache
+from functools import partial
 
-from tracker.body.model import BodyModel
-from tracker.errors import Remedy, TrackerError
+from tracker.estimation.tracking.subjects import require_body
 from tracker.estimation.voxel.constants import PAPER_BODY
 from tracker.estimation.voxel.measurement import MeasurementNoise
 from tracker.estimation.voxel.motion_model import ProcessNoise
 from tracker.estimation.voxel.settings import VoxelSettings
-from tracker.formats.model_toml import load_model
 
 PAPER_VOXEL_M = 0.05
 """Edge of the paper's voxels, metres (MTHC01 Sect. 1)."""
@@ -42,25 +39,5 @@ def paper_settings(voxel_m: float = PAPER_VOXEL_M) -> VoxelSettings:
     )
 
 
-def require_paper_body(bodies: Mapping[str, BodyModel]) -> None:
-    """Check that people have the body of MTHC01, of any sizes.
-
-    Args:
-        bodies: by name of the person.
-
-    Raises:
-        TrackerError: a person has another body.
-    """
-    for name, body in bodies.items():
-        if body.dof_names != _paper_dofs():
-            raise TrackerError(
-                f"expected the paper's body {PAPER_BODY} of '{name}', found {body.name} of {body.n_dofs} degrees of "
-                "freedom",
-                Remedy("paper_body", body=PAPER_BODY),
-            )
-
-
-@cache
-def _paper_dofs() -> tuple[str, ...]:
-    """Return the names of the degrees of freedom of the paper's body."""
-    return load_model(PAPER_BODY, 1.0).dof_names
+require_paper_body = partial(require_body, PAPER_BODY, object)
+"""Raises a TrackerError where people, by name, have another body than that of MTHC01, of any sizes."""
