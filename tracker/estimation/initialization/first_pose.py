@@ -20,6 +20,7 @@ from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.initialization.frame_ranking import ranked_frames
 from tracker.estimation.initialization.generators.person_scene import PersonScene, silhouette_axes
 from tracker.estimation.initialization.generators.start_generators import GENERATORS
+from tracker.estimation.initialization.generators.stature import HEIGHT_SIGMA
 from tracker.estimation.initialization.own_figure import others_on_frame, own_figure
 from tracker.estimation.initialization.silhouette_check import check_against_silhouettes, filling, is_cut_off
 from tracker.estimation.initialization.standing_heights import StandingHeights
@@ -42,10 +43,8 @@ ENOUGH_FRAMES = 2
 _PICTURES = 16
 """Pictures in which `auto` looks for voxels of one person, or otherwise for several: some 20 s of processor time on six
 views of 960x540, measured with simulated people."""
-HEIGHT_SIGMA = 0.02
-"""Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
-_HEIGHTS_AGREE = 3 * HEIGHT_SIGMA
-"""Largest difference of the logarithms of two heights that agree: 97% of pairs of one person do."""
+_HEIGHTS_AGREE = 2 * np.sqrt(2) * HEIGHT_SIGMA
+"""Largest difference of the logarithms of two heights that agree: 95% of pairs of one person do."""
 _LARGER = 0.02
 """Share by which some silhouette grows with what looks like shadows, above which it is worth another start."""
 

@@ -6,6 +6,7 @@ twists are refined, trunk and limbs in turn, at ever smaller spreads.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,28 +16,20 @@ from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.fitting.gauss_newton import fit_to_points, value_mask
 from tracker.estimation.fitting.hypothesis import Hypothesis, distinct
-from tracker.estimation.initialization.generators.body_axis import SHOULDERS, BodyAxis
-from tracker.estimation.initialization.generators.limb_poses import (
-    changes_around,
-    changes_within_limits,
-    moving_limbs,
-    trunk_parts,
-)
+from tracker.estimation.initialization.generators import limb_poses
+from tracker.estimation.initialization.generators.body_axis import BodyAxis
 from tracker.estimation.initialization.generators.silhouette_overlap import SilhouetteOverlap
+from tracker.estimation.initialization.generators.standing_body import typical_person
+from tracker.evidence.voxels.voxel_grid import VOXEL_M
+from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _N_TWISTS = 12
 """Twists about the axis that are tried, 30 degrees apart."""
-_FINER_RAD = tuple(np.radians([40.0, 30.0, 20.0, 15.0, 10.0, 8.0, 6.0, 4.0, 3.0]).tolist())
-"""Spreads of the poses that are tried around the best one, rad, round by round."""
 _N_FINER = 64
 """Poses that are tried around the best one of trunk and of each limb in each round, a power of two."""
-_TRUNK_SHARE, _TRUNK_M = 0.5, 0.10
-"""Spread of the trunk's directions as a share of that of the limbs, and of its place, metres per rad."""
-_N_SEARCHED = 6
-"""Twists of those that face each way that are searched on: a body looks nearly the same from behind."""
 
 
 def search_on_axes(model: BodyModel, overlap: SilhouetteOverlap, axes: Sequence[BodyAxis]) -> list[Hypothesis]:
@@ -49,12 +42,28 @@ def search_on_axes(model: BodyModel, overlap: SilhouetteOverlap, axes: Sequence[
     """
     search = _Search(model, overlap)
     coarse = sorted((h for axis in axes for h in _coarse(search, axis)), key=lambda h: h.cost)
-    ways = [[h for h in coarse if h.faces_away_from(coarse[0]) is away][:_N_SEARCHED] for away in (False, True)]
+    # A body looks nearly the same from behind: as many twists are searched on as one axis has that face each way.
+    ways = [[h for h in coarse if h.faces_away_from(coarse[0]) is away][: _N_TWISTS // 2] for away in (False, True)]
     found = []
     for start in (h for way in ways for h in way):
         pose, cost = search.refined(start.pose)
         found.append(replace(start.at(pose), cost=cost))
     return distinct(found)
+
+
+@lru_cache(maxsize=1)
+def _spreads() -> list[tuple[float, float, float]]:
+    """Return the spreads of limbs and trunk, rad, and of its place, metres, that are tried round by round.
+
+    They begin at the distance of two twists. They end where a hand moves less than a voxel. A turn of the trunk moves
+    the feet as far as a turn of an arm moves the hand. Its place changes as far as the turn moves the shoulders.
+    """
+    adult = typical_person()
+    arm_m, leg_m = adult.segments_m("arm").sum(), adult.segments_m("leg").sum()
+    turn = arm_m / (leg_m - adult.from_neck("left_hip")[2])
+    n_rounds = int(np.ceil(2 * np.log2(2 * np.pi / _N_TWISTS * arm_m / VOXEL_M)))
+    limbs_rad = (2 * np.pi / _N_TWISTS / 2 ** (k / 2) for k in range(n_rounds))
+    return [(own, turn * own, turn * own * adult.half_breadth_m) for own in limbs_rad]
 
 
 def _coarse(search: "_Search", axis: BodyAxis) -> list[Hypothesis]:
@@ -73,16 +82,16 @@ class _Search:
 
     def __init__(self, model: BodyModel, overlap: SilhouetteOverlap) -> None:
         self.model, self._overlap = model, overlap
-        self._limbs, self._parts = moving_limbs(model), np.arange(len(model.parts))
+        self._limbs, self._parts = limb_poses.moving_limbs(model), np.arange(len(model.parts))
         self._root = np.flatnonzero(model.dof_joint == 0)
 
     def limbs_placed(self, pose: Array) -> tuple[Array, float]:
         """Search the limbs all over their joint limits; return the pose and its cost."""
-        model, trunk = self.model, trunk_parts(self.model)
+        model, trunk = self.model, limb_poses.trunk_parts(self.model)
         covered = self._overlap.nothing()
         Ts = model.kinematics(pose).Ts_world_part
         costs = 1 + self._overlap.cover(Ts[trunk], trunk, covered)
-        for limb, changes in zip(self._limbs, changes_within_limits(model), strict=True):
+        for limb, changes in zip(self._limbs, limb_poses.changes_within_limits(model), strict=True):
             poses = self._with_limb(pose, limb, model.clip(model.retract(model.neutral(), changes)))
             totals, view_costs = self._costs(pose, limb, poses, covered, costs)
             best = int(np.argmin(totals))
@@ -93,14 +102,14 @@ class _Search:
     def refined(self, pose: Array) -> tuple[Array, float]:
         """Search around a pose, trunk and limbs in turn; see `limbs_placed`."""
         model, best = self.model, self._total(pose[None])[0]
-        for spread in _FINER_RAD:
-            steps = changes_around(model, self._root, _N_FINER, _TRUNK_SHARE * spread, _TRUNK_M * spread)
+        for spread, trunk_rad, trunk_m in _spreads():
+            steps = limb_poses.changes_around(model, self._root, _N_FINER, trunk_rad, trunk_m)
             poses = model.clip(model.retract(pose, steps))
             totals = self._total(poses)
             if totals.min() < best:
                 pose, best = poses[int(np.argmin(totals))], totals.min()
             for limb in self._limbs:
-                steps = changes_around(model, np.flatnonzero(limb.dofs), _N_FINER, spread)
+                steps = limb_poses.changes_around(model, np.flatnonzero(limb.dofs), _N_FINER, spread)
                 near, cost = self._best_of_limb(pose, limb, model.clip(model.retract(pose, steps)))
                 if cost < best:
                     pose, best = near, cost
@@ -161,7 +170,8 @@ def _trunk(model: BodyModel, axis: BodyAxis, R: Array, near: Array | None) -> Ar
     """
     own = model.named_points_world(model.neutral())
     middle = (own["left_shoulder"] + own["right_shoulder"]) / 2
-    place = rigid.transform(R, axis.top - SHOULDERS * model.height_m * axis.up)
+    person = typical_person(model.height_m / DEFAULT_HEIGHT_M)
+    place = rigid.transform(R, axis.top - person.below_crown_m("left_shoulder") * axis.up)
     known = {n: rigid.apply(place, p - middle) for n, p in own.items()}
     start = near if near is not None else fit_to_points(model, {n: known[n] for n in _TRUNK if n in known}).pose
     return fit_to_points(model, known, start).pose

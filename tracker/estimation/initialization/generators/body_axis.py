@@ -7,28 +7,13 @@ import numpy as np
 
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.initialization.generators.silhouette_axis import MajorAxis
+from tracker.estimation.initialization.generators.standing_body import StandingBody
+from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.geometry.arrays import Array
 
 _MAX_OFF_RAD = np.radians(20)
-"""Largest angle between the axis and the plane of a view that agrees with the others."""
-_MIN_APART = 0.2
-"""Smallest spread of the planes, as a sine: views from opposite sides have the same plane."""
-_CENTER_WEIGHT = 0.1
-"""Weight of the rays through the silhouettes' centres against the planes. They only give the place along the axis."""
-_BIN_M = 0.02
-"""Width of the bins along the axis in which the silhouettes' widths are measured, metres."""
-_LATERAL_M = 0.40
-"""Points of a silhouette farther aside of the axis are not counted, metres."""
-_HEAD = ((-0.08, 0.0, 0.0), (0.0, 0.02, 0.065), (0.02, 0.105, 0.100), (0.105, 0.135, 0.080))
-"""Nothing, crown, head and neck: begin and end below the top and the width of their silhouettes, as fractions of the
-height."""
-_SHOULDERS = (0.18, 0.32, 0.16)
-"""The same for the trunk below, which may be wider."""
-SHOULDERS = 0.185
-"""Distance of the shoulders' joint centres below the top of the head, as a fraction of the height (P. de Leva 1996, J.
-Biomech. 29:1223)."""
-_MAX_MISFIT = 0.035
-"""Largest mean difference of the widths from those of a head, as a fraction of the height."""
+"""Largest angle between the axis and the plane of a view that agrees with the others. Planes that are as near to each
+other are the same, as those of views from opposite sides: they determine no axis."""
 
 
 class BodyAxis(NamedTuple):
@@ -39,20 +24,20 @@ class BodyAxis(NamedTuple):
     top: Array
     """Top of the head, on the axis, (3,), metres."""
     misfit: float
-    """Mean difference of the widths along the axis from those of a head, as a fraction of the height."""
+    """Mean difference of the widths along the axis from those of the body's head, metres."""
     views: tuple[MajorAxis, ...]
     """The axes of all views that are used."""
     left_out: tuple[str, ...]
     """Names of views whose axis contradicts the others."""
 
 
-def find_body_axes(axes: Sequence[MajorAxis], up: Array, height_m: float) -> list[BodyAxis]:
+def find_body_axes(axes: Sequence[MajorAxis], up: Array, body: StandingBody) -> list[BodyAxis]:
     """Return the axis of a body with each place that may be its head, the best first.
 
     Args:
         axes: of the silhouettes of one person.
         up: vertical axis of the world, (3,); of two heads that fit alike, the upper one is first.
-        height_m: of the person, as far as it is known.
+        body: of the person, as far as it is known.
 
     Raises:
         TrackerError: fewer than two views from different sides agree, or no head is found along the axis.
@@ -64,11 +49,10 @@ def find_body_axes(axes: Sequence[MajorAxis], up: Array, height_m: float) -> lis
     center = _center(used, direction)
     found = []
     for sign in (1.0, -1.0):
-        along, widths = _profile(used, center, sign * direction, height_m)
-        for top_m, misfit in _heads(along, widths, height_m):
-            if misfit <= _MAX_MISFIT:
-                top = center + sign * top_m * direction
-                found.append(BodyAxis(sign * direction, top, misfit, used, left_out))
+        along, widths = _profile(used, center, sign * direction, body)
+        for top_m, misfit in _heads(along, widths, body):
+            top = center + sign * top_m * direction
+            found.append(BodyAxis(sign * direction, top, misfit, used, left_out))
     if not found:
         raise TrackerError(
             "expected a head along the silhouettes' axis, found none",
@@ -104,7 +88,7 @@ def _common_direction(axes: Sequence[MajorAxis]) -> tuple[Array, float] | None:
     planes are nearly the same."""
     planes = np.array([a.elongation * a.normal_world for a in axes])
     _, spreads, directions = np.linalg.svd(planes)
-    if spreads[1] < _MIN_APART * spreads[0]:
+    if spreads[1] < np.tan(_MAX_OFF_RAD / 2) * spreads[0]:
         return None
     off = max(abs(float(np.arcsin(np.clip(a.normal_world @ directions[2], -1, 1)))) for a in axes)
     return directions[2], off
@@ -112,13 +96,12 @@ def _common_direction(axes: Sequence[MajorAxis]) -> tuple[Array, float] | None:
 
 def _center(axes: Sequence[MajorAxis], direction: Array) -> Array:
     """Return the point nearest to all planes, and along the axis nearest to the rays through the centres, (3,)."""
-    A, b = np.zeros((3, 3)), np.zeros(3)
-    for a in axes:
-        eye, normal = a.camera.center_world, a.normal_world
-        ray = a.camera.rays(a.lines_px[-1].mean(axis=0))
-        M = a.elongation * np.outer(normal, normal) + _CENTER_WEIGHT * (np.eye(3) - np.outer(ray, ray))
-        A, b = A + M, b + M @ eye
-    return np.asarray(np.linalg.solve(A, b), dtype=np.float64)
+    eyes = np.array([a.camera.center_world for a in axes])
+    planes = np.array([a.elongation * np.outer(a.normal_world, a.normal_world) for a in axes])
+    center = np.linalg.solve(planes.sum(axis=0) + np.outer(direction, direction), np.einsum("nij,nj->i", planes, eyes))
+    rays = np.array([a.camera.rays(a.lines_px[-1].mean(axis=0)) for a in axes])
+    across = direction - (rays @ direction)[:, None] * rays
+    return np.asarray(center + np.sum(across * (eyes - center)) / np.sum(across @ direction) * direction)
 
 
 def _along(axis: MajorAxis, center: Array, direction: Array) -> tuple[Array, Array, Array]:
@@ -131,42 +114,59 @@ def _along(axis: MajorAxis, center: Array, direction: Array) -> tuple[Array, Arr
     d = rays @ direction
     w = eye - center
     # Nearest points of two lines: the viewing ray and the axis.
-    s = (w @ direction - d * (rays @ w)) / np.maximum(1e-6, 1 - d * d)
+    across = np.maximum(np.sin(_MAX_OFF_RAD) ** 2, 1 - d * d)  # of a ray along the axis: the axis may be as far off
+    s = (w @ direction - d * (rays @ w)) / across
     t = s * d - rays @ w
     lateral = np.linalg.norm(w + t[:, None] * rays - s[:, None] * direction, axis=1)
-    tilt = np.sqrt(np.maximum(0.05, 1 - d * d))
-    return s, lateral, (t / axis.camera.K[0, 0]) ** 2 / tilt
+    return s, lateral, (t / axis.camera.K[0, 0]) ** 2 / np.sqrt(across)
 
 
-def _profile(axes: Sequence[MajorAxis], center: Array, direction: Array, height_m: float) -> tuple[Array, Array]:
-    """Return the mean width of the silhouettes along the axis: the middles of bins and the widths, (n,), metres."""
-    edges = np.arange(-1.2 * height_m, 1.2 * height_m, _BIN_M)
+def _profile(axes: Sequence[MajorAxis], center: Array, direction: Array, body: StandingBody) -> tuple[Array, Array]:
+    """Return the mean width of the silhouettes along the axis: the middles of bins and the widths, (n,), metres.
+
+    Arms that are spread farther than the body is broad are left out.
+    """
+    edges = np.arange(-body.height_m, body.height_m, VOXEL_M)
     widths = []
     for axis in axes:
         s, lateral, areas = _along(axis, center, direction)
-        near = lateral < _LATERAL_M
+        near = lateral < body.half_breadth_m
         # The points are a sample: each stands for as many pixels as it was drawn from.
         share = axis.n_pixels / len(axis.points_px)
-        widths.append(np.histogram(s[near], edges, weights=share * areas[near])[0] / _BIN_M)
+        widths.append(np.histogram(s[near], edges, weights=share * areas[near])[0] / VOXEL_M)
     return (edges[1:] + edges[:-1]) / 2, np.median(widths, axis=0)
 
 
-def _heads(along: Array, widths: Array, height_m: float) -> list[tuple[float, float]]:
-    """Return where along the axis the top of a head may be, metres, and how far the widths are from those of a head.
+def _template(body: StandingBody) -> tuple[Array, Array]:
+    """Return the widths from a head's length above the crown, where nothing is, to one below the shoulders."""
+    below_m, widths_m = body.profile
+    own = below_m < body.below_crown_m("left_shoulder") + body.head_m
+    above = np.arange(-body.head_m, 0.0, VOXEL_M)
+    return (np.append(above, below_m[own]), np.append(np.zeros(len(above)), widths_m[own]))
 
-    These are the minima of the difference, no two of them within a head's length.
+
+def _heads(along: Array, widths: Array, body: StandingBody) -> list[tuple[float, float]]:
+    """Return where along the axis the top of a head may be, and how far the widths are from the body's, metres.
+
+    These are the minima of the difference, no two of them within a head's length. Trunks may be wider than the body's.
+    There is no head where the end of a pillar of even width, within a head's length, fits better.
     """
-    relative = widths / height_m
-    misfits = np.full(len(along), np.inf)
-    a, b, least = _SHOULDERS
-    for i, top in enumerate(along):
-        below = (top - along) / height_m
-        terms = [np.abs(relative[(below > a) & (below <= b)] - width) for a, b, width in _HEAD]
-        terms.append(np.maximum(0.0, least - relative[(below > a) & (below <= b)]))
-        if all(len(t) for t in terms):
-            misfits[i] = np.mean([t.mean() for t in terms])
+    from scipy.ndimage import minimum_filter1d  # imported lazily: loading scipy takes 0.2 s
+
+    below_m, expected_m = _template(body)
+    order = np.argsort(along)
+    places = along[:, None] - below_m
+    measured = np.interp(places, along[order], widths[order])
+    pillars = np.where(below_m > 0, np.median(measured[:, below_m > 0], axis=1)[:, None], 0.0)
+    off = measured - expected_m
+    is_trunk = below_m > body.below_crown_m("left_shoulder")
+    misfits = np.where(is_trunk, np.maximum(0.0, -off), np.abs(off)).mean(axis=1)
+    is_within = (places.min(axis=1) >= along.min()) & (places.max(axis=1) <= along.max())
+    of_pillars = np.where(is_within, np.abs(measured - pillars).mean(axis=1), np.inf)
+    nearby = minimum_filter1d(of_pillars, 1 + 2 * round(body.head_m / VOXEL_M))
+    misfits[~is_within | (misfits >= nearby)] = np.inf
     found: list[tuple[float, float]] = []
     for i in np.argsort(misfits, kind="stable"):
-        if np.isfinite(misfits[i]) and all(abs(along[i] - top) > _HEAD[-1][1] * height_m for top, _ in found):
+        if np.isfinite(misfits[i]) and all(abs(along[i] - top) > body.head_m for top, _ in found):
             found.append((float(along[i]), float(misfits[i])))
     return found

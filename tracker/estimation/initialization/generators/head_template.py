@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.estimation.initialization.generators.standing_body import typical_person
 from tracker.evidence.voxels.paths import VoxelGraph, path_lengths
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
@@ -21,9 +22,9 @@ class Template(NamedTuple):
     """A crust that holds the surface of a head, and the shell around it."""
 
     inner_m: float
-    """Inner radius of the crust, metres."""
+    """Inner radius of the crust, metres: half the smallest dimension of a head."""
     outer_m: float
-    """Outer radius of the crust, metres."""
+    """Outer radius of the crust, metres: half the largest dimension."""
     surrounding_m: float
     """Outer radius of the shell in which a head has only its neck, metres."""
     min_score: float
@@ -35,17 +36,12 @@ _TEMPLATES = (Template(0.07, 0.135, 0.20, 0.25), Template(0.055, 0.11, 0.13, 0.5
 """In the order in which they are tried. The first has half the smallest and half the largest dimension of an adult's
 head. Hands and feet in the hull of few views do not pass its wide shell. The second also fits heads beside an arm, and
 heads of children, whose shoulders are near."""
-_MAX_PIECE = 0.02
-"""Largest share of a figure's voxels that may be cut off from the rest without the head: hair and stray voxels."""
-_TRIED = 5
-"""Number of places that are tried, from the highest score down."""
-_UPPER_M, _MIN_UPPER_SCORE = 0.35, 0.4
-"""Depth of the upper end of a figure below its highest voxel, metres, and the smallest score of a head there."""
+_MIN_UPPER_SCORE = 0.4
+"""Smallest score of a head at the upper end of a figure."""
 _ADULT_M3 = 0.10
 """Volume of the visual hull of a typical adult, cubic metres."""
-_RADIUS_M = (0.0945, 0.0405)
-"""Distance from the centre within which voxels belong to the head, metres: a constant, and a slope by the size of the
-person as a share of an adult's, because heads grow less than bodies."""
+STRAY = 0.02
+"""Largest share of a figure's voxels that is no part of it: hair and stray voxels."""
 
 
 class Head(NamedTuple):
@@ -55,6 +51,8 @@ class Head(NamedTuple):
     """Centre of its voxels, (3,), metres."""
     neck: Array
     """Mean of its voxels that touch the rest of the body, (3,), metres."""
+    joint_below_m: float
+    """Depth of the joint of the neck below these, metres."""
     is_head: NDArray[np.bool_]
     """Whether each voxel of the figure belongs to it, (N,)."""
     score: float
@@ -72,7 +70,7 @@ def find_head(figure: Voxels, graph: VoxelGraph) -> Head | None:
         figure: voxels of one person, at most about 5 cm each.
         graph: their `neighbor_graph`.
     """
-    place = next((p for t in _TEMPLATES for p in _ends(figure, t, _scores(figure, t), t.min_score)), None)
+    place = next((p for t in _TEMPLATES for p in _ends(figure, _scores(figure, t), t)), None)
     return None if place is None else _head(figure, graph, place)
 
 
@@ -86,9 +84,10 @@ def find_upper_head(figure: Voxels, graph: VoxelGraph, up: Array) -> Head | None
         graph: their `neighbor_graph`.
         up: vertical axis of the world, (3,).
     """
-    heights, template = figure.points_world @ up, _TEMPLATES[-1]
-    scores = np.where(heights > heights.max() - _UPPER_M, _scores(figure, template), -np.inf)
-    place = next(_ends(figure, template, scores, _MIN_UPPER_SCORE), None)
+    heights, (adult, template) = figure.points_world @ up, _TEMPLATES
+    upper_m = 2 * adult.outer_m  # a head's length
+    scores = np.where(heights > heights.max() - upper_m, _scores(figure, template), -np.inf)
+    place = next(_ends(figure, scores, template._replace(min_score=_MIN_UPPER_SCORE)), None)
     return None if place is None else _head(figure, graph, place)
 
 
@@ -120,13 +119,10 @@ def _scores(figure: Voxels, template: Template) -> Array:
     return np.asarray(counts[tuple(figure.indices.T)] / expected)
 
 
-def _ends(figure: Voxels, template: Template, scores: Array, min_score: float) -> Iterator[_Place]:
+def _ends(figure: Voxels, scores: Array, template: Template) -> Iterator[_Place]:
     """Yield the places that are ends of a figure and score enough, from the highest score down."""
     points, left = figure.points_world, scores.copy()
-    for _ in range(_TRIED):
-        best = int(np.argmax(left))
-        if left[best] < min_score:
-            return
+    while left[best := int(np.argmax(left))] >= template.min_score:
         distances = np.linalg.norm(points - points[best], axis=1)
         is_near = distances <= template.outer_m
         if _is_end(figure, is_near):
@@ -141,12 +137,13 @@ def _head(figure: Voxels, graph: VoxelGraph, place: _Place) -> Head | None:
     path_m = place.radius_m + float(lengths[np.isfinite(lengths)].max())
     # A person cut off by an image has short paths, yet the volume of more than a child.
     scale = min(1.0, max(path_m / DEFAULT_HEIGHT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
-    constant, slope = _RADIUS_M
-    is_head = place.distances <= constant + slope * scale
+    is_head = place.distances <= typical_person(scale).head_radius_m + figure.grid.size_m / 2
     neck = _neck(figure, is_head)
     if neck is None:
         return None
-    return Head(points[is_head].mean(axis=0), neck, is_head, place.score, path_m, scale)
+    center = points[is_head].mean(axis=0)
+    below_m = typical_person(scale).neck_m - float(np.linalg.norm(neck - center))
+    return Head(center, neck, below_m, is_head, place.score, path_m, scale)
 
 
 def _is_end(figure: Voxels, is_head: NDArray[np.bool_]) -> bool:
@@ -154,7 +151,7 @@ def _is_end(figure: Voxels, is_head: NDArray[np.bool_]) -> bool:
     rest = figure.without(is_head)
     largest = rest.components(min_share=1.0)[:1]
     cut_off = len(rest.indices) - sum(len(v.indices) for v in largest)
-    return bool(largest) and cut_off <= _MAX_PIECE * len(is_head)
+    return bool(largest) and cut_off <= STRAY * len(is_head)
 
 
 def _neck(figure: Voxels, is_head: NDArray[np.bool_]) -> Array | None:

@@ -18,8 +18,6 @@ _USUAL_RAD = np.radians(60)
 """Largest angle from hanging of half of these poses, rad: most limbs hang more or less."""
 _HELD = 0.3
 """Share of the spread that joints of little spread take, such as collarbones."""
-_INSIDE = 0.8
-"""Value of a shape's implicit function below which a point lies within it; 1 is the surface, and flesh gives way."""
 
 
 def moving_limbs(model: BodyModel) -> tuple[Limb, ...]:
@@ -86,11 +84,11 @@ def _in_trunk(model: BodyModel, limb: Limb, poses: Array) -> NDArray[np.bool_]:
     """Return for which poses, (n,), the lower half of a limb lies in the trunk or head of the neutral pose."""
     rest, inside = model.kinematics(model.neutral()), np.zeros(len(poses), bool)
     last = int(limb.parts[-1])
-    ends = model.shapes[last].half_axes[2] * np.array([0.7, 0.0, -0.9])
+    ends = model.shapes[last].half_axes[2] * np.linspace(-1, 1, 3)
     Ts = chain_poses(model.tree, rest, limb.parts, poses)[:, -1]
     for end in ends:
         points = Ts[:, :3, :3] @ (model.centers_part[last] + np.array([0.0, 0.0, end])) + Ts[:, :3, 3]
         for part in trunk_parts(model):
             local = rigid.apply(rigid.inverse(rest.Ts_world_part[part]), points) - model.centers_part[part]
-            inside |= model.shapes[part].inside_outside(local) < _INSIDE
+            inside |= model.shapes[part].inside_outside(local) < 1
     return inside

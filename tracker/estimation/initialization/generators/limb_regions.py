@@ -5,40 +5,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.estimation.initialization.generators.head_template import STRAY
+from tracker.estimation.initialization.generators.standing_body import typical_person
 from tracker.estimation.initialization.generators.torso_template import Torso
 from tracker.evidence.voxels.paths import VoxelGraph, path_lengths
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.geometry.arrays import Array, IntArray
 
-_SKIN_M = 0.11
-"""Voxels that are closer to the torso through the body belong to its skin, which would connect the limbs, metres."""
-_MIN_LIMB_M = 0.25
-"""Smallest distance of a limb's end from its beginning, metres."""
-_MIN_VOXELS = 0.01
-"""Smallest share of a figure's voxels in a limb."""
-_MIN_REACH_M = 0.12
-"""Smallest length of a branch beyond a fork, metres."""
-_LEG_M = 0.30
-"""A limb whose tip is farther than this below the trunk is a leg, metres."""
-_LEG_ROOT = -0.75
-"""A limb that begins lower on the trunk, as a share of half its length from its middle, is a leg, raised or not."""
-_SLICE_M = 0.03
-"""Half the thickness of the slice whose mean is a limb's centre, metres."""
-
-
-class _Division(NamedTuple):
-    """Places of the joints of a limb along it."""
-
-    middle: float
-    """Elbow or knee, as a share of the length through the limb to wrist or ankle, bent or not."""
-    end_m: float
-    """Distance of the wrist or ankle from the end of the limb, metres."""
-
-
-_DIVISIONS = {"arm": _Division(0.53, 0.10), "leg": _Division(0.52, 0.12)}
-"""P. de Leva 1996 (J. Biomech. 29:1223) has elbow and knee at 0.51 and 0.49 from shoulder and hip, but the region
-begins at the trunk's surface. With these the heavy and the tall thin man of `tests/benchmarks/from_nothing.py` ended at
-26 and 32 mm, not at 20 and 15."""
+_ROOTS = {"arm": "shoulder", "leg": "hip"}
 
 
 class LimbRegion(NamedTuple):
@@ -70,10 +44,13 @@ def find_limbs(figure: Voxels, graph: VoxelGraph, torso: Torso, is_head: NDArray
         torso: its torso.
         is_head: which voxels belong to the head, (N,).
     """
-    points = figure.points_world
-    distances = path_lengths(graph, torso.is_torso | is_head, figure.grid.size_m)
-    whole = np.flatnonzero(np.isfinite(distances) & (distances > _SKIN_M))
-    found = [_limb(points, branch, distances, torso) for branch in _branches(figure, whole, distances, _SKIN_M)]
+    points, size_m = figure.points_world, figure.grid.size_m
+    distances = path_lengths(graph, torso.is_torso | is_head, size_m)
+    # Voxels as close to the torso as an arm beside it belong to its skin, which would connect the limbs.
+    skin_m = typical_person().thickness_m("arm") + size_m
+    whole = np.flatnonzero(np.isfinite(distances) & (distances > skin_m))
+    branches = _branches(figure, whole, distances, skin_m)
+    found = [_limb(points, b, distances, torso, size_m) for b in branches]
     return sorted(found, key=lambda limb: -len(limb.indices))
 
 
@@ -86,15 +63,16 @@ class _Branch(NamedTuple):
 
 def _branches(figure: Voxels, own: IntArray, distances: Array, begins_m: float) -> list[_Branch]:
     """Return the connected regions of voxels beyond a distance, divided where they fork farther out."""
-    size_m, n_least = figure.grid.size_m, _MIN_VOXELS * len(figure.indices)
+    size_m, n_least = figure.grid.size_m, STRAY * len(figure.indices)
+    _, min_limb_m, min_reach_m = typical_person().segments_m("arm")  # a forearm; beyond a fork a hand
     level = begins_m
     while True:
         beyond = own[distances[own] > level]
         regions = [
-            r for r in _connected(figure, beyond) if len(r) >= n_least and distances[r].max() - level >= _MIN_REACH_M
+            r for r in _connected(figure, beyond) if len(r) >= n_least and distances[r].max() - level >= min_reach_m
         ]
         if not regions:
-            enough = len(own) >= n_least and distances[own].max() - begins_m >= _MIN_LIMB_M if len(own) else False
+            enough = len(own) >= n_least and distances[own].max() - begins_m >= min_limb_m if len(own) else False
             return [_Branch(own, begins_m)] if enough else []
         if len(regions) > 1 or len(own) == len(distances):
             return [b for r in regions for b in _branches(figure, r, distances, level)]
@@ -114,35 +92,50 @@ def _connected(figure: Voxels, own: IntArray) -> list[IntArray]:
     return [own[labels[at] == i + 1] for i in range(n)]
 
 
-def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> LimbRegion:
-    """Return the limb of a branch. Its hidden first stretch is assumed straight."""
-    region, from_torso, half = points[branch.own], distances[branch.own], torso.half_axes[2]
+def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso, size_m: float) -> LimbRegion:
+    """Return the limb of a branch. Its hidden first stretch is assumed straight, its joints are an adult's.
+
+    Args:
+        points: the voxels of the figure, (N, 3).
+        branch: the branch.
+        distances: of the voxels from the torso, (N,), metres.
+        torso: the torso.
+        size_m: edge of a voxel, metres.
+    """
+    region, from_torso, adult = points[branch.own], distances[branch.own], typical_person()
     # Voxels of a child who is enlarged to an adult are wide: there may be none this near.
-    first = region[from_torso <= max(branch.begins_m + 0.05, from_torso.min())].mean(axis=0)
-    tip = region[from_torso > from_torso.max() - 0.04].mean(axis=0)
-    (begins_z, tip_z) = torso.local(np.stack([first, tip]))[:, 2]
-    own_root = branch.begins_m < _SKIN_M + 0.05
-    kind = "leg" if tip_z < -half - _LEG_M or (own_root and begins_z < _LEG_ROOT * half) else "arm"
-    length = from_torso.max() - _DIVISIONS[kind].end_m
-    side = np.sign(torso.local(first[None])[0, 1]) or 1.0
-    across, along = (0.35, -0.75) if kind == "leg" else (1.0, 0.85)
-    root = torso.center + torso.axes @ np.array([0.0, side * across * max(0.12, torso.half_axes[1]), along * half])
-    shares = (_DIVISIONS[kind].middle, 1.0)
-    middle, distal = (_at(region, from_torso, (root, branch.begins_m, first), s * length) for s in shares)
-    return LimbRegion(kind, root, middle, distal, branch.own)
+    first = region[from_torso <= max(branch.begins_m + 2 * size_m, from_torso.min())].mean(axis=0)
+    tip = region[from_torso > from_torso.max() - 2 * size_m].mean(axis=0)
+    side = "left" if torso.local(first[None])[0, 1] > 0 else "right"
+    roots = {k: torso.neck_joint + torso.axes @ adult.from_neck(f"{side}_{j}") for k, j in _ROOTS.items()}
+    hand_m = adult.from_neck("left_shoulder")[2] - adult.segments_m("arm").sum()
+    is_on_trunk = branch.begins_m < adult.thickness_m("arm") + 3 * size_m  # not at a fork farther out
+    is_low = (tip - torso.neck_joint) @ torso.axes[:, 2] < hand_m
+    nearest = min(roots, key=lambda k: float(np.linalg.norm(first - roots[k])))
+    kind = "leg" if is_low or (is_on_trunk and nearest == "leg") else "arm"
+    segments = adult.segments_m(kind)
+    hidden_m = float(np.linalg.norm(first - roots[kind]))
+    length_m = hidden_m + float(from_torso.max()) - branch.begins_m
+    begin = (roots[kind], hidden_m, first)
+    middle, distal = (
+        _at(region, from_torso - branch.begins_m + hidden_m, begin, share * length_m, size_m)
+        for share in np.cumsum(segments)[:2] / segments.sum()
+    )
+    return LimbRegion(kind, roots[kind], middle, distal, branch.own)
 
 
-def _at(region: Array, from_torso: Array, begin: tuple[Array, float, Array], distance: float) -> Array:
-    """Return the centre of a limb at a distance from the torso through the body, (3,), metres.
+def _at(region: Array, lengths: Array, begin: tuple[Array, float, Array], distance: float, size_m: float) -> Array:
+    """Return the centre of a limb at a distance from its root through the body, (3,), metres.
 
     Args:
         region: voxels of the limb, (n, 3).
-        from_torso: their distances, (n,), metres.
+        lengths: their distances, (n,), metres.
         begin: root of the limb, the distance at which it stands out, and its centre there.
         distance: the distance, metres.
+        size_m: edge of a voxel, metres.
     """
-    root, begins_m, first = begin
-    if distance <= begins_m:
-        return np.asarray(root + (first - root) * max(0.0, distance) / begins_m)
-    gaps = np.abs(from_torso - distance)
-    return np.asarray(region[gaps <= max(_SLICE_M, float(gaps.min()))].mean(axis=0))
+    root, hidden_m, first = begin
+    if distance <= hidden_m:
+        return np.asarray(root + (first - root) * distance / hidden_m)
+    gaps = np.abs(lengths - distance)
+    return np.asarray(region[gaps <= max(size_m, float(gaps.min()))].mean(axis=0))

@@ -1,8 +1,8 @@
 """Measure how well bodies in many poses fill the silhouettes of one person: an overlap with soft borders.
 
-The views are reduced to cells of about 2 cm at the person. A cell of the silhouette that a body leaves empty costs,
-and so does a cell beside the silhouette that a body covers. Cells near the border cost less, because no two bodies
-have the same shape. A limb in many poses only costs its own cells, so that thousands are measured in a second.
+The views are reduced to cells of a voxel's size at the person. A cell of the silhouette that a body leaves empty
+costs, and so does a cell beside the silhouette that a body covers. Cells near the border cost less, because no two
+bodies have the same shape. A limb in many poses only costs its own cells, so that thousands are measured in a second.
 """
 
 from collections.abc import Sequence
@@ -14,16 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
+from tracker.compute.float32 import FAR
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.compute.threads import N_HELPERS, kernel_pool
+from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.geometry.arrays import Array, FloatArray, IntArray, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 
-_CELL_M = 0.018
-"""Size of a cell at the person, metres."""
-_SOFT_M = 0.035
-"""Distance from the silhouette's border at which a cell costs in full, metres."""
 _BROKEN = 0.3
 """Cost of a view from which on more counts less and less."""
 _RINGS, _SECTORS = 4, 8
@@ -124,10 +122,10 @@ def _reduced(mask: Mask, camera: Camera, center: Array) -> tuple[FloatArray, Cam
     """Return the cost of covering each cell, (H, W), as shares of the silhouette, and the camera of the cells."""
     depth = max(float(camera.depths(center)), NEAR_PLANE_M)
     whole = camera.pinhole
-    cells = whole.scaled(min(1.0, depth / (whole.K[0, 0] * _CELL_M)))
+    cells = whole.scaled(min(1.0, depth / (whole.K[0, 0] * VOXEL_M)))
     shown = camera.undistort_image(mask.astype(np.uint8) * 255)
     inside = (cv2.resize(shown, cells.size, interpolation=cv2.INTER_AREA) > 127).astype(np.uint8)
-    soft = _SOFT_M * cells.K[0, 0] / depth
+    soft = 2 * VOXEL_M * cells.K[0, 0] / depth  # a voxel may be missing or too many on either side of a border
     within, beside = (
         np.minimum(1.0, (cv2.distanceTransform(part, cv2.DIST_L2, 5) - 0.5) / soft) for part in (inside, 1 - inside)
     )
@@ -181,7 +179,7 @@ def _spans(
     P: FloatArray, T: FloatArray, corners: FloatArray, edges: IntArray, height: int, image: FloatArray, spans: IntArray
 ) -> tuple[int, int]:
     """Fill the columns that a convex part covers in each row; return its first and last row within the image."""
-    top, bottom = np.float32(1e9), np.float32(-1e9)
+    top, bottom = FAR, -FAR
     for k in range(corners.shape[0]):
         x, y, z = corners[k, 0], corners[k, 1], corners[k, 2]
         X = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]

@@ -16,14 +16,14 @@ from tracker.estimation.initialization.generators.axis_start import search_on_ax
 from tracker.estimation.initialization.generators.body_axis import BodyAxis, find_body_axes
 from tracker.estimation.initialization.generators.person_scene import PersonScene, silhouette_axes
 from tracker.estimation.initialization.generators.silhouette_overlap import SilhouetteOverlap
+from tracker.estimation.initialization.generators.standing_body import ROUNDED, WITH_HANDS, typical_person
 from tracker.estimation.initialization.generators.stature import height_of_parts, possible_parts, standing_height
 from tracker.estimation.initialization.generators.voxel_start import start_pose, turned_round
 from tracker.evidence.voxels.part_size import principal_axes
+from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 
 _AXES_TRIED = 3
-"""Places of the head along the axis that are tried, the best first."""
-_RAISED = (0.0, 0.10, 0.20)
-"""Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
+"""Places of the head along an axis that are tried."""
 
 
 def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hypothesis]:
@@ -58,7 +58,8 @@ def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hypo
     Raises:
         TrackerError: fewer than two views agree on an axis, or no head is found along it.
     """
-    axes = find_body_axes(silhouette_axes(scene), scene.up, model.height_m)[:_AXES_TRIED]
+    person = typical_person(model.height_m / DEFAULT_HEIGHT_M, ROUNDED)
+    axes = find_body_axes(silhouette_axes(scene), scene.up, person)[:_AXES_TRIED]
     best = axes[0]
     height_m = None if is_known else standing_height(scene, best.up, best.top)
     own = model if height_m is None else model.with_height(height_m)
@@ -72,10 +73,13 @@ def from_search(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hy
     """
     found = principal_axes(scene.figure.points_world, scene.figure.grid.size_m)
     up = found.axes[:, 2] * (1.0 if found.axes[:, 2] @ scene.up >= 0 else -1.0)
+    person = typical_person(model.height_m / DEFAULT_HEIGHT_M, WITH_HANDS)
+    raised_m = person.segments_m("arm").sum() - person.below_crown_m("left_shoulder")  # hands may be above the head
     starts: list[Hypothesis] = []
     for direction in (up, -up):
         top = found.center + float(((scene.figure.points_world - found.center) @ direction).max()) * direction
-        axes = [BodyAxis(direction, top - s * model.height_m * direction, np.nan, (), ()) for s in _RAISED]
+        tops = (top - m * direction for m in np.linspace(0.0, raised_m, _AXES_TRIED))
+        axes = [BodyAxis(direction, t, np.nan, (), ()) for t in tops]
         # Spread arms look like legs: both ends are kept, and the fits decide.
         starts += _on_axes("search", scene, model, axes, is_known)
     return starts

@@ -1,12 +1,11 @@
 """Measure the height of a person who stands upright on a frame."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from tracker.errors import TrackerError
 from tracker.estimation.initialization.generators.head_template import Head
 from tracker.estimation.initialization.generators.person_scene import PersonScene
+from tracker.estimation.initialization.generators.standing_body import typical_person
 from tracker.estimation.initialization.generators.voxel_start import FigureParts, locate_parts, possible_heads
 from tracker.evidence.voxels.paths import neighbor_graph
 from tracker.evidence.voxels.shadows import is_changed_at
@@ -16,19 +15,8 @@ UPRIGHT = 0.9
 """Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
 
 
-class _NeckHeight(NamedTuple):
-    """Height of the base of a standing person's head, as a fraction of the body's height, linear in the body's size."""
-
-    constant: float
-    """Of no size."""
-    slope: float
-    """By the person's size as a share of an adult's."""
-    spread: float
-    """Largest relative error of the height."""
-
-
-_NECK = _NeckHeight(constant=0.70, slope=0.18, spread=0.04)
-"""Folded legs and hands on the head change it."""
+HEIGHT_SIGMA = 0.02
+"""Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
 _MAX_PATH = 1.25
 """Largest path from the top of the head to the soles, as a share of a standing person's height. Folded legs make it
 longer. The grid lengthens paths by up to a tenth."""
@@ -84,9 +72,10 @@ def standing_height(scene: PersonScene, trunk_up: Array, top: Array, head: Head 
     height_m = float(top @ scene.up) - low
     if head is None:
         return height_m
-    neck = (float(head.neck @ scene.up) - low) / height_m
-    usual = _NECK.constant + _NECK.slope * head.scale
-    stands = abs(neck / usual - 1) < _NECK.spread and head.path_m <= _MAX_PATH * height_m
+    # Folded legs and hands on the head change the share of the height at which the neck is.
+    neck, person = (float(head.neck @ scene.up) - head.joint_below_m - low) / height_m, typical_person(head.scale)
+    usual = 1 - person.below_crown_m("neck") / person.height_m
+    stands = abs(neck / usual - 1) < 2 * HEIGHT_SIGMA and head.path_m <= _MAX_PATH * height_m
     return height_m if stands else None
 
 

@@ -6,37 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import Remedy, TrackerError
+from tracker.estimation.initialization.generators.standing_body import typical_person
 from tracker.evidence.voxels.part_size import principal_axes
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.geometry.arrays import Array
 
-
-class _Size(NamedTuple):
-    """Size of a cylinder."""
-
-    length_m: float
-    """Metres."""
-    radius_m: float
-    """Radius or half-width, metres."""
-
-
-class _TorsoSizes(NamedTuple):
-    """Sizes of a torso."""
-
-    average: _Size
-    """Of the template that turns to the voxels: an average torso."""
-    smallest: _Size
-    """From which the template grows."""
-    largest: _Size
-    """To which it grows."""
-
-
-_TORSO = _TorsoSizes(average=_Size(0.50, 0.13), smallest=_Size(0.20, 0.05), largest=_Size(0.70, 0.30))
-"""Sizes of the template in `_axis`, and of the one that `_grown` grows."""
 _MIN_FILLED = 0.75
 """Smallest share of occupied voxels in a layer that is added; a lower one meets empty voxels."""
-_GIRDLE = _Size(0.25, 0.28)
-"""Size of the shoulder girdle below the neck, which is wide where arms hang at a trunk's sides."""
 
 
 class Torso(NamedTuple):
@@ -44,6 +20,8 @@ class Torso(NamedTuple):
 
     neck: Array
     """Centre of its upper base, (3,), metres."""
+    neck_joint: Array
+    """Joint of the neck below it, (3,), metres."""
     axes: Array
     """Unit directions as columns, (3, 3): across the narrow side, across the wide side, and from the legs to the
     neck; right-handed."""
@@ -59,7 +37,9 @@ class Torso(NamedTuple):
 
     def scaled(self, factor: float) -> "Torso":
         """Return it in a figure that is larger by a factor about the world's origin."""
-        return self._replace(neck=self.neck * factor, half_axes=self.half_axes * factor)
+        return self._replace(
+            neck=self.neck * factor, neck_joint=self.neck_joint * factor, half_axes=self.half_axes * factor
+        )
 
     def turned_round(self) -> "Torso":
         """Return it facing the other way: forwards and left are exchanged with backwards and right."""
@@ -70,12 +50,13 @@ class Torso(NamedTuple):
         return np.asarray((points - self.center) @ self.axes)
 
 
-def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso:
+def find_torso(figure: Voxels, neck: Array, joint_below_m: float, is_head: NDArray[np.bool_]) -> Torso:
     """Return the torso of a figure whose head is known.
 
     Args:
         figure: voxels of one person.
         neck: base of the head, (3,), metres.
+        joint_below_m: depth of the joint of the neck below it, metres.
         is_head: which voxels belong to the head, (N,).
 
     Raises:
@@ -83,7 +64,8 @@ def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso
     """
     points, others = figure.points_world, ~is_head
     up = _axis(points[others], neck)
-    girdle = others & _in_cylinder(points, neck, up, *_GIRDLE)
+    # The shoulder girdle is wide where arms hang at a trunk's sides.
+    girdle = others & _in_cylinder(points, neck, up, _trunk_m() / 2, typical_person().half_breadth_m)
     if not girdle.any():
         raise TrackerError(
             "expected a trunk below the head in the silhouettes, found none", Remedy("another_frame_or_place")
@@ -93,7 +75,12 @@ def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso
     local = (points - neck) @ axes
     within = np.sum(np.square(local[:, :2] / half[:2]), axis=1) <= 1.0
     is_torso = others & within & (local[:, 2] <= 0) & (local[:, 2] >= -2 * half[2])
-    return Torso(neck, axes, half, is_torso)
+    return Torso(neck, neck - joint_below_m * axes[:, 2], axes, half, is_torso)
+
+
+def _trunk_m() -> float:
+    """Return the length of an adult's trunk from the neck to the hips, metres."""
+    return -float(typical_person().from_neck("left_hip")[2])
 
 
 def _axis(points: Array, neck: Array) -> Array:
@@ -101,7 +88,7 @@ def _axis(points: Array, neck: Array) -> Array:
 
     It turns until it holds the same voxels as before.
     """
-    length, radius = _TORSO.average
+    length, radius = _trunk_m(), float(typical_person().half_trunk_m.mean())
     down = points.mean(axis=0) - neck
     down /= np.linalg.norm(down)
     before = set[bytes]()
@@ -132,11 +119,12 @@ def _across(points: Array, size_m: float, up: Array) -> Array:
 def _grown(figure: Voxels, neck: Array, axes: Array) -> Array:
     """Shrink the template and grow it until further growth meets empty voxels; return half its axes, (3,), metres.
 
-    It grows across both axes first, then towards the legs, until they part.
+    It grows across both axes first, then towards the legs, until they part. It begins as a rod through half a trunk.
+    It ends where the thighs of an adult have parted, and within the breadth over the arms.
     """
-    size = figure.grid.size_m
-    smallest, largest = (np.array([s.radius_m, s.radius_m, s.length_m / 2]) for s in (_TORSO.smallest, _TORSO.largest))
-    half = smallest
+    size, adult = figure.grid.size_m, typical_person()
+    crotch_m = _trunk_m() + adult.thickness_m("leg")
+    half, largest = np.array([size, size, _trunk_m() / 4]), np.array([*[adult.half_breadth_m] * 2, crotch_m / 2])
     growing = [0, 1, 2]
     while growing:
         for axis in list(growing):

@@ -11,17 +11,15 @@ from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M
 from tracker.estimation.initialization.generators.head_template import Head, find_head, find_upper_head
 from tracker.estimation.initialization.generators.limb_regions import LimbRegion, find_limbs
+from tracker.estimation.initialization.generators.standing_body import SIDES, typical_person
 from tracker.estimation.initialization.generators.torso_template import Torso, find_torso
 from tracker.evidence.voxels.paths import VoxelGraph
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 
-SIDES = ("left", "right")
 _JOINTS = {"arm": ("elbow", "wrist"), "leg": ("knee", "ankle")}
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
-_ONE_LEG = 0.25
-"""Largest share of a figure's voxels in a single leg."""
 
 
 class FigureParts(NamedTuple):
@@ -74,7 +72,7 @@ def locate_parts(figure: Voxels, graph: VoxelGraph, head: Head) -> FigureParts:
     """
     # Lengths below are those of an adult: a child is enlarged to one.
     grown = figure.scaled(1 / head.scale)
-    torso = find_torso(grown, head.neck / head.scale, head.is_head)
+    torso = find_torso(grown, head.neck / head.scale, head.joint_below_m / head.scale, head.is_head)
     limbs = find_limbs(grown, graph, torso, head.is_head)
     own = {n: limb.scaled(head.scale) for n, limb in _by_side(torso, limbs, len(figure.indices)).items()}
     return FigureParts(figure, head, torso.scaled(head.scale), own)
@@ -94,7 +92,7 @@ def start_pose(model: BodyModel, parts: FigureParts) -> Array:
     """
     known = joint_positions(model, parts)
     own = model.named_points_world(model.neutral())
-    place = rigid.transform(parts.torso.axes, parts.head.neck)
+    place = rigid.transform(parts.torso.axes, parts.torso.neck_joint)
     for name in parts.unresolved:
         side, kind = name.split("_")
         known |= {j: rigid.apply(place, own[j] - own["neck"]) for j in (f"{side}_{x}" for x in _JOINTS[kind])}
@@ -104,7 +102,7 @@ def start_pose(model: BodyModel, parts: FigureParts) -> Array:
 def joint_positions(model: BodyModel, parts: FigureParts) -> dict[str, Array]:
     """Return the joints that the parts of a figure show, by name, (3,) each, metres."""
     own = model.named_points_world(model.neutral())
-    place = rigid.transform(parts.torso.axes, parts.head.neck)
+    place = rigid.transform(parts.torso.axes, parts.torso.neck_joint)
     found = {n: rigid.apply(place, own[n] - own["neck"]) for n in _TRUNK if n in own}
     for name, limb in parts.limbs.items():
         side = name.split("_")[0]
@@ -121,7 +119,7 @@ def _by_side(torso: Torso, limbs: Sequence[LimbRegion], n_voxels: int) -> dict[s
         own.sort(key=lambda limb: -float(torso.local(limb.middle[None])[0, 1]))
         if len(own) == 2:
             found |= {f"left_{kind}": own[0], f"right_{kind}": own[1]}
-        elif own and (kind == "arm" or len(own[0].indices) < _ONE_LEG * n_voxels):
+        elif own and (kind == "arm" or len(own[0].indices) < 3 / 2 * typical_person().share_of("leg") * n_voxels):
             side = "left" if torso.local(own[0].proximal[None])[0, 1] > 0 else "right"
             found[f"{side}_{kind}"] = own[0]
         # A single thick region at the lower end holds both legs: neither is resolved.

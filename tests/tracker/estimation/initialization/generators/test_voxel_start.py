@@ -5,6 +5,7 @@ from figures import child, figure, parts_of
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.estimation.initialization.generators.head_template import find_head
+from tracker.estimation.initialization.generators.torso_template import find_torso
 from tracker.estimation.initialization.generators.voxel_start import start_pose, turned_round
 from tracker.evidence.voxels.paths import neighbor_graph
 from tracker.evidence.voxels.voxel_grid import Voxels
@@ -87,9 +88,11 @@ def test_coarse_voxels_of_a_small_child_give_a_start():
 
 
 def test_a_figure_without_a_trunk():
-    """A figure of 0.7 m, whose belly is taken for a head."""
+    """A head that lies far above the rest of the figure."""
+    voxels, joints = figure()
+    is_head = np.zeros(len(voxels.indices), bool)
     with pytest.raises(TrackerError, match="expected a trunk below the head"):
-        parts_of(child(share=0.4, arms_deg=10)[0])
+        find_torso(voxels, joints["head"] + (0.0, 0.0, 0.6), 0.0, is_head)
 
 
 @pytest.mark.slow
