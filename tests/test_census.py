@@ -8,10 +8,10 @@ import pytest
 from architecture import FILES, ROOT, nodes, trees
 from code_counts import code_lines, git, numbers, private_names, unexplained_rises
 
-MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 1101, 323, 0
+MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 991, 224, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
-MAX_CODE_LINES = {"tracker": 49019, "app": 20773, "js": 14505, "css": 4472, "tests": 65627}
+MAX_CODE_LINES = {"tracker": 49019, "app": 20773, "js": 14505, "css": 4472, "tests": 65620}
 """Lines without blanks, comments and docstrings."""
 MAX_HIDDEN_SUBJECTS = 25
 MAX_PRIVATE = 207

@@ -88,7 +88,7 @@ def acquire(
     person: PersonName = None,
     frames: Sequence[int] | None = None,
     *,
-    n_frames: int = 6,
+    n_frames: int = AcquisitionSettings.n_frames,
     progress: Progress | None = None,
 ) -> Acquisition:
     """Acquire the sizes of a person's body from the contours, and make it the present body if it fits better.

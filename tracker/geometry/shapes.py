@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
 
+_N_RINGS, _N_SECTORS = 24, 32
+"""Latitudes and longitudes of a mesh."""
 _FLAT = 1e-6
 """Component away from the axis of the normal of a flat end: almost 0, so that its slope is finite."""
 
@@ -112,7 +114,7 @@ class TaperedSuperquadric:
         omega = np.arange(n_sectors, dtype=np.float64) * (2 * np.pi / n_sectors) + np.pi / n_sectors
         return self.surface(*np.meshgrid(eta, omega, indexing="ij", sparse=True))
 
-    def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
+    def triangles(self, n_rings: int = _N_RINGS, n_sectors: int = _N_SECTORS) -> Triangles:
         """Return a closed surface in the shape's frame."""
         return _closed(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
 
@@ -176,7 +178,7 @@ class EllipticalCone:
         normals = turned(away, along) / self.half_axes
         return turned(radii, heights) * self.half_axes, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
-    def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
+    def triangles(self, n_rings: int = _N_RINGS, n_sectors: int = _N_SECTORS) -> Triangles:
         """Return a closed surface in the shape's frame."""
         return _closed(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
 
@@ -207,7 +209,7 @@ class Ellipsoid:
         """Return points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end."""
         return self._superquadric.grid(n_rings, n_sectors)
 
-    def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
+    def triangles(self, n_rings: int = _N_RINGS, n_sectors: int = _N_SECTORS) -> Triangles:
         """Return a closed surface in the shape's frame."""
         return self._superquadric.triangles(n_rings, n_sectors)
 

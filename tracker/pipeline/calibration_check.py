@@ -126,13 +126,14 @@ def check_calibration(
             f"before and after, found {len(usable)}; track the recording first",
             Remedy("place_body"),
         )
-    seen = recording.seen(recording.diverse(usable, max(n, MIN_FRAMES)), part_of(report, 0.0, 0.3))
-    check = _checked(recording, seen, part_of(report, 0.3, 0.8))
+    reading, checking, again = (part_of(report, k / 3, (k + 1) / 3) for k in range(3))
+    seen = recording.seen(recording.diverse(usable, max(n, MIN_FRAMES)), reading)
+    check = _checked(recording, seen, checking)
     changes = _Changes(recording, usable, check, seen)
     since = {name: k for name in check.named if (k := changes.first(name)) is not None}
     after = [f for f in seen if f.frame >= max(since.values(), default=0)]
     if since and len(after) >= MIN_FRAMES:  # The frames before would dilute the correction.
-        check = _checked(recording, after, part_of(report, 0.8, 1.0))
+        check = _checked(recording, after, again)
     since = {k: v for k, v in since.items() if k in check.named}
     return _with_lost_frames(replace(check, since=since), recording.fps)
 

@@ -64,7 +64,7 @@ def test_a_camera_that_sees_nothing_is_said_to():
 def test_two_cameras_contradict_each_other_without_a_name():
     check = check_calibration(Seen(viewed({0: turned(pitch_deg=1.5)}, range(4), cameras=CAMERAS[:2])))
     (sentence,) = check.contradictions
-    assert sentence.startswith("the two cameras contradict each other: by ")
+    assert sentence.startswith("the two cameras contradict each other by")
     assert sentence.endswith("nothing shows which is off")
     assert check.named == ()
     assert not check.corrections.any()

@@ -145,7 +145,7 @@ class _Space:
             tried[at] += np.array(signs) * step[at]
             if any(signs) and np.all(np.abs(tried[at]) <= half_range[at] + TINY):
                 tried_m = self._distance_m(tried, parts)
-                if tried_m < best_m - 1e-6:
+                if tried_m < best_m - TINY:
                     best, best_m = tried, tried_m
         return best, best_m
 

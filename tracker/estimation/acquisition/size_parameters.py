@@ -74,7 +74,7 @@ class SizePriors:
     """Of an end of the flesh along a part, fraction of height."""
     free_end: float = 0.05
     """Of an end without a joint: hands and hair belong to the parts before them."""
-    sole: float = 0.05
+    sole: float = free_end
     """Of the end of a calf whose foot has no joint, fraction of height."""
     taper: float = 0.10
     """Of a taper."""
@@ -94,7 +94,7 @@ class SizePriors:
             self,
             limb_joint=min(_ANATOMICAL, self.limb_joint),
             limb_side=min(_ANATOMICAL, self.limb_side),
-            sole=min(0.015, self.sole),
+            sole=min(self.end, self.sole),
         )
 
 

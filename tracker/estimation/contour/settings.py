@@ -5,6 +5,7 @@ from typing import ClassVar, Literal
 
 from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.fitting.contour_residuals import MatchSettings
+from tracker.estimation.fitting.gauss_newton import MAX_ITERATIONS
 
 ImageContours = Literal["edges", "silhouettes"]
 
@@ -17,7 +18,7 @@ class ContourSettings(EstimationSettings):
     """Name of the method, which the store keeps with the settings."""
     match: MatchSettings = field(default_factory=lambda: MatchSettings(motion="sliding"))
     """Weights of the contour residuals, with the motion of contour points in full."""
-    max_iterations: int = 50
+    max_iterations: int = MAX_ITERATIONS
     """Largest number of Gauss-Newton iterations of a whole body."""
     measure_noise: bool = True
     """See `EstimationSettings.measure_noise`."""

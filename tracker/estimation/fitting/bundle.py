@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.compute.threads import one_blas_thread
-from tracker.estimation.fitting.gauss_newton import DAMPING, NormalEquations, damped_step
+from tracker.estimation.fitting.gauss_newton import DAMPING, MAX_ITERATIONS, NormalEquations, damped_step
 from tracker.geometry.arrays import Array
 
 S = TypeVar("S")
@@ -140,7 +140,7 @@ class BundleFit(Generic[S]):
 def solve_bundle(
     problem: BundleProblem[S],
     state: S,
-    max_iterations: int = 50,
+    max_iterations: int = MAX_ITERATIONS,
     tolerance: float = 1e-4,
     report: Callable[[int], None] = lambda iteration: None,
     least_gain: float = 0.0,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 
 
 class _Damping(NamedTuple):
@@ -34,8 +34,6 @@ class _Damping(NamedTuple):
 
 DAMPING = _Damping(first=1e-3, least=1e-9, most=1e8, least_again=1e-2)
 """It grows tenfold after a refused step, and falls to a tenth after one that is taken."""
-AT_LIMIT = 1e-9
-"""Distance from a limit that counts as at the limit, rad or metres."""
 UNKNOWN = 1.0
 """Standard deviation of a degree of freedom that nothing shows, such as the twist of a straight arm, rad or m."""
 JOINT_SHARE = 0.012
@@ -47,6 +45,8 @@ millimetres."""
 OTHER_BODY_M = 0.015
 """Standard deviation of a known joint of a body of other sizes, metres: joints of people and those of the built-in body
 differ by 1 to 4 cm (docs/decisions.md, Offsets of joint centres)."""
+MAX_ITERATIONS, TOLERANCE = 50, 1e-6
+"""Iterations after which a fit ends that is not told otherwise, and its last step, rad or metres."""
 CLOSE_ENOUGH = 1e-3
 """Step below which a pose that is shown or filtered is final, rad or m: no joint moves by more than a millimetre."""
 
@@ -166,8 +166,8 @@ def solve(
     pose: Array,
     blocks: Sequence[ResidualBlock],
     active_dofs: NDArray[np.bool_] | None = None,
-    max_iterations: int = 50,
-    tolerance: float = 1e-6,
+    max_iterations: int = MAX_ITERATIONS,
+    tolerance: float = TOLERANCE,
     gain: float = 0.0,
 ) -> Fit:
     """Minimize the summed cost of all blocks within the joint limits (Levenberg-Marquardt with an active set).
@@ -191,8 +191,8 @@ def iterate(
     pose: Array,
     blocks: Sequence[ResidualBlock],
     active_dofs: NDArray[np.bool_] | None = None,
-    max_iterations: int = 50,
-    tolerance: float = 1e-6,
+    max_iterations: int = MAX_ITERATIONS,
+    tolerance: float = TOLERANCE,
     gain: float = 0.0,
 ) -> Iterator[Fit]:
     """Minimize as `solve`, one iteration at a time.
@@ -367,4 +367,4 @@ def pressed_against_limit(model: BodyModel, pose: Array, gradient: Array) -> NDA
     """Return the degrees of freedom at a limit that descent would cross, (n_dofs,)."""
     at = pose[model.dof_value]
     low, high = model.limits[:, 0], model.limits[:, 1]
-    return ((at <= low + AT_LIMIT) & (gradient > 0)) | ((at >= high - AT_LIMIT) & (gradient < 0))
+    return ((at <= low + TINY) & (gradient > 0)) | ((at >= high - TINY) & (gradient < 0))

@@ -19,7 +19,7 @@ from tracker.estimation.fitting import gauss_newton
 from tracker.estimation.fitting.clocked_residuals import ClockedResiduals
 from tracker.estimation.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
-from tracker.estimation.fitting.gauss_newton import AT_LIMIT, DAMPING, Fit, PosePrior, ResidualBlock
+from tracker.estimation.fitting.gauss_newton import DAMPING, MAX_ITERATIONS, TOLERANCE, Fit, PosePrior, ResidualBlock
 from tracker.estimation.fitting.interpenetration import (
     NO_PENETRATION,
     BodyPenetration,
@@ -29,7 +29,7 @@ from tracker.estimation.fitting.interpenetration import (
 )
 from tracker.estimation.fitting.keypoints import NO_KEYPOINTS, KeypointBlock, KeypointTerm, add_keypoints
 from tracker.estimation.fitting.twists import twists_to_dofs
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 
 _KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration, KeypointBlock)
 
@@ -82,8 +82,8 @@ def solve_compiled(
     pose: Array,
     blocks: Sequence[ResidualBlock],
     active_dofs: NDArray[np.bool_] | None = None,
-    max_iterations: int = 50,
-    tolerance: float = 1e-6,
+    max_iterations: int = MAX_ITERATIONS,
+    tolerance: float = TOLERANCE,
     gain: float = 0.0,
 ) -> Fit:
     """Minimize the summed cost of all blocks within the joint limits, as `gauss_newton.solve` does, up to rounding.
@@ -220,7 +220,7 @@ def _list_active(
     """List the active degrees of freedom that are not pressed against a limit; return their number."""
     n = 0
     for k in range(pose.shape[0]):
-        low, high = pose[k] <= limits[k, 0] + AT_LIMIT, pose[k] >= limits[k, 1] - AT_LIMIT
+        low, high = pose[k] <= limits[k, 0] + TINY, pose[k] >= limits[k, 1] - TINY
         if is_active[k] and not (low and gradient[k] > 0.0) and not (high and gradient[k] < 0.0):
             active[n] = k
             n += 1

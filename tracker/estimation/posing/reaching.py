@@ -12,7 +12,6 @@ from tracker.body.kinematics import Kinematics
 from tracker.body.limbs import BENT_RAD, limbs
 from tracker.body.model import BodyModel
 from tracker.estimation.fitting.gauss_newton import (
-    AT_LIMIT,
     Fit,
     NormalEquations,
     PosePrior,
@@ -285,7 +284,7 @@ def restore_held(model: BodyModel, pose: Array, holds: Holds, unlocked_dofs: NDA
         def is_done(found: Array, of_limb: Holds = of_limb) -> bool:
             return bool(np.all(of_limb.distances(model, found) < _REACHED.across_m))
 
-        if np.any(of_limb.distances(model, pose) > AT_LIMIT):
+        if np.any(of_limb.distances(model, pose) > TINY):
             blocks: list[ResidualBlock] = [of_limb, _rest_prior(model, pose)]
             pose = _solve_bending(model, pose, blocks, own & unlocked_dofs, is_done).pose
     return pose
@@ -330,7 +329,7 @@ def _is_at_limit(model: BodyModel, pose: Array, active_dofs: NDArray[np.bool_]) 
     """Return whether a limb's joint that turns about several axes is at a limit."""
     several = np.array([len(joint.axes) > 1 for joint in model.joints])[model.dof_joint] & active_dofs & model.limb_dofs
     values, (low, high) = pose[model.dof_value[several]], model.limits[several].T
-    return bool(np.any((values <= low + AT_LIMIT) | (values >= high - AT_LIMIT)))
+    return bool(np.any((values <= low + TINY) | (values >= high - TINY)))
 
 
 @lru_cache(maxsize=32)

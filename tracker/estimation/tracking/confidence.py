@@ -68,8 +68,9 @@ SEARCH_ODDS = _odds(0.02)
 """A limb is searched above these log odds that it is off: before it is doubtful, because a wrong limb misleads the
 frames after it. With 5%, 41 poses of nine simulated scenes with few pictures are off, with 2% 29; `fast_arms` ends at
 19.7 mm with either."""
-_LOST_FORWARD = 0.6
-"""Mean distance of the contour to the edges above which the whole body is lost, in outlier distances."""
+_LOST_FORWARD = 0.5
+"""Mean distance of the contour to the edges above which the whole body is lost, in outlier distances. Edges that have
+nothing to do with the body lie anywhere within that distance, in the mean half as far."""
 
 
 class LimbFeatures(NamedTuple):

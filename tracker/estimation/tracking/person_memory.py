@@ -13,8 +13,6 @@ from tracker.estimation.fitting.gauss_newton import with_locked_dofs
 from tracker.estimation.tracking.confidence import PoseQuality, Status
 from tracker.geometry.arrays import Array
 
-_MAX_BACKOFF_FRAMES = 8
-"""Longest back-off of a limb that seems lost."""
 _WORSE_NATS = 2.0
 """The back-off of a limb ends where its odds are higher by this than before the search that failed, nats. That
 search has not seen what now contradicts the limb."""
@@ -108,7 +106,7 @@ class PersonMemory:
             before: quality of the pose before the search.
             found: whether the limb moved.
         """
-        longer = min(_MAX_BACKOFF_FRAMES, 2 * self._backoffs.get(limb.name, (0, 0))[1] + 1)
+        longer = min(HISTORY_FRAMES, 2 * self._backoffs.get(limb.name, (0, 0))[1] + 1)
         self._backoffs[limb.name] = (self._n_frames, 0 if found else longer)
         self._odds_searched[limb.name] = before.off_odds_of(limb.name)
 

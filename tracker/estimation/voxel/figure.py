@@ -124,11 +124,10 @@ def part_rotations(body: PosedBody, of: FigureOfBody) -> Array:
 def torso_center(body: PosedBody, of: FigureOfBody, rotation: Array) -> Array:
     """Return the centre of the figure's torso, (3,), metres, that brings its neck and hips closest to the body's."""
     points = body.named_points_world
-    found = []
-    for part, weight in ((1, 2.0), (4, 1.0), (5, 1.0)):
-        at = rotation @ (of.figure.parent_shares[part] * of.sizes[TORSO])
-        found.append(weight * (points[ROOTS[PARTS[part]]] - at))
-    return np.asarray(np.sum(found, axis=0) / 4.0)
+    neck, left_hip, right_hip = (
+        points[ROOTS[PARTS[part]]] - rotation @ (of.figure.parent_shares[part] * of.sizes[TORSO]) for part in (1, 4, 5)
+    )
+    return np.asarray((neck + (left_hip + right_hip) / 2) / 2)
 
 
 def with_shoulders_of(of: FigureOfBody, body: PosedBody, rotation: Array, center: Array) -> FigureJoints:

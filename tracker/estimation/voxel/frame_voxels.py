@@ -11,6 +11,7 @@ from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.evidence.voxels.carving import Carver
 from tracker.evidence.voxels.voxel_grid import VoxelGrid, Voxels
 from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import NEAR_PLANE_M
 
 _REACH_M = 0.35
 """Distance from the prediction to which voxels are carved, metres: how far a limb may be from where it is predicted."""
@@ -86,7 +87,7 @@ def occupied_near(voxels: Voxels, points: Array) -> NDArray[np.bool_]:
 def _share_inside(silhouette: ViewSilhouette, points: Array) -> float:
     """Return the share of points, (N, 3), in the silhouette; of those in the image. 1 if none is in the image."""
     camera = silhouette.camera
-    near = camera.depths(points) > 0.1
+    near = camera.depths(points) > NEAR_PLANE_M
     px = np.round(np.nan_to_num(camera.project(points[near]), nan=-1.0)).astype(np.int64)
     px = px[np.all((px >= 0) & (px < camera.size), axis=1)]
     return float(silhouette.mask[px[:, 1], px[:, 0]].mean()) if len(px) else 1.0

@@ -77,13 +77,13 @@ def measure_parts(state: FilterState, clouds: PartClouds, size_m: float, by_size
     if odd.any():  # the axis that is farthest from the predicted one is turned
         worst = np.einsum("mii->mi", axes)[odd].argmin(axis=1)
         axes[np.flatnonzero(odd), :, worst] *= -1
-    sizes = np.sqrt(np.maximum(variances, 1e-8)) / state.figure.sigma_shares
+    sizes = np.sqrt(np.maximum(variances, TINY)) / state.figure.sigma_shares
     return PartAxes(
         clouds.counts >= MIN_VOXELS,
         clouds.means,
         rigid.so3_log(axes),
         sizes,
-        np.maximum(variances, 1e-8),
+        np.maximum(variances, TINY),
         clouds.counts * size_m**3,
     )
 
@@ -194,4 +194,4 @@ def _turn_variances(found: PartAxes, noise: MeasurementNoise) -> Array:
     s = found.variances
     one, other = s[:, [1, 2, 0]], s[:, [2, 0, 1]]
     n = np.maximum(found.volumes / noise.independent_m3, 1.0)[:, None]
-    return np.asarray(np.minimum(base + one * other / (n * np.maximum((one - other) ** 2, 1e-16)), UNKNOWN**2))
+    return np.asarray(np.minimum(base + one * other / (n * np.maximum((one - other) ** 2, TINY**2)), UNKNOWN**2))
