@@ -17,8 +17,6 @@ from tracker.geometry.cameras import Camera, Region
 
 SIZE_PX = 160
 """Width and height of a thumbnail, pixels."""
-SILHOUETTE_WIDTH_PX = 320
-"""Width of the picture of a silhouette, which shows the whole view, pixels."""
 _MARGIN = 0.12
 """Margin around the person, as a share of the crop."""
 
@@ -100,22 +98,6 @@ def thumbnail(
     # The limb also where it is occluded: that is often why it is lost.
     draw_lines(drawn, contour.pieces_px[limb[contour.parts]], overlay_colors.rgb(overlay_colors.NEUTRAL), 2)
     return pictures.footage(drawn, (SIZE_PX, SIZE_PX))
-
-
-def silhouette_picture(image: Image | None, inside: NDArray[np.bool_]) -> bytes:
-    """Draw a whole view with its silhouette as JPEG, `SILHOUETTE_WIDTH_PX` wide.
-
-    Args:
-        image: of the view, undistorted, (H, W, 3) RGB; None if it is damaged.
-        inside: which pixels are of people, of the same view at any scale.
-    """
-    size = (SILHOUETTE_WIDTH_PX, max(1, round(SILHOUETTE_WIDTH_PX * inside.shape[0] / inside.shape[1])))
-    if image is None:
-        return pictures.footage(None, size)
-    drawn = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-    share = cv2.resize(inside.astype(np.float32), size, interpolation=cv2.INTER_AREA)[:, :, None]
-    color = np.array(overlay_colors.rgb(overlay_colors.SILHOUETTE), np.float32)
-    return pictures.footage((drawn * (1 - share) + (drawn + color) / 2 * share).astype(np.uint8), size)
 
 
 def limb_parts(bodies: Sequence[PosedBody], person: int, limb: int | None) -> NDArray[np.bool_]:

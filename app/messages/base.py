@@ -4,7 +4,7 @@ Positions are in undistorted pixels, frames count from 0, cameras and people are
 """
 
 import struct
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 import msgspec
 import numpy as np
@@ -32,6 +32,14 @@ class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 
 class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A part of a message to a page."""
+
+
+M = TypeVar("M", bound=Message | Part)
+
+
+def made_of(kind: type[M], source: object, /, **others: Any) -> M:
+    """Return a message, or a part of one, whose fields are the attributes of that name, but for some others."""
+    return kind(**{f: getattr(source, f) for f in kind.__struct_fields__ if f not in others}, **others)
 
 
 def encode_text(message: Message) -> str:

@@ -17,16 +17,13 @@ from app.drawing.seen_bodies import bodies_in
 from app.messages import annotation as plan_wire
 from app.messages import search
 from app.messages import server as wire
-from app.messages.base import encode_binary
+from app.messages.base import encode_binary, made_of
 from app.messages.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
 from app.participants.participants import Presence, Visit
-from app.state.comparison import PoseComparison, RangeComparison
+from app.state.comparison import RangeComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View
-from app.state.people import DepthNote
-from app.state.progress import TrackState
 from app.state.role import Role
-from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.estimation.posing.grab import heading_points, minor_points
@@ -91,15 +88,14 @@ def _person(person: Person) -> wire.PersonInfo:
 
 def state(session: Session, state: State) -> wire.StateMessage:
     """Describe the texts and figures of the page."""
-    shown, drawn = state.people[state.person], state.drawn
+    shown, drawn, view, compared = state.people[state.person], state.drawn, state.search_view, state.compared
     people = tuple(
         wire.PersonState(p.source, _status(p.status), i not in state.visibility.hidden, len(p.alternatives))
         for i, p in enumerate(state.people)
     )
-    return wire.StateMessage(
-        frame=state.frame,
-        person=state.person,
-        point=state.point,
+    return made_of(
+        wire.StateMessage,
+        state,
         people=people,
         solo=state.visibility.solo,
         cost_px=drawn.cost_px,
@@ -113,25 +109,15 @@ def state(session: Session, state: State) -> wire.StateMessage:
         dofs=tuple(dof_labels.shown(state.models[state.person], shown.values)),
         locked=tuple(sorted(state.locked[state.person])),
         other_sizes=state.revisions[state.person] != state.present[state.person],
-        job=_job(state.search),
-        replay=_replay(state.search_view.replay),
-        compared_run=state.search_view.compared_run,
-        preview=_preview(state.search_view.preview),
-        compared=_compared(state.compared),
-        unseen_depth=_unseen_depth(state.unseen_depth),
-        track=_track(state.track),
-        range=wire.RangeWork(
-            state.ranges.running, state.ranges.what, state.ranges.done, state.ranges.total, state.ranges.message
-        ),
-        follow=state.follow,
-        snapped=state.snapped,
+        job=made_of(wire.Job, state.search),
+        replay=None if view.replay is None else made_of(wire.ReplayedStep, view.replay),
+        compared_run=view.compared_run,
+        preview=None if view.preview is None else made_of(wire.PreviewedCandidate, view.preview),
+        compared=None if compared is None else made_of(wire.Compared, compared),
+        view_across=None if state.unseen_depth is None else state.unseen_depth.unseen.camera,
+        track=made_of(wire.Track, state.track),
+        range=made_of(wire.RangeWork, state.ranges),
         floor=_floor(state.floor.picking),
-        footage=wire.FootageProgress(state.footage.listed, state.footage.error),
-        compiling=state.compiling,
-        undo=state.undo,
-        redo=state.redo,
-        saved=state.saved,
-        save_error=state.save_error,
     )
 
 
@@ -266,66 +252,6 @@ def _floor(picking: Picking | None) -> wire.FloorPicking | None:
         error_px=last.error_px,
         ready=picking.plane is not None,
         why=picking.why or last.why,
-    )
-
-
-def _job(job: SearchState) -> wire.Job:
-    return wire.Job(
-        running=job.running,
-        kind=job.kind,
-        stage=job.stage,
-        stages=job.stages,
-        evaluations=job.evaluations,
-        per_second=job.per_second,
-        best_px=job.best_px,
-        message=job.message,
-    )
-
-
-def _replay(replay: ReplayState | None) -> wire.ReplayedStep | None:
-    return None if replay is None else wire.ReplayedStep(replay.run, replay.step, replay.steps, replay.stage)
-
-
-def _preview(preview: PreviewState | None) -> wire.PreviewedCandidate | None:
-    return None if preview is None else wire.PreviewedCandidate(preview.run, preview.candidate)
-
-
-def _compared(last: PoseComparison | None) -> wire.Compared | None:
-    if last is None:
-        return None
-    return wire.Compared(
-        number=last.number,
-        work=last.work,
-        before_px=last.before_px,
-        after_px=last.after_px,
-        before_view_costs_px=last.before_view_costs_px,
-        after_view_costs_px=last.after_view_costs_px,
-        warning=last.warning,
-        moved=tuple(
-            search.MovedLimb(person, limb_display_name(move.limb.name), round(100 * move.distance_m, 1))
-            for person, move in last.moved
-        ),
-        is_before_shown=last.is_before_shown,
-    )
-
-
-def _unseen_depth(note: DepthNote | None) -> search.UnseenDepth | None:
-    return None if note is None else search.UnseenDepth(note.person, note.unseen.points, note.unseen.camera)
-
-
-def _track(track: TrackState) -> wire.Track:
-    return wire.Track(
-        running=track.running,
-        first=track.first,
-        last=track.last,
-        at=track.at,
-        done=track.done,
-        total=track.total,
-        per_second=track.per_second,
-        doubtful=track.doubtful,
-        lost=track.lost,
-        stage=track.stage,
-        message=track.message,
     )
 
 

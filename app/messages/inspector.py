@@ -350,10 +350,6 @@ class FindingMessage(Message, frozen=True, tag="finding"):
     """How the last one ended, or empty."""
     failed: bool
     """Whether it ended with an error."""
-    tried: int | None
-    """The frame that is being tried, or that a failure is about."""
-    camera: int | None
-    """The camera whose silhouette a failure is about; null for no single one."""
     frame: int | None
     """The frame on which people were found last."""
     axes: tuple[SilhouetteAxes, ...]

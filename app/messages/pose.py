@@ -169,3 +169,5 @@ class TakeLimbBack(Command, frozen=True, tag="limb_back"):
     """Put the limb back that the last fit moved farthest although nobody had touched it; all else stays."""
 
     frame: Frame
+    every: bool = False
+    """Whether all limbs that the fit moved so are put back."""

@@ -234,25 +234,6 @@ class RangeComparisonMessage(Message, frozen=True, tag="range_comparison"):
 # --- poses that deserve a look --------------------------------------------------------------------------------------
 
 
-class MovedLimb(Part, frozen=True):
-    """A limb that the fit moved although nobody had touched it."""
-
-    person: int
-    limb: str
-    """For display: `left arm`."""
-    distance_cm: float
-
-
-class UnseenDepth(Part, frozen=True):
-    """Points that the user placed in opposite or neighbouring views alone."""
-
-    person: int
-    points: tuple[str, ...]
-    """Names of the points, the last placed one first."""
-    camera: int
-    """The view that looks across, and would show the depth of the first point."""
-
-
 class RaisedViewCost(Part, frozen=True):
     """A view whose cost contradicts a keyframe."""
 

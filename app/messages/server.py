@@ -7,6 +7,7 @@ the feeds make them. `tests/recipes/protocol_docs.py` writes the page's types an
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.epipolar_check import EpipolarDistance, EpipolarLine
+from app.messages.advice import AdviceMessage
 from app.messages.annotation import AnnotationMessage, PresenceMessage
 from app.messages.base import Message, Part, Status
 from app.messages.inspector import (
@@ -21,12 +22,10 @@ from app.messages.observation import AnnotatorsMessage, ObservationsMessage, Oth
 from app.messages.search import (
     CostMapMessage,
     InconsistentMessage,
-    MovedLimb,
     RangeComparisonMessage,
     ReasonMessage,
     SearchRunsMessage,
     SearchSetupMessage,
-    UnseenDepth,
 )
 from app.state.comparison import ComparedWork
 from app.state.progress import TrackStage
@@ -139,8 +138,6 @@ class Job(Part, frozen=True):
     """Null where there is no search."""
     stage: str | None
     """The stage that is searched."""
-    stages: tuple[str, ...]
-    """Names of all stages, in order."""
     evaluations: int
     """Poses scored."""
     per_second: float
@@ -224,8 +221,6 @@ class Compared(Part, frozen=True):
     after_view_costs_px: tuple[float | None, ...]
     warning: str
     """Sentence on a large disagreement of the edges with the user's placement; empty without one."""
-    moved: tuple[MovedLimb, ...]
-    """Limbs that a fit moved although nobody had touched them, farthest first; their former places are drawn."""
     is_before_shown: bool
     """Whether the views show the poses before. The costs and handles are theirs then, and no joint can be dragged."""
 
@@ -247,15 +242,6 @@ class FloorPicking(Part, frozen=True):
     """Whether there is a plane to apply."""
     why: str
     """Why there is none."""
-
-
-class FootageProgress(Part, frozen=True):
-    """Progress of the first scan of long videos."""
-
-    listed: float | None
-    """Share of the frames, 0 to 1; null when the scan is complete."""
-    error: str | None
-    """Fault of a file, as a sentence; null without one."""
 
 
 class StateMessage(Message, frozen=True, tag="state"):
@@ -298,8 +284,9 @@ class StateMessage(Message, frozen=True, tag="state"):
     preview: PreviewedCandidate | None
     compared: Compared | None
     """Null where there is no such result, or it has changed."""
-    unseen_depth: UnseenDepth | None
-    """Null where the views have shown the depth of the last placed point, or the pose has changed since."""
+    view_across: int | None
+    """The view that would show the depth of the last placed point; null where the views have shown it, or the pose has
+    changed since."""
     track: Track
     range: RangeWork
     follow: bool
@@ -308,7 +295,6 @@ class StateMessage(Message, frozen=True, tag="state"):
     """The camera that the 3-D view looks through."""
     floor: FloorPicking | None
     """Null while nobody sets the floor."""
-    footage: FootageProgress
     compiling: str | None
     """Group of kernels being compiled, as after an installation."""
     undo: str | None
@@ -407,7 +393,7 @@ class EpipolarMessage(Message, frozen=True, tag="epipolar"):
 
 
 TextMessage: TypeAlias = Union[  # noqa: UP007
-    SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
+    SessionMessage, StateMessage, AdviceMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
     RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage, FindingMessage, CalibrationMessage, ObservationsMessage, ReasonMessage, CostMapMessage,

@@ -155,7 +155,7 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     pose_wire.DragPin: _pin,
     pose_wire.RemovePins: _unpin,
     pose_wire.FitPose: _fit,
-    pose_wire.TakeLimbBack: lambda controller, _, m: controller.pinning.take_limb_back(m.frame),
+    pose_wire.TakeLimbBack: lambda controller, _, m: controller.pinning.take_limb_back(m.frame, m.every),
     wire.StartTracking: lambda controller, _, m: controller.tracking.start(m.action == "backward", m.until),
     wire.ControlTracking: _control_tracking,
     wire.EditRange: _range,

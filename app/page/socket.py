@@ -16,6 +16,7 @@ from app.messages.observation import WatchProvenance
 from app.messages.parsing import MISUNDERSTOOD, MessageError, check_allowed, parse
 from app.messages.server import HistoryMessage, NoticeMessage, StateMessage
 from app.page import commands
+from app.page.feeds.advice import AdviceFeed
 from app.page.feeds.curves import CurveFeed
 from app.page.feeds.inspector import InspectorFeed
 from app.page.feeds.observability import ObservabilityFeed
@@ -104,6 +105,7 @@ class PageConnection:
         self._pictures = PictureSets(visit.controller)
         self._epipolar: tuple[tuple[int, float, float], ...] = ()
         self._sent_epipolar: tuple[object, ...] = ((),)  # what the lines were drawn from
+        self._advice = AdviceFeed()
         self._curves = CurveFeed()
         self._searches = SearchFeed()
         self._inspector = InspectorFeed()
@@ -256,10 +258,8 @@ class PageConnection:
                 await self._send_history()
                 for update in await asyncio.to_thread(self._searches.updates, self._controller, with_figures):
                     await self._send(update)
-                if state.footage.error and (sent is None or sent.footage.error != state.footage.error):
-                    await self._notice(state.footage.error)
-                if state.track.notice and (sent is None or sent.track is not state.track):
-                    await self._notice(state.track.notice)
+                if with_figures and self._visit.role in ("host", "annotate"):  # others take no next step
+                    await self._send_advice(state)
             except TrackerError as error:
                 await self._notice(page_text(error))
             if state.search.running:
@@ -316,6 +316,12 @@ class PageConnection:
             await self._send(encoding.inconsistent(state))
         if sent is None or sent.range_comparison is not state.range_comparison:
             await self._send(encoding.range_comparison(state.range_comparison))
+
+    async def _send_advice(self, state: State) -> None:
+        """Send what the line over the views says, if that changed."""
+        advice = await asyncio.to_thread(self._advice.update, self._controller, state)
+        if advice is not None:
+            await self._send(advice)
 
     async def _send_epipolar(self, state: State) -> None:
         """Send the lines of the pixel that the page asks about, if they changed."""

@@ -31,7 +31,7 @@ _ENTRY = (
     '<meta http-equiv="refresh" content="0; url={root}">'
 )
 """Answer to an address with a token: the browser goes on to the page's own address, and does not keep this one."""
-_SHOWN, _SHOWN_BELOW = ("/", "/ws", "/starting.json"), (f"/{PREFIX}", "/thumbnail/", "/silhouette/")
+_SHOWN, _SHOWN_BELOW = ("/", "/ws", "/starting.json"), (f"/{PREFIX}", "/thumbnail/")
 """Paths that a shared link may ask for, and beginnings of such paths; 3-D view, exports and other sessions are none."""
 _MAX_MESSAGE_BYTES = 1 << 20  # what a page sends is a line or two of JSON
 _MAX_PATH_CHARACTERS = 2000

@@ -1,4 +1,4 @@
-"""Thumbnails: one person on one frame, in the view that shows a limb best; or a view with its silhouette."""
+"""Thumbnails: one person on one frame, in the view that shows a limb best."""
 
 import time
 from functools import lru_cache
@@ -76,26 +76,6 @@ class Thumbnails:
                 colors, Identity(self._controller.session.cameras),
             )
         )  # fmt: skip
-
-    def silhouette(self, camera: int, frame: int) -> bytes | None:
-        """Return a picture of a view with its silhouette as JPEG; None if there is no such view, frame or silhouette.
-
-        Args:
-            camera: index of the view.
-            frame: of the session.
-
-        Raises:
-            RecordingError: the footage cannot be read.
-        """
-        session = self._controller.session
-        if camera >= len(session.cameras) or frame >= session.n_frames:
-            return None
-        self._give_way()
-        self._follow_cameras()
-        found = self._controller.frames.evidence(frame)[camera].silhouette
-        if found is None:
-            return None
-        return thumbnails.silhouette_picture(self._footage.image(camera, frame), found.inside)
 
     def close(self) -> None:
         """Release the footage."""

@@ -129,7 +129,7 @@ def open_session(
             others.add_to(app)
             ObservationRoutes(controller, no_paths).add_to(app)
             CopyRoutes(controller, no_paths).add_to(app)
-            ThumbnailRoutes(thumbnails.jpeg, thumbnails.silhouette, lambda: not _can_draw(controller)).add_to(app)
+            ThumbnailRoutes(thumbnails.jpeg, lambda: not _can_draw(controller)).add_to(app)
 
             def ready() -> None:
                 for name in proxies.stale(session):

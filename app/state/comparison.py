@@ -1,10 +1,13 @@
 """Poses that are compared: of a frame before and after a fit or search, and of a range with those they replaced."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from app.state.people import ShownPose
+from tracker.estimation.initialization.silhouette_check import SilhouetteCheck
 from tracker.estimation.posing.limb_moves import LimbMove
 from tracker.geometry.arrays import Array
 
@@ -35,6 +38,8 @@ class PoseComparison:
     """Sentence for the user on a large disagreement of edges and placement; empty without one."""
     moved: tuple[tuple[int, LimbMove], ...] = ()
     """Limbs that a fit moved although nobody had touched them, each after the index of its person; farthest first."""
+    filled: SilhouetteCheck = field(default_factory=lambda: SilhouetteCheck((), np.zeros(0)))
+    """How far the bodies fill the silhouettes after a fit or search; no views where nothing shows them."""
     is_before_shown: bool = False
     """Whether the views show the poses before."""
 

@@ -26,6 +26,8 @@ class SearchState:
     """Pose of each person under test."""
     message: str = ""
     """How the last search ended."""
+    failed: bool = False
+    """Whether it ended with an error."""
 
 
 @dataclass(frozen=True, eq=False)

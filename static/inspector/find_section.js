@@ -9,24 +9,25 @@ const SHOWN = 8;
 
 /**
  * @param {import("../model/index.js").Context} context
- * @returns {import("./inspector.js").Section}
+ * @returns {import("./inspector.js").Section & {find: () => void, detect: () => void}}
  */
 export function findSection({ store, send, layers }) {
-  const find = (/** @type {"start" | "stop"} */ action) => send({ type: "find_people", action });
+  const find = () => send({ type: "find_people", action: "start" });
   const start = textButton("Find people", "Find everybody whom nobody has placed, acquire their sizes and track them; one step to undo", () =>
-    find("start"),
+    find(),
   );
   const network = (/** @type {"detect_track" | "stop"} */ action) => send({ type: "observations", action, name: "" });
-  const detect = textButton("Detect and track", "Let a network find the people in the pictures, then track them by its key points and the contours", () => {
+  const detect = () => {
     isDetecting = true;
     layers.toggle(["imported"], true);
     network("detect_track");
-  });
+  };
+  const detectButton = textButton("Detect and track", "Let a network find the people in the pictures, then track them by its key points and the contours", detect);
   const offer = sectionNote("No camera has a background or masks: let a network find the people, or find them by what moves.");
-  const work = workRow("Stop; what was found and tracked stays", () => (store.facts.finding?.running ? find("stop") : network("stop")));
+  const work = workRow("Stop; what was found and tracked stays", () => (store.facts.finding?.running ? send({ type: "find_people", action: "stop" }) : network("stop")));
   const notes = make("ul", "find-notes");
   const details = make("details", {}, make("summary", { title: "Each frame that was tried, and who was found" }, "Details"), notes);
-  const body = make("div", "acquisition", offer, detect, start, work.element, work.status, details);
+  const body = make("div", "acquisition", offer, detectButton, start, work.element, work.status, details);
 
   /** Whether the last work that was begun here is that of a network. */
   let isDetecting = false;
@@ -38,9 +39,9 @@ export function findSection({ store, send, layers }) {
     const running = now?.running ?? false;
     const hasOutlines = session?.has_outlines ?? true;
     offer.hidden = running || hasOutlines;
-    start.hidden = detect.hidden = running;
+    start.hidden = detectButton.hidden = running;
     start.classList.toggle("is-primary", hasOutlines);
-    detect.classList.toggle("is-primary", !hasOutlines);
+    detectButton.classList.toggle("is-primary", !hasOutlines);
     work.show(now);
     details.hidden = !finding?.notes.length;
     if (running !== wasRunning) details.open = !running && !finding?.failed; // sentences on the people who were found
@@ -54,5 +55,7 @@ export function findSection({ store, send, layers }) {
     title: "Find people",
     hint: "First poses, sizes and a track with nobody's help",
     body,
+    find,
+    detect,
   };
 }

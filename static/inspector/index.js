@@ -40,11 +40,12 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
   const calibration = calibrationSection(context);
   const observations = observationsSection(context, panes, sessions);
   const provenance = provenanceSection(context, timeline);
+  const finding = findSection(context);
   const copy = copySection(context, timeline, sessions);
   const sections = [
     joint,
     reasonSection(context, panes, posing),
-    findSection(context),
+    finding,
     new BodySection(context),
     trackSection(context),
     searchSection(context),
@@ -57,7 +58,11 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
   const inspector = new Inspector(context.store, sections);
   const findPeople = () => {
     inspector.reveal("find"); // which offers a network first where only what moves shows the people
-    if (context.store.facts.session?.has_outlines) context.send({ type: "find_people", action: "start" });
+    if (context.store.facts.session?.has_outlines) finding.find();
+  };
+  const detect = () => {
+    inspector.reveal("find");
+    finding.detect();
   };
   button("show-reason", () => inspector.reveal("reason"));
   const bindings = inArea("Inspector", [
@@ -102,5 +107,5 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
       run: () => context.themes.choose(choice),
     })),
   ]);
-  return { inspector, findPeople, bindings };
+  return { inspector, findPeople, detect, bindings };
 }

@@ -108,6 +108,7 @@ export class Store {
     settings: null,
     view3d: null,
     bodySizes: null,
+    advice: null,
     acquisition: null,
     finding: null,
     calibration: null,

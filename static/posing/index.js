@@ -8,11 +8,10 @@ import { byId } from "../widgets/elements.js";
 import { EpipolarCheck } from "./epipolar_check.js";
 import { mountFrameCard } from "./frame_card.js";
 import { JointBar } from "./joint_bar.js";
-import { PoseNotes } from "./pose_notes.js";
 import { mountPinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
-import { epipolarBindings, noteBindings, pinBindings, posingBindings } from "./posing_keys.js";
+import { depthBindings, epipolarBindings, pinBindings, posingBindings } from "./posing_keys.js";
 
 /** @typedef {ReturnType<typeof mount>} PosingRoom */
 
@@ -22,7 +21,7 @@ import { epipolarBindings, noteBindings, pinBindings, posingBindings } from "./p
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
  */
-export function mount({ store, send, say, reasons, actions }, { grid }) {
+export function mount({ store, send, say, reasons }, { grid }) {
   const pinning = new Pinning(store, send, say);
   grid.addPointerTarget(pinning);
   const epipolar = new EpipolarCheck(store, send);
@@ -31,7 +30,6 @@ export function mount({ store, send, say, reasons, actions }, { grid }) {
   const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, say);
   mountFrameCard(store, posing);
   mountPinBar(store, pinning);
-  const notes = new PoseNotes({ store, actions, pinning, grid });
-  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...epipolarBindings(epipolar, reasons.away), ...noteBindings(notes, reasons.away)];
+  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...epipolarBindings(epipolar, reasons.away), ...depthBindings(store, grid, reasons.away)];
   return { posing, pinning, epipolar, bindings };
 }

@@ -107,8 +107,7 @@ export class Pinning {
   /** Put the limb back that the last fit moved farthest although nobody had touched it. */
   takeLimbBack() {
     const { state } = this.#store.facts;
-    if (state?.compared?.moved.length) this.#send({ type: "limb_back", frame: state.frame });
-    else this.#say("The last fit moved no limb that nobody had touched. Ctrl+Z takes the whole fit back.");
+    if (state) this.#send({ type: "limb_back", frame: state.frame });
   }
 
   /**

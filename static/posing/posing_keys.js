@@ -69,17 +69,21 @@ export function pinBindings(pinning, why) {
 }
 
 /**
- * @param {import("./pose_notes.js").PoseNotes} notes
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../panes/pane_grid.js").PaneGrid} grid
  * @param {() => string | null} away
  */
-export function noteBindings(notes, away) {
+export function depthBindings({ facts }, grid, away) {
   return inArea("Posing", [
     {
       keys: ["Alt V"],
       label: "Fill the grid with the view that looks across the last placed joint",
       words: "depth opposite side",
-      why: () => away() ?? notes.whyNotAcross,
-      run: () => notes.showAcross(),
+      why: () => away() ?? (facts.state?.view_across == null ? "The views have shown the depth of the last placed joint." : null),
+      run: () => {
+        const camera = facts.state?.view_across ?? null;
+        if (camera !== null && camera !== facts.filled) grid.toggleFill(camera);
+      },
     },
   ]);
 }

@@ -35,8 +35,7 @@ export function mount({ store, send, reasons }, { grid }) {
 
 /** A gizmo of the 3-D view moves people: shared links have none. */
 function showNoScene() {
-  const note = byId("scene-note", HTMLElement);
-  [note.hidden, note.textContent] = [false, "This link shows the cameras. The 3-D view is the host's."];
+  byId("scene-note", HTMLElement).hidden = false;
 }
 
 /**
@@ -54,7 +53,6 @@ function loadLate(frame, store, isSoftware) {
     if (isLoaded || shown === null || state === null) return;
     if (session && session.role !== "host") return showNoScene();
     const waits = isSoftware && BEFORE_COST.has(state.compiling ?? "") && state.cost_px === null;
-    byId("scene-note", HTMLElement).hidden = !waits;
     if (waits) return;
     isLoaded = true;
     loadScene(frame, store);

@@ -33,8 +33,6 @@ export function mountAnnouncer(region, store) {
     if (state.frame !== before.frame) {
       words.push(`frame ${state.frame}, ${[state.source ?? "no pose", state.status].filter(Boolean).join(", ")}`);
     }
-    if (state.job.message && state.job.message !== before.job.message) words.push(state.job.message);
-    if (state.track.message && state.track.message !== before.track.message) words.push(state.track.message);
     if (words.length) region.textContent = `${words.join("; ")}.`;
   }
 }

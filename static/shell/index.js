@@ -1,25 +1,24 @@
 /**
- * Shell: what surrounds the views: top bar, people, history, messages, command palette and keys.
+ * Shell: what surrounds the views: top bar, the line of advice, people, history, command palette and keys.
  *
  * The room imports all other rooms.
  */
 
 import { button, byId } from "../widgets/elements.js";
 import { leaveFields, watchTyping } from "../widgets/typing.js";
+import { AdviceLine } from "./advice.js";
 import { mountAnnouncer } from "./announcer.js";
 import { mountComparison } from "./comparison.js";
+import { deeds } from "./deeds.js";
 import { ExportPanel } from "./export_panel.js";
-import { FirstSteps } from "./first_steps.js";
 import { HistoryList } from "./history_list.js";
 import { KeyList } from "./key_list.js";
 import { listen, orderedByArea } from "./keys.js";
-import { Notices, watchConnection } from "./notices.js";
 import { Palette } from "./palette.js";
 import { People } from "./people.js";
 import { mountSavedMark } from "./saved_mark.js";
 import { escapeBindings, helpBindings, peopleBindings } from "./shell_keys.js";
 import { mountTopBar } from "./top_bar.js";
-import { mountWorkList } from "./work_list.js";
 import { Workspace } from "./workspace.js";
 
 /**
@@ -46,27 +45,24 @@ export function mount(context, rooms) {
   const { store, send, actions, navigation, layers, reasons } = context;
   const { grid, gestures } = rooms.panes;
   const { posing, pinning } = rooms.posing;
-  const notices = new Notices();
-  context.onNotice((notice) => notices.show(notice));
   mountTopBar(store, actions);
   mountComparison(store, actions);
   const people = new People(store, actions, posing);
-  watchConnection(byId("banner", HTMLElement), store);
   const workspace = new Workspace(store);
   const history = new HistoryList(store, send);
   const exporting = new ExportPanel(store, context.notify);
-  mountWorkList(context, () => exporting.cancel());
+  const advice = new AdviceLine(store, deeds(context, rooms, exporting));
+  context.onNotice((notice) => advice.answer(notice));
   mountSavedMark(store, send);
   mountAnnouncer(byId("announcer", HTMLElement), store);
-  const firstSteps = new FirstSteps(store, rooms.inspector.findPeople, rooms.sessions.showNew);
   const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });
   const keyList = new KeyList();
   button("show-palette", () => palette.toggle());
 
   const own = [
-    ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }),
+    ...helpBindings({ actions, history, advice, palette, keyList, reasons }),
     ...rooms.sessions.bindings,
-    ...escapeBindings({ store, actions, notices, grid, gestures, pinning, epipolar: rooms.posing.epipolar, floor: rooms.scene.floor }),
+    ...escapeBindings({ store, actions, advice, grid, gestures, pinning, epipolar: rooms.posing.epipolar, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
     ...workspace.bindings,
   ];

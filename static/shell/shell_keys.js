@@ -8,11 +8,10 @@ import { closePopover } from "../widgets/popovers.js";
 
 /**
  * @param {{actions: import("../model/actions.js").Actions, history: import("./history_list.js").HistoryList,
- *   notices: import("./notices.js").Notices, palette: import("./palette.js").Palette,
- *   keyList: import("./key_list.js").KeyList, firstSteps: import("./first_steps.js").FirstSteps,
+ *   advice: import("./advice.js").AdviceLine, palette: import("./palette.js").Palette, keyList: import("./key_list.js").KeyList,
  *   reasons: import("../model/unavailable_reasons.js").Reasons}} parts
  */
-export function helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }) {
+export function helpBindings({ actions, history, advice, palette, keyList, reasons }) {
   return inArea("History and help", [
     { keys: ["Ctrl K"], label: "Commands", anywhere: true, run: () => palette.toggle() },
     { keys: ["Ctrl Z"], label: "Undo", anywhere: true, why: reasons.undo, run: () => actions.undo() },
@@ -24,10 +23,9 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
       run: () => actions.toggleBefore(),
     },
     { keys: ["H"], label: "History of edits", run: () => history.toggle() },
-    { keys: ["Shift H"], label: "Messages", run: () => notices.toggleLog() },
-    { keys: ["Shift Esc"], label: "Dismiss all messages", run: () => notices.dismissAll() },
+    { keys: ["Shift H"], label: "What the line said before", words: "messages log", run: () => advice.toggleLog() },
+    { keys: ["Shift Esc"], label: "Dismiss what the line says", words: "messages", run: () => void advice.dismiss() },
     { keys: ["?"], label: "Keyboard shortcuts", matches: (event) => event.key === "?", run: () => keyList.show() },
-    { keys: [], label: "First steps with a new recording", run: () => firstSteps.show() },
   ]);
 }
 
@@ -35,12 +33,12 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
  * Esc ends the first of the activities below that is in progress.
  *
  * @param {{store: import("../model/store.js").Store, actions: import("../model/actions.js").Actions,
- *   notices: import("./notices.js").Notices, grid: import("../panes/pane_grid.js").PaneGrid,
+ *   advice: import("./advice.js").AdviceLine, grid: import("../panes/pane_grid.js").PaneGrid,
  *   gestures: import("../panes/gestures.js").Gestures, pinning: import("../posing/pinning.js").Pinning,
  *   epipolar: import("../posing/epipolar_check.js").EpipolarCheck, floor: import("../scene/floor.js").Floor}} parts
  * @returns {Binding[]}
  */
-export function escapeBindings({ store, actions, notices, grid, gestures, pinning, epipolar, floor }) {
+export function escapeBindings({ store, actions, advice, grid, gestures, pinning, epipolar, floor }) {
   const run = () => {
     if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || epipolar.cancel()) return;
     if (store.facts.bare) return store.set({ bare: false });
@@ -49,9 +47,9 @@ export function escapeBindings({ store, actions, notices, grid, gestures, pinnin
     if (hasTrack(state)) actions.stopTracking();
     else if (state?.range.running) actions.stopRange();
     else if (hasSearch(state)) actions.search("stop");
-    else if (notices.dismiss()) return;
     else if (range) store.set({ range: null });
     else if (filled !== null) grid.toggleFill(filled);
+    else advice.dismiss();
   };
   const label = "Cancel a drag, exit the replay, stop a run, or unmark the range";
   return inArea("Tracking", [{ keys: ["Esc"], label, run }]);

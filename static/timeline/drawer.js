@@ -165,7 +165,7 @@ export class Drawer {
 
 /** The bars around the views; the drawer is part of the last one. */
 function barsAround() {
-  return /** @type {HTMLElement[]} */ ([...document.querySelectorAll(".top-bar, #first-steps, #joint-bar, footer")]);
+  return /** @type {HTMLElement[]} */ ([...document.querySelectorAll(".top-bar, #advice, #joint-bar, footer")]);
 }
 
 /**

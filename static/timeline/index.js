@@ -47,5 +47,5 @@ export function mount({ store, actions, navigation, reasons }, { grid }) {
     ...drawerBindings(drawer),
     ...queueBindings(queue, reasons.away),
   ];
-  return { bindings, drawer, jumps };
+  return { bindings, drawer, jumps, queue };
 }

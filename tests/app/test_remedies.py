@@ -7,7 +7,7 @@ from pathlib import Path
 
 from architecture import FILES, ROOT, nodes
 
-from app.remedies import PHRASES, Phrases, command_line_text, page_text
+from app.remedies import Phrases, command_line_text, page_text, phrases
 from tracker.errors import Remedy, SessionError, TrackerError
 
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
@@ -64,22 +64,22 @@ def test_no_text_of_the_page_names_an_option():
     for path in (ROOT / "static").rglob("*.html"):
         html = re.sub(r"<!--.*?-->", "", path.read_text("utf-8"), flags=re.DOTALL)
         assert OPTION.findall(html) == [], path.name
-    assert [p.page for p in PHRASES.values() if OPTION.search(p.page)] == []
+    assert [p.page for p in phrases().values() if OPTION.search(p.page)] == []
 
 
 def test_every_remedy_has_phrases_for_its_fields():
     made = remedies()
-    assert {code for code, _, _ in made} == PHRASES.keys()
+    assert {code for code, _, _ in made} == phrases().keys()
     for code, fields, name in made:
-        for phrase in PHRASES[code]:
+        for phrase in phrases()[code]:
             asked = {field for _, field, _, _ in string.Formatter().parse(phrase) if field}
             assert asked <= fields, f"{name}: {code}"
 
 
 def test_each_phrase_ends_a_sentence():
-    for code, phrases in PHRASES.items():
-        assert isinstance(phrases, Phrases)
-        for phrase in phrases:
+    for code, pair in phrases().items():
+        assert isinstance(pair, Phrases)
+        for phrase in pair:
             assert phrase[0].islower(), code
             assert phrase[-1] not in ".;", code
 

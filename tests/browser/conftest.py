@@ -48,24 +48,8 @@ async def browser():
         except Error as error:
             why = f"no Chromium to drive the page with (`make test` finds or installs one): {error}"
             pytest.fail(why) if os.environ.get("CI") == "true" else pytest.skip(why)
-        browser.new_context = _of_a_regular(browser.new_context)
         yield browser
         await browser.close()
-
-
-def _of_a_regular(new_context):
-    """Contexts of users who have put the first steps away in all sessions; they take room from the views."""
-
-    async def of_a_regular(newcomer=False, **options):
-        context = await new_context(**options)
-        if not newcomer:
-            await context.add_init_script(
-                "const item = Storage.prototype.getItem; Storage.prototype.getItem = function (key) {"
-                " return key.startsWith('quadrille.first_steps.') ? 'seen' : item.call(this, key); };"
-            )
-        return context
-
-    return of_a_regular
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="session")
@@ -104,7 +88,6 @@ async def server(blank_viser):
     server = _Server()
     app = create_app(server, blank_viser, Access(), static_folder())
     app.router.add_get("/thumbnail/{person}/{frame}", server.thumbnail)
-    app.router.add_get("/silhouette/{camera}/{frame}", server.thumbnail)
     async with listening(app) as port:
         server.address = f"http://127.0.0.1:{port}/"
         yield server

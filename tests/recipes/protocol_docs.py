@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 import msgspec
 
 from app.messages import annotation, base, binary_headers, client, inspector, observation, pose, search, server
+from app.messages.base import Command
 from app.messages.binary_headers import BINARY_HEADERS
 from app.messages.client import CLIENT_MESSAGES
 from app.messages.pose import PoseEdit
@@ -50,10 +51,14 @@ def fields_of(kind: type) -> list[Field]:
     hints, docs = get_type_hints(kind, include_extras=True), _field_docs(kind)
     if dataclasses.is_dataclass(kind):
         return [Field(f.name, to_typescript(hints[f.name]), False, docs[f.name]) for f in dataclasses.fields(kind)]
+    may_lack = issubclass(kind, Command)  # the program sends defaults, too
     return [
-        Field(f.encode_name, to_typescript(hints[f.name]), not f.required, docs[f.name])
+        Field(
+            f.encode_name, to_typescript(hints[f.name]), not f.required and (may_lack or f.default is msgspec.UNSET),
+            docs[f.name],
+        )
         for f in msgspec.structs.fields(kind)
-    ]
+    ]  # fmt: skip
 
 
 def to_typescript(hint: Any) -> str:

@@ -27,6 +27,7 @@ HOUSE = {
         ["bench", "server"],
         ["page", "scene3d"],
         ["page/feeds"],
+        ["advice"],
         ["messages"],
         ["participants"],
         ["control"],

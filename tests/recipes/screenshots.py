@@ -130,7 +130,7 @@ async def tracked(page: Page) -> None:
 async def refused(page: Page) -> None:
     """An error, said to the user: nobody has been placed."""
     await page.keyboard.press("t")
-    await shows(page, "document.querySelector('#notices').childElementCount > 0", 20)
+    await shows(page, "document.querySelector('#advice').dataset.level === 'fault'", 20)
 
 
 async def helping(page: Page) -> None:
@@ -320,8 +320,6 @@ async def take(out: Path, only: str, tutorial: bool) -> None:
             for screen in screens:
                 path = out / f"{screen.name}.{'jpg' if tutorial else 'png'}"
                 async with opened(browser, sessions[screen.session], screen) as page:
-                    if screen.session != "fresh":
-                        await page.click("#close-first-steps")
                     await screen.act(page)
                     await asyncio.sleep(SETTLE_S)
                     await page.screenshot(path=path, timeout=120_000, **({"quality": 80} if tutorial else {}))

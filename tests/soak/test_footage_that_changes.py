@@ -76,7 +76,7 @@ async def test_seeks_in_footage_that_changes_lose_no_socket(tmp_path, cases, rep
                 ended = program.status
         if ended is None:
             async with joined(program.address) as page:  # all cameras are shown again
-                await page.hear("state", lambda m: m["footage"]["error"] is None, timeout_s=60)
+                await page.hear("advice", lambda m: all(a["situation"] != "damaged" for a in m["said"]), timeout_s=60)
     finally:
         await program.kill()
     report(

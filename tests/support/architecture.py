@@ -78,6 +78,7 @@ ROOMS = [
     "app.control",
     "app.participants",
     "app.messages",
+    "app.advice",
     "app.page.feeds",
     "app.page",
     "app.scene3d",

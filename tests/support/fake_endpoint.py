@@ -194,14 +194,14 @@ class FakeEndpoint:
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "is_checked": False, "part_costs_px": [],
             "expected_errors_m": [], "replay": None,
-            "compared": None, "unseen_depth": None, "compared_run": None, "preview": None,
+            "compared": None, "view_across": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,
             "people": [
                 {"source": "manual", "status": "", "shown": True, "alternatives": 0} for _ in range(self.n_people)
             ],
-            "snapped": None, "floor": None, "footage": {"listed": None, "error": None}, "compiling": None,
+            "snapped": None, "floor": None, "compiling": None,
             "saved": True, "save_error": None,
         }  # fmt: skip
 
@@ -219,7 +219,7 @@ class FakeEndpoint:
 
     def idle_job(self, message):
         return {
-            "running": False, "kind": None, "stage": None, "stages": STAGES, "evaluations": 0, "per_second": 0.0,
+            "running": False, "kind": None, "stage": None, "evaluations": 0, "per_second": 0.0,
             "best_px": None, "message": message,
         }  # fmt: skip
 

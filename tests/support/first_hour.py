@@ -123,8 +123,8 @@ class Hour:
             await self.page.screenshot(path=path, timeout=120_000)
 
     async def notices(self):
-        """Messages of the page, newest first."""
-        rows = "[...document.querySelectorAll('#notice-log-list li')]"
+        """Sentences of the line of advice, newest first."""
+        rows = "[...document.querySelectorAll('#advice-log-list li')]"
         return await self.page.evaluate(f"{rows}.map((li) => [li.className, li.lastChild.textContent])")
 
     async def choose_person(self, person):

@@ -3,7 +3,7 @@
 import numpy as np
 from solids import cameras_around, ellipsoid, silhouettes_of
 
-from tracker.estimation.voxel.figure import FigureJoints, chain_centers, joint_points
+from tracker.estimation.voxel.figure import FigureJoints, chain_centers, point_shares
 from tracker.geometry import rigid
 
 SHARES = np.array(
@@ -34,6 +34,12 @@ def pose_at(seconds, swing_deg=35.0):
     for lower, upper, bend in ((6, 2, -0.5), (7, 3, -0.5), (8, 4, 0.3), (9, 5, 0.3)):
         R[lower] = R[upper] @ rigid.so3_exp(np.array([0, bend, 0]))
     return R, np.array([0.4 * seconds - 0.2, 0.0, 0.1])
+
+
+def joint_points(figure, sizes, rotations, centers):
+    """Joints of a figure and ends of its limbs by name, (3,) each, metres."""
+    points = zip(*point_shares(figure), strict=True)
+    return {name: centers[part] + rotations[part] @ (share * sizes[part]) for name, part, share in points}
 
 
 def joints_at(seconds, sizes=ADULT):

@@ -3,7 +3,7 @@
 import shlex
 from typing import Any
 
-from app.remedies import PHRASES
+from app.remedies import phrases
 from tracker.batch.manifest import Manifest
 from tracker.batch.results import RecordingRow, summarize, totals
 from tracker.batch.task_files import Result
@@ -97,6 +97,6 @@ def _joined(row: RecordingRow) -> str:
 def _error(result: Result) -> str:
     """Return why a task failed, with what to do in the words of the command line."""
     try:
-        return f"{result.error}; {PHRASES[result.remedy].command_line.format(**result.remedy_fields)}"
+        return f"{result.error}; {phrases()[result.remedy].command_line.format(**result.remedy_fields)}"
     except LookupError:  # none, or one of another version of the program
         return result.error

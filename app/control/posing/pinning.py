@@ -197,11 +197,12 @@ class Pinning:
             what = f"fit {limb_display_name(limb)}" if limb else "fit"
             self._session_state.save(f"{what} to {evidence}", "fitted", None, person, vouched)
 
-    def take_limb_back(self, frame: int) -> None:
+    def take_limb_back(self, frame: int, every: bool = False) -> None:
         """Put the limb back that the last fit moved farthest although nobody had touched it; all else stays.
 
         Args:
             frame: the frame that the user saw.
+            every: whether to put all such limbs back.
 
         Raises:
             TrackerError: the shown pose is not the result of a fit that moved such a limb.
@@ -215,16 +216,19 @@ class Pinning:
                     "expected a limb that the last fit moved although nobody had touched it, found none; "
                     "undo takes back the whole fit"
                 )
-            (person, move), *rest = last.moved
-            model, former = session_state.models[person], last.before[person].values
-            session_state.show_pose(person, copy_dofs(model, session_state.state.poses[person], former, move.limb.dofs))
+            moves = last.moved if every else last.moved[:1]
+            for person, move in moves:
+                former, now = last.before[person].values, session_state.state.poses[person]
+                session_state.show_pose(person, copy_dofs(session_state.models[person], now, former, move.limb.dofs))
             state = session_state.state
             noted = replace(
                 last, after=state.poses, after_px=state.cost_px, after_view_costs_px=state.view_costs_px,
-                moved=tuple(rest), is_before_shown=False,
+                moved=last.moved[len(moves) :], is_before_shown=False,
             )  # fmt: skip
             session_state.set(comparison=noted)
-            session_state.save(f"take back {limb_display_name(move.limb.name)}", "manual", None, person)
+            names = " and ".join(limb_display_name(move.limb.name) for _, move in moves)
+            people = {person for person, _ in moves}
+            session_state.save(f"take back {names}", "manual", None, people.pop() if len(people) == 1 else None)
 
     def _show_fit(
         self,

@@ -262,8 +262,9 @@ class SearchRunner:
             else:
                 message = page_text(error) if isinstance(error, TrackerError) else f"the search failed: {error}"
             ended = replace(
-                session_state.state.search, running=False, kind=None, stage=None, candidate=None, message=message
-            )
+                session_state.state.search, running=False, kind=None, stage=None, candidate=None, message=message,
+                failed=error is not None,
+            )  # fmt: skip
             session_state.set(search=ended)
             self._run.rest(session_state.state.cost_px)
             if error is None:

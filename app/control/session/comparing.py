@@ -10,7 +10,9 @@ from app.state.comparison import ComparedWork, PoseComparison
 from app.state.people import ShownPose
 from app.state.state import Costs
 from tracker.body.limbs import display_name
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.estimation.initialization.silhouette_check import check_all_people
 from tracker.estimation.posing.limb_moves import LimbMove, untouched_moves
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
@@ -100,6 +102,8 @@ def note_comparison(
     )
     placed = {person: _placed_points(session_state, person, before[person].values) for person in moved}
     moves = _untouched_moves(session_state, noted, placed) if work == "fit" else ()
+    bodies = [PosedBody(m, p.values) for m, p in zip(state.models, state.people, strict=True)]
+    noted = replace(noted, filled=check_all_people(bodies, session_state.frames.cached_evidence(state.frame) or ()))
     session_state.set(comparison=replace(noted, warning=_warning(session_state, noted, placed), moved=moves))
 
 

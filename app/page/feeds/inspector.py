@@ -12,7 +12,7 @@ from app.drawing.misfit_field import NO_MISFITS, MisfitField, misfit_field
 from app.messages import annotation as plan_wire
 from app.messages import inspector as wire
 from app.messages import observation as observed
-from app.messages.base import Message
+from app.messages.base import Message, made_of
 from app.messages.search import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
 from app.state.annotation import AnnotationState, ProposedClick
 from app.state.calibration import CalibrationState
@@ -96,7 +96,7 @@ def settings(found: TrackSettings, choices: RunChoices) -> wire.SettingsMessage:
 
 def track_values(choices: RunChoices) -> wire.TrackValues:
     """Describe the choices for a run."""
-    return wire.TrackValues(choices.method, choices.stride, choices.cameras, dict(choices.options))
+    return made_of(wire.TrackValues, choices, options=dict(choices.options))
 
 
 def methods() -> tuple[wire.MethodInfo, ...]:
@@ -121,18 +121,12 @@ def _sentence(text: str) -> str:
 
 def search_values(found: TrackSettings) -> wire.SearchValues:
     """Describe the settings of the search that hold for all stages."""
-    search = found.search
-    return wire.SearchValues(
+    return made_of(
+        wire.SearchValues,
+        found.search,
         theta_px=found.theta_px,
         outliers=found.outliers,
-        passes=tuple(search.passes),
-        patience=search.patience,
-        max_expansions=search.max_expansions,
-        limbs_apart=search.limbs_apart,
-        bound_rad=search.bound_rad,
-        bound_m=search.bound_m,
-        step_rad=search.step_rad,
-        step_m=search.step_m,
+        passes=tuple(found.search.passes),
     )
 
 
@@ -189,8 +183,7 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
     """
     axes = tuple(wire.SilhouetteAxes(cameras.index(n), people) for n, people in found.axes.items() if n in cameras)
     return wire.FindingMessage(
-        found.running, found.stage, found.share, found.notes, found.message, found.failed, found.tried, found.camera,
-        found.frame, axes,
+        found.running, found.stage, found.share, found.notes, found.message, found.failed, found.frame, axes,
     )  # fmt: skip
 
 

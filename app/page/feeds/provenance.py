@@ -1,7 +1,7 @@
 """Updates on where the shown pose comes from, and on another copy of the session (docs/protocol.md)."""
 
 from app.control.controller import Controller
-from app.messages.base import Message
+from app.messages.base import Message, made_of
 from app.messages.observation import (
     AnnotatorsMessage,
     CopyDifferenceInfo,
@@ -80,10 +80,9 @@ def provenance(state: State, person: int, origin: PoseOrigin | None) -> Provenan
         PointProvenance(name, p.source, p.author, p.time, p.views, None if q != q else round(q, 3))
         for name, p, q in zip(model.point_names, origin.points, lost, strict=True)
     )
-    return ProvenanceMessage(
-        frame=state.frame, person=person, source=source, author=record.author, time=record.time, program=record.program,
-        keyframe=record.keyframe, reviewed=record.reviewed or record.keyframe,
-        method=str(record.settings.get("method", "")), seam_mm=record.seam_mm,
+    return made_of(
+        ProvenanceMessage, record, frame=state.frame, person=person, source=source,
+        reviewed=record.reviewed or record.keyframe, method=str(record.settings.get("method", "")),
         between=None if between is None else (int(between[0]), int(between[1])),
         imported_from=_imported_from(record.remark) if "imported" in record.sources else "",
         taken_from=str(record.settings.get(TAKEN_FROM, "")), body=model.name, body_revision=record.model_revision,

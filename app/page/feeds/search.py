@@ -8,11 +8,11 @@ from app.control.controller import Controller
 from app.control.search import search_settings
 from app.control.search.search_runs import SearchRun
 from app.messages import search as wire
-from app.messages.base import Message, encode_binary
+from app.messages.base import Message, encode_binary, made_of
 from app.messages.binary_headers import LandscapeHeader, SearchCandidatesHeader, SearchStepsHeader
 from app.messages.client import Tab
 from app.state.identity import Identity
-from app.state.search import CostLandscape, ReplayState
+from app.state.search import CostLandscape
 from app.state.state import State, finite_or_none
 from tracker.session.session import Session
 
@@ -98,7 +98,8 @@ def runs(found: Sequence[SearchRun], state: State) -> wire.SearchRunsMessage:
     """Describe the runs of the shown frame with their stages, and the step that is replayed."""
     differing = search_settings.differences([r.settings for r in found])
     listed = tuple(_run(run, differs, state) for run, differs in zip(found, differing, strict=True))
-    return wire.SearchRunsMessage(listed, _replay(state.search_view.replay), state.search_view.compared_run)
+    replay, compared = state.search_view.replay, state.search_view.compared_run
+    return wire.SearchRunsMessage(listed, None if replay is None else made_of(wire.Replay, replay), compared)
 
 
 def steps(run: SearchRun, first: int) -> bytes:
@@ -124,12 +125,11 @@ def candidates(session: Session, run: SearchRun) -> bytes:
 def landscape(session: Session, found: CostLandscape) -> bytes:
     """Encode a landscape: its values, the mean costs, then the costs of each view."""
     model = session.people[found.person].model
-    header = LandscapeHeader(
-        person=found.person,
-        dof=found.dof,
+    header = made_of(
+        LandscapeHeader,
+        found,
         names=model.dof_names,
         unit="m" if model.dof_is_length[found.dof] else "rad",
-        current=found.current,
         current_px=finite_or_none(found.current_px),
         count=len(found.values),
     )
@@ -142,41 +142,25 @@ def _run(run: SearchRun, differs: dict[str, str], state: State) -> wire.SearchRu
     is_current = state.search.kind is not None and not run.over
     at = max((i for i, c in enumerate(run.counts) if c.expansions), default=-1)
     stages = tuple(
-        wire.SearchStage(
+        made_of(
+            wire.SearchStage,
+            count,
             person=stage.person,
             name=stage.group.name,
             factor=stage.factor,
-            evaluations=count.evaluations,
-            gain_px=count.gain_px,
-            done=count.done,
             running=is_current and i == at and not count.done,
         )
         for i, (stage, count) in enumerate(zip(run.stages, run.counts, strict=True))
     )
-    return wire.SearchRun(
-        number=run.number,
+    return made_of(
+        wire.SearchRun,
+        run,
         state="over" if not is_current else "running" if state.search.running else "paused",
         start_px=finite_or_none(run.start_px),
         best_px=finite_or_none(run.end_px),
-        evaluations=run.evaluations,
-        seconds=run.seconds,
         steps=len(run.steps),
-        thinned=run.thinned,
         differs=differs,
         stages=stages,
-    )
-
-
-def _replay(replay: ReplayState | None) -> wire.Replay | None:
-    if replay is None:
-        return None
-    return wire.Replay(
-        run=replay.run,
-        step=replay.step,
-        stage=replay.stage,
-        candidate_px=replay.candidate_px,
-        best_px=replay.cost_px,
-        evaluations=replay.evaluations,
     )
 
 

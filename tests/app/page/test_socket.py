@@ -126,16 +126,17 @@ async def test_an_impossible_run_is_a_notice(controller, caplog):
 
 
 @pytest.mark.slow
-async def test_a_tracker_that_fails_is_a_notice_once(controller, tracker):
+async def test_a_tracker_that_fails_is_said_once(controller, tracker):
     tracker.fails_at = 4
     async with visiting(controller) as page:
         await page.hear("timeline")
         await page.send("track", action="forward", until=None)
         tracker.let_go(2)
-        assert "no light" in (await page.hear("notice"))["text"]
+        said = await page.hear("advice", lambda m: m["said"] and m["said"][0]["situation"] == "run_failed")
+        assert "no light" in said["said"][0]["text"]
         await page.send("select", person=0, point="head")
         await page.hear("state", lambda m: m["point"] == "head")
-        assert len([m for m in page.told if m["type"] == "notice"]) == 1
+        assert page.told[page.told.index(said) + 1 :].count(said) == 0
 
 
 @pytest.mark.slow

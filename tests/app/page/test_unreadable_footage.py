@@ -1,5 +1,7 @@
 """Footage that cannot be read while pages look at it."""
 
+from itertools import groupby
+
 import pytest
 from page_visits import visiting
 
@@ -42,8 +44,11 @@ async def state(page, condition):
         await page.hear("state", condition)
 
 
-def notices(page):
-    return [m["text"] for m in page.told if m["type"] == "notice"]
+def damages(page):
+    """What the line has said of damaged footage, without repetitions; None where it said nothing of it."""
+    said = (m["said"] for m in page.told if m["type"] == "advice")
+    texts = (next((a["text"] for a in of if a["situation"] == "damaged"), None) for of in said)
+    return [text for text, _ in groupby(texts)]
 
 
 @pytest.mark.slow
@@ -51,7 +56,7 @@ def notices(page):
     "damage",
     ["truncated", pytest.param("removed", marks=pytest.mark.slow), pytest.param("emptied", marks=pytest.mark.slow)],
 )
-async def test_a_video_that_cannot_be_read_is_one_notice_until_it_is_back(controller, session, damage):
+async def test_a_video_that_cannot_be_read_is_said_until_it_is_back(controller, session, damage):
     video = session / FRONT
     async with visiting(controller) as page:
         await pictures(page, 2)
@@ -67,35 +72,35 @@ async def test_a_video_that_cannot_be_read_is_one_notice_until_it_is_back(contro
             placeholders.add(seen[0])
             assert seen[0] not in (seen[1], seen[2], seen[3])
         assert len(placeholders) == 1
-        await state(page, lambda m: m["footage"]["error"] is not None)
+        if damages(page)[-1:] in ([], [None]):
+            await page.hear("advice", lambda m: m["said"] and m["said"][0]["situation"] == "damaged")
         await page.send("select", person=0, point="head")  # the socket is as it was
         await state(page, lambda m: m["point"] == "head")
-        assert len(notices(page)) == 1
-        assert FRONT in notices(page)[0]
+        none, text = damages(page)
+        assert (none, FRONT in text) == (None, True)
         if damage == "removed":
             (session / "elsewhere.mp4").rename(video)
         else:
             video.write_bytes(whole)
         assert (await pictures(page, 8))[0] not in placeholders  # without a word of the user
-        await state(page, lambda m: m["footage"]["error"] is None and m["cost_px"] is not None)
-        assert len(notices(page)) == 1
+        await page.hear("advice", lambda m: not any(a["situation"] == "damaged" for a in m["said"]))
+        assert damages(page) == [None, text, None]
 
 
 @pytest.mark.slow
-async def test_a_drive_that_is_gone_is_one_notice_for_all_cameras(controller, session):
+async def test_a_drive_that_is_gone_is_said_once_for_all_cameras(controller, session):
     async with visiting(controller) as page:
         await pictures(page, 2)
         for name in ("FRONT", "RIGHT", "BACK", "LEFT"):
             (session / f"{name}.mp4").rename(session / f"{name}.gone")
         await page.send("seek", frame=40)
         await pictures(page, 40)
-        text = (await page.hear("notice"))["text"]
+        await page.hear("advice", lambda m: "3 others" in m["said"][0]["text"])
+        text = damages(page)[-1]
         assert "put it back" in text
-        assert "3 others" in text
         for name in ("FRONT", "RIGHT", "BACK", "LEFT"):
             (session / f"{name}.gone").rename(session / f"{name}.mp4")
-        await state(page, lambda m: m["footage"]["error"] is None and m["cost_px"] is not None)
-        assert len(notices(page)) == 1
+        await page.hear("advice", lambda m: not any(a["situation"] == "damaged" for a in m["said"]))
 
 
 async def test_a_search_on_a_frame_that_cannot_be_read_says_why(controller, session):

@@ -37,15 +37,12 @@ class Maker:
             raise RecordingError("the drive is away")
         return JPEG
 
-    def silhouette(self, camera, frame):
-        return self.make("silhouette", frame, camera)
-
 
 @pytest.fixture
 async def client(tmp_path):
     maker = Maker()
     app = server.create_app(Nobody(), tmp_path / "nobody", Access(), static_folder())
-    ThumbnailRoutes(maker.make, maker.silhouette, lambda: maker.is_busy).add_to(app)
+    ThumbnailRoutes(maker.make, lambda: maker.is_busy).add_to(app)
     async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
         yield session, maker
         maker.free.set()
@@ -67,18 +64,6 @@ async def test_a_thumbnail_is_sent_as_jpeg(client):
     for wrong in ("/thumbnail/x/1", "/thumbnail/0/-1", "/thumbnail/0/1?limb=a", f"/thumbnail/0/{10**12}"):
         assert await status(session, wrong) == 404
     assert await status(session, "/thumbnail/0/1", **{"Sec-Fetch-Site": "cross-site"}) == 403
-
-
-async def test_a_silhouette_is_sent_under_the_same_rules(client):
-    session, maker = client
-    async with session.get("/silhouette/2/31") as response:
-        assert (response.status, response.content_type, await response.read()) == (200, "image/jpeg", JPEG)
-    assert maker.asked == [("silhouette", 31, 2)]
-    assert await status(session, "/silhouette/2/404") == 404
-    assert await status(session, "/silhouette/x/1") == 404
-    assert await status(session, "/silhouette/0/1", **{"Sec-Fetch-Site": "cross-site"}) == 403
-    maker.is_busy = True
-    assert await status(session, "/silhouette/0/1") == 503
 
 
 async def test_nothing_waits_for_a_thumbnail(client, monkeypatch):

@@ -4,12 +4,10 @@ import threading
 import time
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from gestures import drag, pixel_of
 
-from app.drawing import overlay_colors
 from app.server import thumbnails
 from app.session.footage_crops import FootageCrops
 from tracker.footage.camera_source import Clock
@@ -45,25 +43,6 @@ def test_a_thumbnail_is_made_once_for_each_pose_and_limb(made):
     assert found.jpeg(0, 0, 1) != first
     assert found.jpeg(0, 1, 1) is None  # no pose
     assert found.jpeg(7, 0, 1) is None
-
-
-def test_a_silhouette_is_shown_over_its_view(made):
-    controller, found, _ = made
-    image = cv2.imdecode(np.frombuffer(found.silhouette(1, 0), np.uint8), cv2.IMREAD_COLOR_RGB).astype(int)
-    view = controller.frames.evidence(0)[1]
-    size = thumbnails.thumbnails.SILHOUETTE_WIDTH_PX, image.shape[0]
-    assert image.shape[1] == size[0]
-    assert abs(size[1] / size[0] - view.camera.height / view.camera.width) < 0.01
-    inside = cv2.resize(view.silhouette.inside.astype(np.uint8), size, interpolation=cv2.INTER_AREA)
-    footage = cv2.resize(FootageCrops(controller.session.cameras).image(1, 0), size, interpolation=cv2.INTER_AREA)
-    color = np.array(overlay_colors.rgb(overlay_colors.SILHOUETTE))
-    core = cv2.erode(inside, np.ones((5, 5), np.uint8)) > 0
-    away = cv2.dilate(inside, np.ones((17, 17), np.uint8)) == 0
-    assert core.any()
-    assert np.abs(image - footage)[away].mean() < 4  # JPEG
-    assert np.abs(image - (footage + color) / 2)[core].mean() < 8
-    assert found.silhouette(99, 0) is None
-    assert found.silhouette(0, 10**6) is None
 
 
 def test_a_person_is_drawn_at_the_time_of_the_picture(made):

@@ -78,7 +78,7 @@ async def test_poses_of_an_earlier_calibration_are_marked_counted_and_tracked_ag
     await shows(page, "quadrille.state.calibration")
     plain = await drawn(page)
     await endpoint.broadcast(APPLIED)
-    await shows(page, "document.querySelector('#notices').innerText.includes('poses are of an earlier calibration')")
+    await shows(page, "quadrille.state.calibration.outdated[0]?.length > 0")
     assert await drawn(page) != plain
     assert "keyframe was set under it and stays." in await section.inner_text()
     assert "earlier calibration" in await page.locator("#legend").get_attribute("title")

@@ -65,7 +65,7 @@ async def test_people_are_detected_where_nothing_was_imported(page, endpoint, se
 
 FINDING = {
     "type": "finding", "running": True, "stage": "acquiring sizes", "share": 0.5, "message": "", "failed": False,
-    "notes": [], "frame": None, "tried": None, "camera": None, "axes": [],
+    "notes": [], "frame": None, "axes": [],
 }  # fmt: skip
 
 

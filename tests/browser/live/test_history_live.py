@@ -103,9 +103,9 @@ async def test_a_full_disk_is_said_and_nothing_is_lost(tabs, program):
         async with dragging(page, 0, "left_wrist", (0, -8), (0, -16)) as (_, v):
             follows = f"h.camera === 0 && h.point === 'left_wrist' && Math.abs(h.v - {v - 16}) < 1"
             await shows(page, f"quadrille.state.overlay.handles.some((h) => {follows})")
-        await shows(page, "!document.querySelector('#unsaved').hidden")
+        await page.locator("#advice [data-deed=retry]").wait_for()
         u, v = await handle_of(page, 0, "left_wrist")
-        await page.locator("#retry-saving").click()
+        await page.locator("#advice [data-deed=retry]").click()
         await asyncio.sleep(0.3)
         assert await page.locator("#saved").inner_text() == "Not saved"
         await go_to(page, 2)
@@ -114,8 +114,8 @@ async def test_a_full_disk_is_said_and_nothing_is_lost(tabs, program):
         assert await handle_of(page, 0, "left_wrist") == pytest.approx((u, v), abs=0.01)
     finally:
         resource.prlimit(program.pid, resource.RLIMIT_FSIZE, unlimited)
-    await page.locator("#retry-saving").click()
-    await shows(page, "document.querySelector('#unsaved').hidden")
+    await page.locator("#advice [data-deed=retry]").click()
+    await page.locator("#advice [data-deed=retry]").wait_for(state="hidden")
     await shows(page, "quadrille.state.state.undo === 'drag left wrist, frame 8'")
     await shows(page, "quadrille.state.timeline[8] !== undefined")
     assert await page.locator("#saved").inner_text() == "All saved"

@@ -225,7 +225,9 @@ async def test_a_pin_outside_of_the_image_is_refused_and_panes_keep_their_size(p
     await page.keyboard.press("x")
     box = await page.locator(".pane").first.bounding_box()
     await page.mouse.dblclick(box["x"] + 5, box["y"] + 150)  # beside the image
-    await shows(page, "document.querySelector('#notices')?.textContent.includes('within the 640x480 px of FRONT')", 30)
+    await shows(
+        page, "document.querySelector('#advice-text')?.textContent.includes('within the 640x480 px of FRONT')", 30
+    )
     assert await page.evaluate(f"{PINS}.length") == 0
     assert (await state_of(page))["filled"] is None
 

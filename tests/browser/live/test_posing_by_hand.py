@@ -163,7 +163,7 @@ async def test_locks_hold_under_a_drag(live):
     await press(live, before["left_elbow"])
     await carry(live, before["left_elbow"], (-8, -8))
     await live.mouse.up()
-    await shows(live, "[...document.querySelectorAll('.notice')].some((n) => n.textContent.includes('unlock'))")
+    await shows(live, "document.querySelector('#advice-text').textContent.includes('unlock')")
     assert (await handles(live))["left_elbow"] == pytest.approx(before["left_elbow"])
     await live.keyboard.press("Shift+J")  # back to the shoulder
     await shows(live, "quadrille.state.state.point === 'left_shoulder'")

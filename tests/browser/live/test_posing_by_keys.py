@@ -79,7 +79,7 @@ async def test_mirror_copy_and_reset(live):
     await live.keyboard.press("m")
     await shows(live, "quadrille.state.state.undo === 'mirror, frame 5'")
     await live.keyboard.press("Alt+,")  # nobody has posed frame 4
-    await shows(live, "document.querySelector('#notices')?.textContent.includes('on frame 4 to copy, found none')")
+    await shows(live, "document.querySelector('#advice-text')?.textContent.includes('on frame 4 to copy, found none')")
     await live.locator("#copy-pose").focus()
     await live.keyboard.press("Enter")
     await live.get_by_role("menuitem", name="Keyframe 3").focus()
@@ -101,7 +101,7 @@ async def test_locks_hold_under_keys_and_show(live):
     assert await live.locator(".dof .number-field").is_disabled()
     before = (await state_of(live))["state"]
     await live.keyboard.press("+")
-    await shows(live, "document.querySelector('#notices')?.textContent.includes('left elbow extension is locked')")
+    await shows(live, "document.querySelector('#advice-text')?.textContent.includes('left elbow extension is locked')")
     assert (await state_of(live))["state"]["dofs"] == before["dofs"]
     await live.keyboard.press("Shift+O")
     await shows(live, "quadrille.state.state.locked.length > 3")
@@ -119,7 +119,7 @@ async def test_wrong_numbers_are_refused_and_restored(live):
         await entry.fill(wrong)
         await live.keyboard.press("Enter")
         assert await entry.get_attribute("aria-invalid") == "true"
-        assert f"expected a number from 0 to 155 °, found “{wrong}”" in await live.locator(".notice").last.inner_text()
+        assert f"expected a number from 0 to 155 °, found “{wrong}”" in await live.locator("#advice-text").inner_text()
         await live.keyboard.press("Escape")
         assert await entry.get_attribute("aria-invalid") is None
     before = await entry.input_value()
@@ -129,7 +129,7 @@ async def test_wrong_numbers_are_refused_and_restored(live):
     await shows(live, "quadrille.state.state.undo === 'set left elbow extension, frame 9'")
     await live.locator("#step-deg").fill("0")
     await live.keyboard.press("Enter")
-    assert "above 0" in await live.locator(".notice").last.inner_text()
+    assert "above 0" in await live.locator("#advice-text").inner_text()
     await live.keyboard.press("Escape")
     await live.locator("#step-deg").fill("2")
     await live.keyboard.press("Enter")

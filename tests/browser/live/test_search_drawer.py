@@ -134,7 +134,7 @@ async def test_runs_are_compared_in_cost_and_pose_and_one_is_taken(page):
     theta = page.locator("#search-controls input")
     await theta.fill("-3")
     await theta.press("Enter")
-    await page.locator("#notices").get_by_text("expected theta to be above 0 px").wait_for()
+    await page.locator("#advice").get_by_text("expected theta to be above 0 px").wait_for()
     await theta.fill("9")
     await theta.press("Enter")
     await shows(page, "quadrille.state.settings.search.theta_px === 9", 10)

@@ -49,7 +49,7 @@ async def test_another_session_takes_the_place_of_the_first(browser, tmp_path, m
 
 
 async def test_a_session_is_made_of_footage_with_two_names_exchanged(browser, tmp_path, monkeypatch, data_folder):
-    """The form shows the cameras, exchanges the two on request, and opens the session with its first steps."""
+    """The form shows the cameras, exchanges the two on request, and opens the session with its next step."""
     walk, mixed = data_folder("walk"), tmp_path / "mixed"
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     shutil.copytree(SAMPLE, tmp_path / "sample")
@@ -59,14 +59,15 @@ async def test_a_session_is_made_of_footage_with_two_names_exchanged(browser, tm
         shutil.copy(walk / f"{name}.mp4", mixed / f"{exchanged.get(name, name)}.mp4")
     program = Program(tmp_path / "sample", has_token=True)
     await program.start()
-    context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
+    context = await browser.new_context(viewport={"width": 1280, "height": 720})
     try:
         page = await context.new_page()
         await page.add_init_script(WITHOUT_3D)
         await page.goto(program.address, timeout=120_000)
         await page.wait_for_url(lambda url: "token" not in url)  # the page exchanges it for a cookie
         await shows(page, "window.quadrille?.state.overlay", 120)
-        await page.click("#first-new-session")
+        await page.click("#session-name")
+        await page.click("#show-new-session")
         await page.fill("#new-footage", str(mixed))
         await page.fill("#new-calibration", str(walk / "Calib.toml"))
         await page.fill("#new-background", str(walk / "background"))
@@ -83,7 +84,7 @@ async def test_a_session_is_made_of_footage_with_two_names_exchanged(browser, tm
         async with page.expect_event("load", timeout=60_000):
             await page.click("#open-made-session")
         await shows(page, "window.quadrille?.state.session?.name === 'mixed_session'", 60)
-        await page.locator("#first-steps").wait_for()
+        await page.locator("#advice [data-deed=find]").wait_for()
     finally:
         await context.close()
         await program.kill()

@@ -38,14 +38,14 @@ async def test_a_lost_connection_is_said_and_mended_with_the_true_state(browser,
         await page.goto(f"http://127.0.0.1:{port}/")
         await shows(page, "window.quadrille?.state.shown.frame === 12")
     await shows(page, "!quadrille.state.connected")
-    assert await page.locator("#banner").inner_text() == "Connection lost. Reconnecting…"
+    assert await page.locator("#advice-text").inner_text() == "Connection lost. Reconnecting…"
     assert await page.locator("#search-frame").is_disabled()
     endpoint.state |= {"frame": 77, "cost_px": 3.5}
     async with listening(create_app(endpoint, blank_viser, Access(), static_folder()), port):
         await shows(page, "quadrille.state.connected && quadrille.state.overlay.frame === 77", timeout_s=15.0)
         assert await page.locator("#cost").inner_text() == "3.50"
         assert await page.locator("#frame").input_value() == "77"
-        await shows(page, "getComputedStyle(document.querySelector('#banner')).opacity === '0'")
+        await shows(page, "document.querySelector('#advice-text').textContent === ''")
     await page.context.close()
 
 

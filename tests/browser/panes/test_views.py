@@ -138,7 +138,7 @@ async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, end
 async def test_people_who_are_found_are_framed(page, endpoint):
     finding = {
         "type": "finding", "running": True, "stage": "tracking", "share": 1.0, "notes": [], "message": "",
-        "failed": False, "tried": None, "camera": None, "frame": None, "axes": [],
+        "failed": False, "frame": None, "axes": [],
     }  # fmt: skip
     endpoint.state["people"][0]["source"] = None
     await endpoint.broadcast(endpoint.state)

@@ -58,10 +58,12 @@ async def test_a_session_is_opened_by_its_folder_or_from_the_list(fresh_page, en
     page.errors.clear()
     async with page.expect_event("load"):
         await page.locator("#recent-sessions button").click()
-        await shows(page, "document.querySelector('#banner').textContent === 'Opening dance…'")
+        await shows(page, "document.querySelector('#advice-text').textContent === 'Opening dance…'")
         for socket in [*endpoint.sockets]:  # the program ends
             await socket.close()
-        await shows(page, "document.querySelector('#banner').textContent === 'Opening dance: loading the program…'")
+        await shows(
+            page, "document.querySelector('#advice-text').textContent === 'Opening dance: loading the program…'"
+        )
     assert posted == ["/data/w", "/data/walks/dance"]
     await shows(page, "window.quadrille?.state.overlay")
     listed |= {"refusal": WHY, "recent": []}

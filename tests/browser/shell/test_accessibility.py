@@ -117,7 +117,7 @@ async def test_nothing_jumps_while_work_is_under_way(page, endpoint):
     async with dragging(page, 0, "l_wrist", *[(4 * k, -3 * k) for k in range(12)]):
         pass
     await endpoint.broadcast({"type": "notice", "level": "error", "text": "the frame 9 is out of range"})
-    await page.get_by_role("alert").wait_for()
+    await page.locator("#advice-text", has_text="the frame 9").wait_for()
     assert await page.evaluate("shifts") == []
 
 

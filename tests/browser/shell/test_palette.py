@@ -110,7 +110,7 @@ async def test_the_next_step_suits_the_state(page, endpoint):
     await page.keyboard.press("Enter")
     await page.keyboard.press("Escape")
     await open_palette(page)
-    assert (await found(page))[:2] == ["Messages", "Pause or continue tracking"]
+    assert (await found(page))[:2] == ["What the line said before", "Pause or continue tracking"]
 
 
 @pytest.mark.slow
@@ -228,9 +228,7 @@ async def test_undo_holds_in_every_part_of_the_page(page, endpoint):
 
 async def test_a_key_that_does_nothing_says_why(page, endpoint):
     await page.keyboard.press("Alt+p")
-    await shows(
-        page, "document.querySelector('.notice:not([hidden]) span')?.textContent.startsWith('Nothing is being tracked')"
-    )
+    await shows(page, "document.querySelector('#advice-text').textContent.startsWith('Nothing is being tracked')")
     assert not endpoint.received
 
 

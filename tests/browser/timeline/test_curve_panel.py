@@ -143,8 +143,8 @@ async def test_they_fit_a_small_screen(curves):
     timeline = await curves.locator("#timeline").bounding_box()
     assert timeline["y"] + timeline["height"] <= 720
     assert await curves.evaluate("document.documentElement.scrollWidth") == 1280
-    # The bar of the selected joint has its 34 px too.
-    await shows(curves, "quadrille.state.views[0].scale > 0.34")
+    # The bar of the selected joint has its 34 px too, and the line of advice 32.
+    await shows(curves, "quadrille.state.views[0].scale > 0.3")
 
 
 @pytest.mark.endpoint(n_frames=100_000)

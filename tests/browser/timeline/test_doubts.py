@@ -48,7 +48,7 @@ async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(p
     )
     assert len(endpoint.thumbnails) == n_loaded  # those that stay are not loaded again
     await page.keyboard.press("Alt+ArrowDown")
-    await page.locator("#notices .notice", has_text="no doubtful or lost frame left").wait_for()
+    await page.locator("#advice-text", has_text="no doubtful or lost frame left").wait_for()
 
 
 async def replace_doubts(page, endpoint, doubts, **marks):

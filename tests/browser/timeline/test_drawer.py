@@ -53,7 +53,6 @@ async def test_a_search_drawer_without_searches_stays_as_opened(page, endpoint):
 @pytest.mark.parametrize("endpoint", [{"n_people": 2}, {"n_people": 8}], indirect=True, ids=["2", "8"])
 @pytest.mark.parametrize("height", [720, 1080])
 async def test_no_lane_of_the_timeline_is_cut_off(page, endpoint, height):
-    await page.evaluate("localStorage.removeItem('quadrille.first_steps')")
     for kind in ("search", "curves", "doubts"):
         await page.evaluate("(kind) => localStorage.setItem(`quadrille.drawer-height-${kind}`, '2000')", kind)
     await page.set_viewport_size({"width": 1280, "height": height})

@@ -6,4 +6,4 @@ people on given frames, and `first_pose.find_first_poses_anywhere` for those on 
 room fits, searches, tracks and compares (`start_choice.compare_starts`).
 """
 
-__all__ = ["first_pose", "known_start"]
+__all__ = ["first_pose", "known_start", "silhouette_check"]

@@ -1,6 +1,6 @@
 """Check a start pose against the silhouettes of its person: never a body in empty space."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,9 @@ from tracker.body.model import PosedBody
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.initialization.start_fit import StartTrack
 from tracker.evidence.contours.body_silhouette import body_silhouette
+from tracker.evidence.contours.label_image import part_labels
 from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.evidence.voxels.figure_masks import FigureMask
 from tracker.geometry.arrays import Array, Mask, intersection_over_union
 
@@ -22,7 +24,7 @@ class SilhouetteCheck(NamedTuple):
     """How well a body fills the silhouettes of its person."""
 
     cameras: tuple[str, ...]
-    """Names of the views that show the person alone."""
+    """Names of the views that show the person alone, or all people."""
     overlaps: Array
     """In each of these views the area that body and silhouette share, as a share of that of both, (n_views,)."""
 
@@ -59,11 +61,27 @@ def check_against_silhouettes(
         silhouettes: of all people, in all views.
         masks: that of the person in each of them.
     """
-    found = [
-        (s.camera.name, intersection_over_union(body_silhouette([body], s.camera), m.mask))
+    return _shared(
+        (s.camera.name, body_silhouette([body], s.camera), m.mask)
         for s, m in zip(silhouettes, masks, strict=True)
         if m.shows_figure_alone
-    ]
+    )
+
+
+def check_all_people(bodies: Sequence[PosedBody], views: Sequence[ViewEvidence]) -> SilhouetteCheck:
+    """Compare all people of a frame with the silhouettes that show them together.
+
+    Args:
+        bodies: of all people.
+        views: those without a silhouette are left out.
+    """
+    seen = [(v.camera, v.silhouette.inside) for v in views if v.silhouette is not None]
+    return _shared((camera.name, part_labels(bodies, camera) > 0, inside) for camera, inside in seen)
+
+
+def _shared(seen: Iterable[tuple[str, Mask, Mask]]) -> SilhouetteCheck:
+    """Return the share of both areas that two masks of each view have in common."""
+    found = [(name, intersection_over_union(one, other)) for name, one, other in seen]
     return SilhouetteCheck(tuple(name for name, _ in found), np.array([share for _, share in found]))
 
 

@@ -165,19 +165,8 @@ def chain_centers(figure: FigureJoints, sizes: Array, rotations: Array, center: 
     return out
 
 
-def joint_points(figure: FigureJoints, sizes: Array, rotations: Array, centers: Array) -> dict[str, Array]:
-    """Return the joints of a figure and the ends of its limbs by name, (3,) each, metres."""
-    found = {}
-    for i, name in enumerate(PARTS):
-        if i:
-            found[ROOTS[name]] = centers[i] + rotations[i] @ (figure.own_shares[i] * sizes[i])
-        if name in _ENDS:
-            found[_ENDS[name]] = centers[i] + rotations[i] @ (figure.end_shares[i] * sizes[i])
-    return found
-
-
 class PointShares(NamedTuple):
-    """The points of `joint_points`."""
+    """Joints of a figure, and ends of its limbs."""
 
     names: tuple[str, ...]
     """(N,)."""
@@ -188,7 +177,7 @@ class PointShares(NamedTuple):
 
 
 def point_shares(figure: FigureJoints) -> PointShares:
-    """Return where the points of `joint_points` lie on the parts."""
+    """Return where the joints and the ends of the limbs lie on the parts."""
     roots, ends = list(range(1, N_PARTS)), [i for i, n in enumerate(PARTS) if n in _ENDS]
     names = [ROOTS[PARTS[i]] for i in roots] + [_ENDS[PARTS[i]] for i in ends]
     shares = np.concatenate([figure.own_shares[roots], figure.end_shares[ends]])

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from tracker.compute.threads import N_HELPERS, map_chunked
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.evidence.voxels.carving_kernels import STACK_COLUMNS, ViewTables, carve_blocks
-from tracker.evidence.voxels.sensor_lookup import Lens, SensorLookup, lens_of, lookup_of_lens
+from tracker.evidence.voxels.sensor_lookup import SensorLookup, lookup_of_lens
 from tracker.evidence.voxels.voxel_grid import VoxelGrid, Voxels
 from tracker.geometry.arrays import FloatArray, IntArray
+from tracker.geometry.lens_tables import Lens, lens_of
 
 _BLOCK = 16
 """Voxels along the edge of the largest blocks. For a room of 3 m and voxels of 25 mm, 69,200 blocks and voxels of 1.8

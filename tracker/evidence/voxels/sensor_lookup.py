@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import BEYOND_PX, Camera
-from tracker.geometry.lens_tables import Lens, lens_of
+from tracker.geometry.lens_tables import Lens
 
 _STEPS_PER_PX = 2
 """Entries of the table per raw pixel along each axis."""
@@ -38,17 +38,9 @@ class SensorLookup(NamedTuple):
     """Upper bound of the distance of two entries' pixels along an image axis, divided by their distance."""
 
 
-def sensor_lookup(camera: Camera) -> SensorLookup:
-    """Return the table of a camera, cached by its lens and image size.
-
-    It covers the image and half a pixel around it.
-    """
-    return lookup_of_lens(lens_of(camera))
-
-
 @lru_cache(maxsize=32)
 def lookup_of_lens(lens: Lens) -> SensorLookup:
-    """Return the table of all cameras with a lens, cached."""
+    """Return the table of all cameras with a lens, cached. It covers the image and half a pixel around it."""
     camera = lens.camera
     low, high = _border(camera)
     step = max(1 / (_STEPS_PER_PX * max(camera.K[0, 0], camera.K[1, 1])), float((high - low).max()) / _MAX_ENTRIES)

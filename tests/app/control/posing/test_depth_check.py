@@ -10,7 +10,7 @@ FRONT, RIGHT, BACK, LEFT = range(4)
 
 
 def unseen(controller):
-    return encoding.state(controller.session, controller.state).unseen_depth
+    return controller.state.unseen_depth
 
 
 def test_opposite_views_alone_miss_the_depth_until_a_view_across_is_used(controller):
@@ -18,11 +18,12 @@ def test_opposite_views_alone_miss_the_depth_until_a_view_across_is_used(control
     assert unseen(controller) is None  # the first placement of all
     drag(controller, "left_wrist", (5.0, 3.0), BACK)
     note = unseen(controller)
-    assert (note.person, note.points) == (0, ("left_wrist",))
-    assert note.camera in (RIGHT, LEFT)
+    assert (note.person, note.unseen.points) == (0, ("left_wrist",))
+    assert note.unseen.camera in (RIGHT, LEFT)
+    assert encoding.state(controller.session, controller.state).view_across == note.unseen.camera
     drag(controller, "right_wrist", (4.0, 4.0), BACK)
-    assert unseen(controller).points == ("right_wrist", "left_wrist")
-    drag(controller, "right_wrist", (4.0, 4.0), note.camera)
+    assert unseen(controller).unseen.points == ("right_wrist", "left_wrist")
+    drag(controller, "right_wrist", (4.0, 4.0), note.unseen.camera)
     assert unseen(controller) is None
 
 

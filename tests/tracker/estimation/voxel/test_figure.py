@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from moving_figure import joint_points
 
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.voxel.body_pose import pose_of, state_of
-from tracker.estimation.voxel.figure import chain_centers, figure_of, joint_points, part_rotations, torso_center
+from tracker.estimation.voxel.figure import chain_centers, figure_of, part_rotations, torso_center
 from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import PRESETS, load_model

@@ -1,0 +1,44 @@
+"""The line over the views of a page (docs/protocol.md)."""
+
+from app.advice.situations import advise
+from app.advice.stored_work import PersonWork, StoredWork
+from app.control.controller import Controller
+from app.messages.advice import AdviceMessage
+from app.state.state import State
+
+
+class AdviceFeed:
+    """Remembers what one page has received, and what the session stored then."""
+
+    def __init__(self) -> None:
+        """Begin with nothing sent."""
+        self._sent: AdviceMessage | None = None
+        self._stored: StoredWork | None = None
+        self._version = -1
+
+    def update(self, controller: Controller, state: State) -> AdviceMessage | None:
+        """Return the message that brings the page up to date; None where it is, and during a drag."""
+        if state.is_dragging:
+            return None
+        is_busy = state.track.running and self._stored is not None  # its poses change twice a second
+        if not is_busy and self._version != state.timeline_version:
+            self._version = state.timeline_version
+            self._stored = stored_work(controller)
+        assert self._stored is not None
+        message = AdviceMessage(tuple(advise(state, self._stored)))
+        if message == self._sent:
+            return None
+        self._sent = message
+        return message
+
+
+def stored_work(controller: Controller) -> StoredWork:
+    """Sum up what the session stores."""
+    session, timeline = controller.session, controller.stored_poses.timeline
+    is_lone = len(session.people) == 1
+    people = (
+        PersonWork.of(p.name, p.model, timeline(0, None if is_lone else i), session.fps)
+        for i, p in enumerate(session.people)
+    )
+    names = tuple(c.camera.name for c in session.cameras)
+    return StoredWork(tuple(people), session.n_frames, session.has_outlines, names)
