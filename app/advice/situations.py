@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from app.advice.stored_work import StoredWork, Unsure
+from app.advice.stored_work import StoredWork
 from app.advice.work_under_way import work_under_way
 from app.messages.advice import Action, Advice
 from app.state.state import State
@@ -184,28 +184,28 @@ def _untracked(_: State, stored: StoredWork) -> Iterator[Advice]:
     first = max(p.first or 0 for p in stored.people)
     last = min(p.last or 0 for p in stored.people)
     step = max(p.step for p in stored.people)
-    end = f"{last + 1} to {stored.n_frames - 1}", stored.n_frames - 1 - last, last, "forward"
-    for frames, n, frame, way in (end, (f"0 to {first - 1}", first, first, "backward")):
-        if n >= step:
+    end = stored.n_frames - 1
+    for one, other, frame, way in ((last + 1, end, last, "forward"), (0, first - 1, first, "backward")):
+        if other - one + 1 >= step:
             track = Action("track", f"Track {way} from frame {frame}", frame, of=way)
-            yield Advice("untracked", f"Frames {frames} have no pose yet.", (track,))
+            yield Advice("untracked", f"{_span(one, other)} have no pose yet.", (track,))
 
 
-def _unsure(_: State, stored: StoredWork) -> Iterator[Advice]:
+def _unsure(state: State, stored: StoredWork) -> Iterator[Advice]:
     """Poses of a run are in doubt, and nobody has looked at them."""
     n = sum(p.n_unsure for p in stored.people)
     if not n or not stored.is_tracked:
         return
-    person, worst = max(
-        ((i, p.unsure[0]) for i, p in enumerate(stored.people) if p.unsure),
-        key=lambda one: (one[1].status == "lost", one[1].probability),
-    )
+    in_doubt = [(p.unsure[0], i) for i, p in enumerate(stored.people) if p.unsure]
+    worst, person = max(in_doubt, key=lambda one: one[0].severity)
     places = sum(len(p.unsure) for p in stored.people) - 1
     more = f", and {places} more {'place' if places == 1 else 'places'}" if places else ""
-    kind = "frames" if len(stored.people) == 1 else "poses"
-    limb = f"{worst.limb or 'pose'}{_whose(stored, person)} {'lost' if worst.status == 'lost' else 'unsure'}"
-    text = f"{stored.n_poses - n:,} of {stored.n_poses:,} {kind} are good. {_span(worst)}: {limb}{more}."
-    yield Advice("unsure", text, (Action("show_doubt", "Look", worst.worst, person),), "doubt")
+    good = f"{stored.n_poses - n:,} of {stored.n_poses:,} {'frames' if len(stored.people) == 1 else 'poses'} are good"
+    how = f"{_whose(stored, person)} {'lost' if worst.status == 'lost' else 'unsure'}"
+    text = f"{good}. {_span(worst.first, worst.last)}: {worst.limb or 'pose'}{how}{more}."
+    look, accept = Action("show_doubt", "Look", worst.worst, person), Action("accept", "It is right")
+    actions = (accept, look) if worst.first <= state.frame <= worst.last else (look,)
+    yield Advice("unsure", text, actions, "doubt")
 
 
 def _usual_sizes(_: State, stored: StoredWork) -> Iterator[Advice]:
@@ -241,9 +241,8 @@ def _whose(stored: StoredWork, person: int) -> str:
     return f" of {stored.people[person].name}" if len(stored.people) > 1 else ""
 
 
-def _span(unsure: Unsure) -> str:
-    one = unsure.first == unsure.last
-    return f"Frame {unsure.first}" if one else f"Frames {unsure.first} to {unsure.last}"
+def _span(first: int, last: int) -> str:
+    return f"Frame {first}" if first == last else f"Frames {first} to {last}"
 
 
 def _sentence(text: str) -> str:

@@ -27,6 +27,11 @@ class Unsure(NamedTuple):
     limb: str
     """For display; empty where no limb is named."""
 
+    @property
+    def severity(self) -> tuple[bool, float]:
+        """The status, then the probability."""
+        return self.status == "lost", self.probability
+
 
 @dataclass(frozen=True)
 class PersonWork:
@@ -110,10 +115,6 @@ def _stretches(
             last_of[limb or cell["remark"]] = len(found)
             found.append(here)
             continue
-        worst = max(found[at], here, key=_severity)
+        worst = max(found[at], here, key=lambda u: u.severity)
         found[at] = worst._replace(first=found[at].first, last=frame)
-    return tuple(sorted(found, key=lambda u: (*_severity(u), u.last - u.first), reverse=True))
-
-
-def _severity(unsure: Unsure) -> tuple[bool, float]:
-    return unsure.status == "lost", unsure.probability
+    return tuple(sorted(found, key=lambda u: (*u.severity, u.last - u.first), reverse=True))

@@ -5,9 +5,9 @@ from typing import Literal
 from app.messages.base import Message, Part
 
 Deed = Literal[
-    "acquire", "apply_correction", "apply_sizes", "by_key_points", "check_cameras", "detect", "export", "find", "fit",
-    "go_to", "place", "resume", "retry", "search", "show_before", "show_doubt", "show_section", "show_silhouettes",
-    "show_view", "stop", "take_all_back", "take_back", "track", "track_again",
+    "accept", "acquire", "apply_correction", "apply_sizes", "by_key_points", "check_cameras", "detect", "export",
+    "find", "fit", "go_to", "place", "resume", "retry", "search", "show_before", "show_doubt", "show_section",
+    "show_silhouettes", "show_view", "stop", "take_all_back", "take_back", "track", "track_again",
 ]  # fmt: skip
 """What a button does; the page knows how."""
 Level = Literal["next", "work", "doubt", "fault"]

@@ -19,7 +19,7 @@ const TICK_MS = 1000;
 export class AdviceLine {
   #store;
   #perform;
-  #log = new AdviceLog();
+  log = new AdviceLog();
   #line = byId("advice", HTMLElement);
   #text = byId("advice-text", HTMLElement);
   #bar = byId("advice-share", HTMLProgressElement);
@@ -51,7 +51,7 @@ export class AdviceLine {
   /** @param {Notice} notice answers what the user did */
   answer(notice) {
     this.#answer = notice;
-    this.#log.add(notice.text, notice.level === "error");
+    this.log.add(notice.text, notice.level === "error");
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => this.#forgetAnswer(), ANSWER_MS[notice.level]);
     this.#show();
@@ -65,10 +65,6 @@ export class AdviceLine {
     this.#dismissed.add(keyOf(said));
     this.#show();
     return true;
-  }
-
-  toggleLog() {
-    this.#log.toggle();
   }
 
   #forgetAnswer() {
@@ -103,7 +99,7 @@ export class AdviceLine {
     const text = now?.text ?? "";
     if (this.#text.textContent !== text) {
       this.#text.textContent = this.#text.title = text;
-      if (text && this.#store.facts.connected && !this.#answer) this.#log.add(text, now?.level === "fault");
+      if (text && this.#store.facts.connected && !this.#answer) this.log.add(text, now?.level === "fault");
     }
     this.#bar.hidden = now?.level !== "work" || now.share === null;
     this.#bar.value = now?.share ?? 0;

@@ -497,6 +497,11 @@ class FakeEndpoint:
             "limbs_lost": LIMBS_LOST.get(status_of(frame), []) if frame >= 10 else [],
         }
 
+    async def tell(self, **state):
+        """Change the state, and send it."""
+        self.state |= state
+        await self.broadcast(self.state)
+
     async def broadcast(self, message):
         text = encoded(message)
         for socket in list(self.sockets):

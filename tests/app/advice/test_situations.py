@@ -123,6 +123,7 @@ ROWS = [
         "Ann is tracked with usual proportions", ["acquire"],
     ),
     ("unsure", state("tracked"), WORN, "89 of 90 frames are good. Frames 84 to 99: left leg unsure.", ["show_doubt"]),
+    ("unsure", replace(state("tracked"), frame=90), WORN, "left leg unsure", ["accept", "show_doubt"]),
     ("done", state("tracked"), TRACKED, "All 90 poses are good or looked at.", ["export"]),
 ]  # fmt: skip
 ORDER = list(dict.fromkeys(name for name, *_ in ROWS))

@@ -78,8 +78,7 @@ async def test_contours_of_other_poses_are_contours_too(page, endpoint, kind):
 
 @pytest.mark.slow
 async def test_the_corner_is_right_about_a_replayed_pose(page, endpoint):
-    endpoint.state |= {"point": "l_wrist", "replay": REPLAY}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(point="l_wrist", replay=REPLAY)
     await endpoint.send_overlay()
     corner = page.locator(".pane-joint")
     await shows(page, "quadrille.state.state.replay !== null && !document.querySelector('.pane-joint').hidden")

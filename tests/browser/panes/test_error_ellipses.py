@@ -32,8 +32,7 @@ async def is_drawn(page):
 
 
 async def test_ellipses_are_switched_on_in_the_inspector_and_kept(page, endpoint):
-    endpoint.state["expected_errors_m"] = ERRORS_M
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(expected_errors_m=ERRORS_M)
     switch = await open_inspector(page)
     assert not await switch.is_checked()
     assert not await is_drawn(page)
@@ -59,8 +58,7 @@ async def test_the_inspector_says_where_errors_come_from_while_none_are_known(pa
     await switch.check()
     await why.wait_for()
     await until(lambda: "errors" in endpoint.views[-1]["layers"])
-    endpoint.state["expected_errors_m"] = ERRORS_M
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(expected_errors_m=ERRORS_M)
     await why.wait_for(state="hidden")
 
 
@@ -68,13 +66,10 @@ async def test_the_selected_joint_shows_its_expected_error(page, endpoint):
     await open_inspector(page)
     error = page.get_by_text("Expected error")
     assert await error.is_hidden()
-    endpoint.state |= {"expected_errors_m": ERRORS_M, "point": "l_elbow"}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(expected_errors_m=ERRORS_M, point="l_elbow")
     await error.wait_for()
     assert await error.inner_text() == "Expected error 23 mm"
-    endpoint.state["point"] = "l_wrist"
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(point="l_wrist")
     await shows(page, "document.querySelector('[data-section=joint]').textContent.includes('Expected error 100 mm')")
-    endpoint.state["expected_errors_m"] = []
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(expected_errors_m=[])
     await error.wait_for(state="hidden")

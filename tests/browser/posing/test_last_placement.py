@@ -3,21 +3,9 @@
 import pytest
 from page_driver import shows, until
 
-COMPARED = {
-    "number": 4, "work": "fit", "before_px": 5.74, "after_px": 5.44, "before_view_costs_px": [],
-    "after_view_costs_px": [], "warning": "", "is_before_shown": False,
-}  # fmt: skip
-
-
-async def tell(endpoint, **state):
-    endpoint.state |= state
-    await endpoint.broadcast(endpoint.state)
-
 
 @pytest.mark.endpoint(n_people=2)
 async def test_limbs_that_a_fit_moved_by_itself_are_taken_back_by_a_key(page, endpoint):
-    await tell(endpoint, compared=COMPARED)
-    await shows(page, "quadrille.state.state.compared")
     await page.keyboard.press("Alt+b")
     await until(lambda: endpoint.heard("limb_back") == [{"type": "limb_back", "frame": 12}])
 
@@ -41,7 +29,7 @@ async def test_a_fit_can_be_limited_to_a_person_or_a_limb(page, endpoint):
     ]  # fmt: skip
     assert await items.nth(2).is_disabled()
     await page.keyboard.press("Escape")
-    await tell(endpoint, point="l_elbow")
+    await endpoint.tell(point="l_elbow")
     await shows(page, "quadrille.state.state.point === 'l_elbow'")
     await page.keyboard.press("Alt+g")
     await page.locator("#fit-choices").click()
@@ -59,7 +47,7 @@ async def test_a_fit_can_be_limited_to_a_person_or_a_limb(page, endpoint):
 async def test_the_view_across_fills_the_grid(page, endpoint):
     await page.keyboard.press("Alt+v")
     await page.locator("#advice-text", has_text="The views have shown the depth").wait_for()
-    await tell(endpoint, view_across=1)
+    await endpoint.tell(view_across=1)
     await shows(page, "quadrille.state.state.view_across === 1")
     await page.keyboard.press("Alt+v")
     await shows(page, "quadrille.state.filled === 1")

@@ -12,8 +12,7 @@ async def test_it_follows_the_first_cost_where_no_graphics_card_draws(page, endp
     endpoint.state |= {"compiling": "evidence", "cost_px": None}
     await reloaded(page)
     assert await page.evaluate(ADDRESS) is None
-    endpoint.state["cost_px"] = 6.27
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(cost_px=6.27)
     await shows(page, f"{ADDRESS}?.startsWith('viser/')")
 
 

@@ -82,8 +82,7 @@ async def test_a_keyboard_alone_does_a_round_of_work(page, endpoint):
 async def test_the_live_region_says_what_changed(page, endpoint):
     await page.keyboard.press("Period")
     await shows(page, "document.querySelector('#announcer').textContent.startsWith('frame 13')")
-    endpoint.state |= {"undo": "drag r_knee, frame 13"}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(undo="drag r_knee, frame 13")
     await shows(page, "document.querySelector('#announcer').textContent === 'drag r_knee, frame 13.'")
 
 

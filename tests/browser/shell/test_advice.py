@@ -138,8 +138,7 @@ async def test_an_answer_ends_by_itself(page, endpoint):
 @pytest.mark.slow
 async def test_an_edit_that_is_not_saved_holds_the_page(fresh_page, endpoint):
     page = fresh_page
-    endpoint.state |= {"saved": False, "save_error": "the disk is full; make room"}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(saved=False, save_error="the disk is full; make room")
     await page.locator("#saved.is-failed").click()
     await until(lambda: len(endpoint.heard("save")) == 1)
     prompts = []
@@ -151,8 +150,7 @@ async def test_an_edit_that_is_not_saved_holds_the_page(fresh_page, endpoint):
     page.on("dialog", stay)
     await page.close(run_before_unload=True)
     await until(lambda: prompts == ["beforeunload"])
-    endpoint.state |= {"saved": True, "save_error": None}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(saved=True, save_error=None)
     await shows(page, "document.querySelector('#saved').textContent === 'All saved'")
     assert await page.evaluate("dispatchEvent(new Event('beforeunload', { cancelable: true }))")
 

@@ -122,8 +122,7 @@ async def test_history_and_saving_say_what_they_would_do(page, endpoint):
     assert await page.locator("#undo").get_attribute("title") == "Undo drag l_wrist (Ctrl+Z)"
     assert await page.locator("#redo").is_disabled()
     assert await page.locator("#saved").inner_text() == "All saved"
-    endpoint.state |= {"saved": False, "save_error": "the disk is full", "undo": None, "redo": "search"}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(saved=False, save_error="the disk is full", undo=None, redo="search")
     await shows(page, "document.querySelector('#saved').textContent === 'Not saved'")
     assert "Not saved: the disk is full" in await page.locator("#saved").get_attribute("title")
     assert await page.locator("#saved").get_attribute("class") == "is-failed"

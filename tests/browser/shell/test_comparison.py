@@ -19,8 +19,7 @@ TEXT = "document.querySelector('#show-comparison').textContent"
 @pytest.mark.slow
 async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_before(page, endpoint):
     assert not await page.locator("#show-comparison").is_visible()
-    endpoint.state |= {"compared": COMPARED, "cost_px": 5.44}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(compared=COMPARED, cost_px=5.44)
     await shows(page, f"{TEXT} === '5.74 →'")
     await page.locator("#show-comparison").click()
     rows = await page.locator("#comparison-views tr").all_inner_texts()
@@ -39,8 +38,7 @@ async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_befor
     await page.keyboard.press("Escape")
     await shows(page, "document.querySelector('#before-badge').hidden")
     await until(lambda: [m["shown"] for m in endpoint.heard("before")] == [True, False])
-    endpoint.state["compared"] = None  # the pose has changed since
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(compared=None)  # the pose has changed since
     await page.locator("#show-comparison").wait_for(state="hidden")
     await page.keyboard.press("Shift+B")
     await until(lambda: len(endpoint.heard("before")) == 2)
@@ -51,8 +49,7 @@ async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_befor
 async def test_the_top_bar_has_room_for_a_comparison(page, endpoint):
     job = endpoint.idle_job("done: 12,345 poses scored")
     compared = COMPARED | {"before_px": 15.74, "warning": WARNING}
-    endpoint.state |= {"compared": compared, "cost_px": 15.44, "job": job}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(compared=compared, cost_px=15.44, job=job)
     await shows(page, f"{TEXT} === '15.74 →'")
     for width in (1280, 1440, 1520, 1640, 1700, 1770, 1920):
         await page.set_viewport_size({"width": width, "height": 720})
@@ -67,8 +64,7 @@ async def test_the_top_bar_has_room_for_a_comparison(page, endpoint):
 
 async def test_a_result_that_disagrees_with_the_placement_says_so_until_the_next_fit(page, endpoint):
     for number, warning in ((4, ""), (5, WARNING), (6, "")):
-        endpoint.state["compared"] = COMPARED | {"number": number, "warning": warning}
-        await endpoint.broadcast(endpoint.state)
+        await endpoint.tell(compared=COMPARED | {"number": number, "warning": warning})
         await shows(page, f"quadrille.state.state.compared?.number === {number}")
         if warning:
             await page.locator("#show-comparison").click()
@@ -80,8 +76,7 @@ async def test_a_result_that_disagrees_with_the_placement_says_so_until_the_next
 @pytest.mark.parametrize("width", [1280, 1510, 1600, 1640])
 async def test_both_costs_have_room_in_the_top_bar(page, endpoint, width):
     await page.set_viewport_size({"width": width, "height": 900})
-    endpoint.state |= {"compared": COMPARED, "cost_px": 5.44}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(compared=COMPARED, cost_px=5.44)
     await shows(page, f"{TEXT} === '5.74 →'")
     heights = "['.cost', '.top-bar'].map((name) => document.querySelector(name).getBoundingClientRect().height)"
     cost, bar = await page.evaluate(heights)

@@ -137,11 +137,8 @@ async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(coup
     await shows(couple, "quadrille.state.state.job.kind === 'step' && !quadrille.state.state.job.running")
     assert (await stop.get_attribute("title")).startswith("End the paused search")
     assert not await legend.is_visible()
-    endpoint.state |= {
-        "compared_run": 2, "replay": {"run": 3, "step": 4, "steps": 9, "stage": "arms"},
-    }  # fmt: skip
     endpoint.other_kind = "compared"
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(compared_run=2, replay={"run": 3, "step": 4, "steps": 9, "stage": "arms"})
     await endpoint.send_overlay(candidate=0.1)
     await shows(couple, "document.querySelectorAll('#pose-legend svg').length === 3")
     texts = await legend.locator("span").all_inner_texts()

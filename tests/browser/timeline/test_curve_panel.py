@@ -175,8 +175,7 @@ async def test_the_landscape_says_why_it_is_empty(page, endpoint):
     waiting = page.locator("#landscape p")
     assert "Sampling the cost" in await waiting.inner_text()
     await page.keyboard.press("v")
-    endpoint.state["compiling"] = "cost"
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(compiling="cost")
     await shows(page, "quadrille.state.state.compiling === 'cost'")
     await page.keyboard.press("v")
     await shows(page, "document.querySelector('#landscape p').innerText.includes('once the kernels are compiled')")

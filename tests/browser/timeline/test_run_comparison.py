@@ -72,8 +72,7 @@ def stretch(first, last, frames, verdict):
 
 async def test_gain_and_harm_of_a_run_are_opened_and_decided_by_stretch(page, endpoint):
     await endpoint.broadcast(NOTHING)
-    endpoint.state["point"] = "l_wrist"
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(point="l_wrist")
     await shows(page, "quadrille.state.state.point === 'l_wrist'")  # and nothing is compared
     stretches = [stretch(24, 30, 6, "better"), stretch(31, 31, 1, "worse"), stretch(33, 36, 4, "better")]
     run = COMPARED | {"stretches": stretches, "run": 1}

@@ -257,14 +257,16 @@ async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
         "interpolate", "estimate",
     ]  # fmt: skip
     assert {(m["first"], m["last"], m["person"]) for m in endpoint.heard("range")} == {(24, 36, None)}
-    endpoint.state["range"] |= {"running": True, "what": "interpolating", "done": 500, "total": 12000}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(
+        range=endpoint.state["range"] | {"running": True, "what": "interpolating", "done": 500, "total": 12000}
+    )
     await shows(page, "document.querySelector('#range-work').textContent === 'interpolating 500 of 12,000'")
     assert await page.locator("#range-clear").is_disabled()
     await page.locator("#range-stop").click()
     await until(lambda: endpoint.heard("stop_range"))
-    endpoint.state["range"] |= {"running": False, "message": "stopped: interpolated 500 of 12000 frames"}
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(
+        range=endpoint.state["range"] | {"running": False, "message": "stopped: interpolated 500 of 12000 frames"}
+    )
     await shows(page, "document.querySelector('#range-work').textContent.startsWith('stopped: ')")
     await page.keyboard.press("Escape")
     await shows(page, "quadrille.state.range === null")
@@ -279,8 +281,10 @@ async def test_poses_around_a_frame_are_estimated_again_in_a_range_of_their_own(
         await page.keyboard.press("Shift+R")
         await shows(page, f"quadrille.state.range?.first === {first} && quadrille.state.range.last === {last}")
         for running, text in ((True, "estimating"), (False, "estimated 8 frames")):
-            endpoint.state["range"] |= {"running": running, "what": "estimating", "message": "" if running else text}
-            await endpoint.broadcast(endpoint.state)
+            await endpoint.tell(
+                range=endpoint.state["range"]
+                | {"running": running, "what": "estimating", "message": "" if running else text}
+            )
             await shows(page, f"document.querySelector('#range-work').textContent.startsWith('{text}')")
     await mark(page, 24, 36)
     await page.keyboard.press("Shift+R")
@@ -326,8 +330,7 @@ async def test_marks_of_the_shown_frame(page, endpoint):
 @pytest.mark.endpoint(n_people=2)
 async def test_the_legend_leaves_out_what_does_not_fit(page, endpoint):
     await page.set_viewport_size({"width": 1280, "height": 720})
-    endpoint.state["other_sizes"] = True
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(other_sizes=True)
     await shows(page, "document.querySelector('#source').textContent.endsWith(', earlier sizes')")
     legend = await page.locator("#legend").bounding_box()
     entries = await page.locator(".legend-row > span").all()
@@ -344,8 +347,7 @@ async def test_the_legend_leaves_out_what_does_not_fit(page, endpoint):
     assert all(name in listed for name in ("lost", "keyframe", "smoothed", "pose under test"))
     await page.locator("#legend").click()
     await panel.wait_for(state="hidden")
-    endpoint.state["other_sizes"] = False
-    await endpoint.broadcast(endpoint.state)
+    await endpoint.tell(other_sizes=False)
     await page.locator("#legend").get_by_text("lost").wait_for()  # there is room for every status
     await page.set_viewport_size({"width": 1920, "height": 720})
     await page.locator(".legend-row > span").last.wait_for()
