@@ -174,7 +174,7 @@ def _camera_off(state: State, _: StoredWork) -> Iterator[Advice]:
         yield Advice("camera_off", _sentence(check.contradictions[0]), (*apply, _section("calibration")), "doubt")
     elif check is None and state.track.notice and not state.track.failed:
         check_cameras = Action("check_cameras", "Check the cameras")
-        yield Advice("camera_doubt", _sentence(state.track.notice), (check_cameras,), "doubt")
+        yield Advice("camera_doubt", _sentence(state.track.notice.partition(";")[0]), (check_cameras,), "doubt")
 
 
 def _untracked(_: State, stored: StoredWork) -> Iterator[Advice]:
