@@ -26,10 +26,8 @@ class AdviceFeed:
             self._stored = stored_work(controller)
         assert self._stored is not None
         message = AdviceMessage(tuple(advise(state, self._stored)))
-        if message == self._sent:
-            return None
-        self._sent = message
-        return message
+        is_known, self._sent = message == self._sent, message
+        return None if is_known else message
 
 
 def stored_work(controller: Controller) -> StoredWork:

@@ -98,10 +98,9 @@ def runs(found: Sequence[SearchRun], state: State) -> wire.SearchRunsMessage:
     """Describe the runs of the shown frame with their stages, and the step that is replayed."""
     differing = search_settings.differences([r.settings for r in found])
     listed = tuple(_run(run, differs, state) for run, differs in zip(found, differing, strict=True))
-    replay, compared = state.search_view.replay, state.search_view.compared_run
-    return wire.SearchRunsMessage(
-        listed, None if replay is None else made_of(wire.Replay, replay, best_px=replay.cost_px), compared
-    )
+    replay = state.search_view.replay
+    shown = None if replay is None else made_of(wire.Replay, replay, best_px=replay.cost_px)
+    return wire.SearchRunsMessage(listed, shown, state.search_view.compared_run)
 
 
 def steps(run: SearchRun, first: int) -> bytes:

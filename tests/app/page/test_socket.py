@@ -378,10 +378,10 @@ async def test_evidence_waits_for_the_pictures(controller):
 @pytest.mark.slow
 async def test_a_pose_changes_the_part_masks_alone(controller, page):
     await page.shows("image", "parts")
-    await page.hear("image", lambda m: m["of"] == 8)
-    count = len(page.told) + 7
+    await page.hear("image", lambda m: (m["layer"], m["camera"]) == ("parts", 3))  # the last one
+    count = len(page.told)
     drag(controller, "left_knee", (4.0, 0.0))
-    await page.hear("image", lambda m: m["of"] == 4)
+    await page.hear("image", lambda m: m["camera"] == 3)
     assert {m["layer"] for m in page.told[count:] if m["type"] == "image"} == {"parts"}
 
 
