@@ -34,19 +34,13 @@ function wordFitness(word, text) {
 }
 
 /**
- * Match letters in their order with others between them. Fewer letters between are better; too many are no match.
+ * Match letters of one word of the text in their order, from its first on. Fewer letters between them are better.
  *
  * @param {string} word
  * @param {string} text
  */
 function scattered(word, text) {
-  let at = -1;
-  let first = 0;
-  for (const letter of word) {
-    at = text.indexOf(letter, at + 1);
-    if (at < 0) return null;
-    if (letter === word[0] && first === 0) first = at;
-  }
-  const spread = at - first + 1 - word.length;
-  return spread <= 2 * word.length ? 5 - spread / 10 : null;
+  const letters = [...word].map((letter) => letter.replace(/[^a-z0-9]/, "\\$&"));
+  const found = new RegExp(`(?<![a-z0-9])${letters.join("[a-z0-9]*?")}`).exec(text)?.[0].length ?? Infinity;
+  return found <= 3 * word.length ? 5 - (found - word.length) / 10 : null;
 }
