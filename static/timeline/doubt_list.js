@@ -181,7 +181,6 @@ function explain(row, sentence) {
   if (!sentence) return;
   const known = row.querySelector(".doubt-reason") ?? line("doubt-reason", "");
   known.textContent = sentence;
-  row.classList.add("is-explained");
   row.querySelector(".doubt-text > .quiet")?.before(known);
 }
 

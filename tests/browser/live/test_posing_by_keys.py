@@ -144,7 +144,7 @@ async def test_the_bar_keeps_its_height_and_nothing_is_cut_off(live, width):
     for joint in ("torso", "left_shoulder", "head"):
         await select(live, joint)
         box = await live.locator("#joint-bar").bounding_box()
-        assert box["height"] == 34
+        assert box["height"] == (34 if width == 1280 else 52)  # a narrow one has two rows, whatever the joint
         last = await live.locator("#reset-limb").bounding_box()
         assert last["x"] + last["width"] <= width
     assert await live.evaluate("document.querySelector('#joint-bar').scrollWidth") <= width

@@ -83,4 +83,3 @@ async def test_both_costs_have_room_in_the_top_bar(page, endpoint, width):
     assert cost <= bar
     usual = await page.locator("#usual-cost").bounding_box()
     assert usual["y"] + usual["height"] <= bar
-    await page.set_viewport_size({"width": 1440, "height": 900})

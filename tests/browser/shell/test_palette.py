@@ -165,6 +165,7 @@ async def test_every_key_and_button_is_in_it(page):
 @pytest.mark.slow
 async def test_the_list_of_keys_is_searched_and_fits(page):
     await page.keyboard.press("?")
+    assert await page.get_by_role("dialog").locator("dt").count() >= 24
     scroller = page.locator("#key-list .scroller")
     for width, height in ((1280, 720), (1440, 900)):
         await page.set_viewport_size({"width": width, "height": height})
@@ -181,6 +182,8 @@ async def test_the_list_of_keys_is_searched_and_fits(page):
     ]  # fmt: skip
     await page.locator("#key-query").fill("interpolated between")  # the marks are listed too
     assert await page.locator("#key-list dd:visible").all_inner_texts() == ["interpolated between poses"]
+    await page.keyboard.press("Escape")
+    await page.get_by_role("dialog").wait_for(state="hidden")
 
 
 async def test_no_two_commands_obey_the_same_key(page):
