@@ -13,11 +13,13 @@ from tracker.errors import SessionError, TrackerError
 if TYPE_CHECKING:
     from tracker.body.model import BodyModel, PosedBody
     from tracker.estimation.fitting.observability import Observability
-    from tracker.geometry.arrays import Array, IntArray
+    from tracker.geometry.arrays import Array
     from tracker.geometry.cameras import Camera
 
 _MAX_FRAMES = 50
 """Frames of a range that are looked at, evenly spread; poses of neighbouring frames are alike."""
+_SPREADS = ("mean_before", "mean_after", "largest_before", "largest_after")
+"""Standard deviations of the angles without and with another camera, radians."""
 _N_POSITIONS = 3
 """Positions of another camera that are printed."""
 
@@ -33,7 +35,7 @@ class ObservabilityArguments:
     frames: OptionalRange = None
     """A:B, half open: medians over these frames instead."""
     person: OptionalName = None
-    """name; needed in a session of several people."""
+    """name; all people with a pose by default."""
     another_camera: bool = False
     """also answer where one more camera would help most."""
     json: bool = False
@@ -46,11 +48,22 @@ def command(arguments: Annotated[ObservabilityArguments, tyro.conf.arg(name="")]
     The standard deviations follow from the contours of the posed body in the views, with the noise of real contours.
     No image is read.
     """
-    at = load_target(arguments.session, arguments.person, several=False)
+    at = load_target(arguments.session, arguments.person, several=True)
     if arguments.frame is not None and arguments.frames is not None:
         raise TrackerError("expected --frame or --frames, found both; leave one out")
-    found = observability(at, arguments.frame, arguments.frames, arguments.another_camera)
-    print(format_json(found) if arguments.json else _format(found))
+    found, missing = list[dict[str, Any]](), list[SessionError]()
+    for index in at.people:
+        try:
+            one = Target(at.session, (index,))
+            found.append(observability(one, arguments.frame, arguments.frames, arguments.another_camera))
+        except SessionError as error:
+            missing.append(error)
+    if not found:
+        raise missing[0]
+    if arguments.json:
+        print(format_json(found[0] if len(at.people) == 1 else {"people": found}))
+    else:
+        print(*map(_format, found), *missing, sep="\n")
 
 
 def observability(at: Target, frame: int | None, frames: str | None, another_camera: bool = False) -> dict[str, Any]:
@@ -61,6 +74,7 @@ def observability(at: Target, frame: int | None, frames: str | None, another_cam
         TrackerError: the frames are not within the session.
     """
     from tracker.estimation.fitting.observability import observe_pose
+    from tracker.evidence.images.working_view import working_scale
     from tracker.geometry.ground_plane import up_rotation
 
     session, (index,) = at
@@ -74,13 +88,12 @@ def observability(at: Target, frame: int | None, frames: str | None, another_cam
         )
     if frames is None:
         scenes = dict([next(iter(scenes.items()))])
-    cameras, person = _working_cameras(at), 0  # the person comes first
-    found = {k: observe_pose(bodies, cameras, person) for k, bodies in scenes.items()}
+    cameras = [s.camera.pinhole.scaled(working_scale(s.camera)) for s in session.cameras]
+    found = {k: observe_pose(bodies, cameras, 0) for k, bodies in scenes.items()}  # the person comes first
     out = _summary(session.people[index].name, scenes, cameras, found)
     if another_camera:
-        out["another_camera"] = _another_camera(
-            list(scenes.values()), cameras, up_rotation(session.up, session.floor)[:, 2]
-        )
+        up = up_rotation(session.up, session.floor)[:, 2]
+        out["another_camera"] = _another_camera([*scenes.values()], cameras, up)
     return out
 
 
@@ -96,12 +109,6 @@ def _scenes(at: Target, wanted: range) -> "dict[int, list[PosedBody]]":
     return {k: [of_one[k].body for of_one in poses if k in of_one] for k in posed}
 
 
-def _working_cameras(at: Target) -> "list[Camera]":
-    from tracker.evidence.images.working_view import working_scale
-
-    return [s.camera.pinhole.scaled(working_scale(s.camera)) for s in at.session.cameras]
-
-
 def _summary(
     name: str, scenes: "dict[int, list[PosedBody]]", cameras: "list[Camera]", found: "dict[int, Observability]"
 ) -> dict[str, Any]:
@@ -115,8 +122,7 @@ def _summary(
     alike = [o for o in found.values() if o.model.dof_names == model.dof_names]
     sigmas = np.median([o.sigmas for o in alike], axis=0)
     shares = np.mean([o.is_observable for o in alike], axis=0)
-    votes = np.array([o.best_views for o in alike])
-    best = [int(np.bincount(column).argmax()) for column in votes.T]
+    best = [int(np.bincount(views).argmax()) for views in np.transpose([o.best_views for o in alike])]
     sentences = describe_all(scenes[first], cameras, found[first]) if len(found) == 1 else None
     return {
         "person": name,
@@ -148,20 +154,11 @@ def _another_camera(frames: "list[list[PosedBody]]", cameras: "list[Camera]", up
             "position_m": [float(v) for v in c.camera.center_world],
             "direction_deg": float(np.degrees(c.direction_rad)),
             "elevation_deg": float(np.degrees(c.elevation_rad)),
-            "mean_before_deg": float(np.degrees(c.mean_before)),
-            "mean_after_deg": float(np.degrees(c.mean_after)),
-            "largest_before_deg": float(np.degrees(c.largest_before)),
-            "largest_after_deg": float(np.degrees(c.largest_after)),
-            "gains_most": [model.dof_names[int(i)] for i in _largest_gains(c.gains, model)],
+            **{f"{name}_deg": float(np.degrees(getattr(c, name))) for name in _SPREADS},
+            "gains_most": [model.dof_names[i] for i in np.argsort(-c.gains * ~model.dof_is_length)[:3]],
         }
         for c in rank_added_cameras(alike, cameras, up)
     ]
-
-
-def _largest_gains(gains: "Array", model: "BodyModel") -> "IntArray":
-    import numpy as np
-
-    return np.argsort(np.where(model.dof_is_length, -np.inf, gains))[::-1][:3]
 
 
 def _format(found: dict[str, Any]) -> str:

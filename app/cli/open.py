@@ -17,7 +17,7 @@ def command(
     session: _SessionOrSample = None,
     /,
     host: str = "127.0.0.1",
-    port: int = 8080,
+    port: OptionalWhole = None,
     allow_host: Names = (),
     browser: bool = True,
     token: bool = True,
@@ -33,7 +33,7 @@ def command(
     Args:
         session: session folder.
         host: address to listen at; anything but loopback needs --allow-host.
-        port: port to listen at; 0 takes a free one.
+        port: port to listen at; 0 takes a free one, and by default the first free one from 8080 to 8089 is taken.
         allow_host: names by which browsers may call this machine.
         browser: open the page in the default browser.
         token: require the token in the printed address. Without it every account of this machine can use the page.

@@ -3,12 +3,15 @@
 import errno
 import socket
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from app.server.access import Access, is_loopback
 from tracker.errors import TrackerError
 
 _BACKLOG = 128
+_PORTS = range(8080, 8090)
+"""Ports of which the first free one is taken where none is named."""
 
 
 @dataclass(frozen=True)
@@ -16,7 +19,8 @@ class Serving:
     """Address and access of the page."""
 
     host: str = "127.0.0.1"
-    port: int = 8080
+    port: int | None = None
+    """None takes the first free one of a few."""
     allow_hosts: tuple[str, ...] = ()
     browser: bool = True
     """Whether to open the page in the default browser."""
@@ -26,16 +30,21 @@ class Serving:
     """Whether to make links for other people."""
 
 
-def listen(host: str, port: int) -> list[socket.socket]:
+def listen(host: str, port: int | None) -> list[socket.socket]:
     """Listen at all addresses of a host, at one port.
 
     Args:
         host: name or address of this machine.
-        port: port to listen at; 0 takes a free one.
+        port: port to listen at; 0 takes a free one, None the first free one of a few.
 
     Raises:
         TrackerError: the port is taken, or the address is not this machine's.
     """
+    if port is None:
+        for usual in _PORTS:
+            with suppress(TrackerError):
+                return listen(host, usual)
+        port = _PORTS[0]
     sockets: list[socket.socket] = []
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple, Self
 from platformdirs import user_state_path
 
 from app.runtime.restart import inherited
-from app.server.access import Access, Invitation, access_for
+from app.server.access import access_for
 from app.server.address import Serving, listen, page_address, port_of
 from app.server.static_files import KEPT, POLICY, PREFIX, PageFiles, connect_sources, static_folder
 from app.state.role import Role
@@ -127,13 +127,10 @@ class Doorway:
     def open_browser(self) -> None:
         """Open the page in the browser if that is wanted."""
         if self.serving.browser:
-            invited = self.access if self.access.invitation is None else self._invited(self.access.invitation)
-            opened = page_address(invited, self.serving.host, self.port)
+            # The token is the invitation: other accounts see the address of a browser.
+            code = self.access.invitation.code if self.access.invitation else self.access.token
+            opened = page_address(replace(self.access, token=code), self.serving.host, self.port)
             threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
-
-    def _invited(self, invitation: Invitation) -> Access:
-        """Return the access whose token is the invitation: other accounts see the address of a browser."""
-        return replace(self.access, token=invitation.code)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from tracker.body.model import BodyModel
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 
@@ -45,6 +47,14 @@ ARM = parse_model(
     """,
     "arm",
 )
+
+
+def set_deg(model, **degrees):
+    """The neutral pose but for some angles, degrees; a name has two underscores for its dot."""
+    values = model.neutral()
+    for name, angle in degrees.items():
+        values[model.value_names.index(name.replace("__", "."))] = np.radians(angle)
+    return values
 
 
 def with_center(model: BodyModel, point: str, offset: tuple[float, float, float]) -> BodyModel:

@@ -220,17 +220,13 @@ def observations(found: ObservationsState, people: Sequence[str]) -> observed.Ob
     judged = tuple(
         observed.JudgedPerson(j.person, j.share_in_order, len(j.frames), tuple(j.sentences)) for j in found.judgements
     )
-    doubts = [(people.index(j.person), d) for j in found.judgements for d in j.worst if _is_off(d)]
+    doubts = [(people.index(j.person), d) for j in found.judgements for d in j.worst if d.verdict.is_doubted]
     doubts.sort(key=lambda own: (-round(own[1].verdict.probability_off, 2), -own[1].verdict.distance_m))
     return observed.ObservationsMessage(
         sets, found.shown.name if found.shown is not None else "", found.plan is not None, found.running, found.stage,
         found.share, found.message, found.failed, found.judged, judged,
         tuple(_judged_limb(person, doubt) for person, doubt in doubts[:_MAX_LISTED]), len(doubts),
     )  # fmt: skip
-
-
-def _is_off(doubt: Doubt) -> bool:
-    return doubt.verdict.is_doubted
 
 
 def _judged_limb(person: int, doubt: Doubt) -> observed.JudgedLimb:

@@ -11,7 +11,6 @@ from tracker.body.model import PosedBody
 from tracker.estimation.fitting.observability import OBSERVABLE_M, OBSERVABLE_RAD, Observability, observe_pose
 from tracker.estimation.fitting.observability_reasons import describe_all
 from tracker.evidence.images.working_view import working_scale
-from tracker.geometry.cameras import Camera
 from tracker.session.session import Session
 
 LAYER = "observability"
@@ -45,15 +44,11 @@ def observability(session: Session, state: State) -> ObservabilityMessage:
     """Describe how well the views constrain the pose of the selected person."""
     person = state.person
     bodies = [PosedBody(m, p.values) for m, p in zip(state.models, state.people, strict=True)]
-    cameras = [_working_camera(c.camera) for c in session.cameras]
+    cameras = [c.camera.pinhole.scaled(working_scale(c.camera)) for c in session.cameras]
     found = observe_pose(bodies, cameras, person)
     sentences = describe_all(bodies, cameras, found, person)
     dofs = (_dof(found, d, sentence) for d, sentence in enumerate(sentences))
     return ObservabilityMessage(state.frame, person, tuple(dofs))
-
-
-def _working_camera(camera: Camera) -> Camera:
-    return camera.pinhole.scaled(working_scale(camera))
 
 
 def _dof(found: Observability, dof: int, sentence: str) -> DofObservability:

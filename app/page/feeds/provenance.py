@@ -11,7 +11,6 @@ from app.messages.observation import (
     WatchProvenance,
 )
 from app.state.identity import Identity
-from app.state.other_copy import OtherCopy
 from app.state.state import State
 from app.storage.pose_origins import PoseOrigin
 from tracker.interchange.exports.provenance import point_lost
@@ -103,13 +102,9 @@ def other_copy(controller: Controller, state: State) -> OtherCopyMessage:
     if copy is None:
         return _NO_COPY
     people = tuple(
-        tuple(_difference(copy, person, frame, joint, 1000 * m) for frame, joint, m in found)
-        for person, found in enumerate(copy.differences)
+        tuple(CopyDifferenceInfo(k, joint, round(1000 * m, 1), (i, k) in copy.decided) for k, joint, m in found)
+        for i, found in enumerate(copy.differences)
     )
     posed = tuple(state.frame in poses for poses in copy.poses)
     tolerance_mm = round(1000 * copy.tolerance_m, 3)
     return OtherCopyMessage(copy.name, copy.own_name, tolerance_mm, copy.notes, posed, people)
-
-
-def _difference(copy: OtherCopy, person: int, frame: int, joint: str, distance_mm: float) -> CopyDifferenceInfo:
-    return CopyDifferenceInfo(frame, joint, round(distance_mm, 1), (person, frame) in copy.decided)

@@ -353,7 +353,7 @@ def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
     assert run("open", session)[0] == 0
     assert samples == [("tango", False)]
     assert [folder for folder, _ in asked] == [session] * 3
-    assert (asked[0][1].host, asked[0][1].port) == ("127.0.0.1", 8080)
+    assert (asked[0][1].host, asked[0][1].port) == ("127.0.0.1", None)
     assert (asked[1][1].port, asked[1][1].browser) == (0, False)
     wait_for(lambda: len(browsed) == 2)
 

@@ -1,9 +1,11 @@
 """`quadrille observability`: a sentence for each degree of freedom, medians over frames, and one more camera."""
 
 import json
+import re
+import shutil
 
 import pytest
-from command_line import assert_refused
+from command_line import SAMPLE, assert_refused
 
 
 @pytest.mark.slow
@@ -43,3 +45,13 @@ def test_the_sentence_for_a_person(run, placed):
 )
 def test_refused(run, placed, words, expected):
     assert_refused(run("observability", placed, *words), expected)
+
+
+@pytest.mark.slow
+def test_all_people_with_a_pose_are_listed(run, tmp_path):
+    tango = shutil.copytree(SAMPLE.with_name("tango"), tmp_path / "tango")
+    for name, others in (("man", "expected a stored pose of 'woman'"), ("woman", "woman, frame 0: ")):
+        poses = ("--method", "poses", "--poses", tango / f"first_pose_{name}.csv", "--frame", "0")
+        assert run("init", tango, *poses, "--person", name, "--json")[0] == 0
+        assert re.match(rf"man, frame 0: .*\n{others}", run("observability", tango)[1], re.DOTALL)
+    assert [one["person"] for one in json.loads(run("observability", tango, "--json")[1])["people"]] == ["man", "woman"]

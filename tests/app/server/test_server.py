@@ -1,6 +1,5 @@
 import asyncio
 import re
-import socket
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -311,13 +310,14 @@ async def test_long_paths_are_not_found(port, fake_viser, caplog, prefix, name):
     assert status in (400, 404, 414) or (prefix, name) == ("/viser/", "%00")
 
 
-def test_serving_a_busy_port_names_it_and_the_remedy():
-    with socket.socket() as busy:
-        busy.bind(("127.0.0.1", 0))
-        busy.listen()
-        port = busy.getsockname()[1]
-        with pytest.raises(TrackerError, match=rf"port {port} .* in use; .*--port"):
-            address.listen("127.0.0.1", port)
+def test_a_busy_port_is_refused_if_named_and_passed_over_if_not():
+    (busy,) = address.listen("127.0.0.1", 0)
+    port = address.port_of([busy])
+    with busy, pytest.raises(TrackerError, match=rf"port {port} .* in use; .*--port"):
+        address.listen("127.0.0.1", port)
+    (usual,), (following,) = address.listen("127.0.0.1", None), address.listen("127.0.0.1", None)
+    with usual, following:
+        assert 8080 <= address.port_of([usual]) < address.port_of([following]) < 8090
 
 
 async def test_serving_closes_its_sockets_at_the_end():

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from bodies import MODELS, with_center
+from bodies import MODELS, set_deg, with_center
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -142,13 +142,6 @@ def test_height_scales_the_body(model):
 
 def at(model, values, name):
     return model.points_world(values)[model.point_names.index(name)]
-
-
-def set_deg(model, **degrees):
-    values = model.neutral()
-    for name, angle in degrees.items():
-        values[model.value_names.index(name.replace("__", "."))] = np.radians(angle)
-    return values
 
 
 def test_gavrila_has_the_papers_degrees_of_freedom():

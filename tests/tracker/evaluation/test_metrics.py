@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies import set_deg
 
 from tracker.errors import FormatError
 from tracker.evaluation.metrics import Motion, best_rigid, evaluate_joints, evaluate_poses, joints_of_poses
@@ -126,13 +127,6 @@ def test_axes_that_mirror():
         remap_axes(table([[[1.0, 2.0, 3.0]]], names=["a"]), "x,z,y")
 
 
-def pose(model, **degrees):
-    values = model.neutral()
-    for name, angle in degrees.items():
-        values[model.value_names.index(name.replace("__", "."))] = np.radians(angle)
-    return values
-
-
 @pytest.fixture
 def model():
     return load_model("gavrila22")
@@ -148,8 +142,8 @@ def compared(model, estimated, true, frames=(0,), true_model=None):
 def test_twist_counts_only_where_it_shows(model):
     n_parts = len(model.parts)
     for bend, expected in ((0, 0.0), (19, None), (21, None), (90, None)):
-        true = pose(model, left_elbow__extension=bend)
-        estimate = pose(model, left_elbow__extension=bend, left_shoulder__twist=30)
+        true = set_deg(model, left_elbow__extension=bend)
+        estimate = set_deg(model, left_elbow__extension=bend, left_shoulder__twist=30)
         comparison = compared(model, {0: estimate}, {0: true})
         # The forearm's axis swings around the upper arm's by the twist: 2 asin(sin(bend) sin(15)).
         swing = np.degrees(2 * np.arcsin(np.sin(np.radians(bend)) * np.sin(np.radians(15))))
@@ -163,36 +157,36 @@ def test_twist_counts_only_where_it_shows(model):
 
 def test_body_turn_counts_whole_for_trunk_and_head(model):
     # Turning about the vertical leaves all limbs' hanging axes as they are.
-    comparison = compared(model, {0: pose(model, torso__twist=40)}, {0: pose(model)})
+    comparison = compared(model, {0: set_deg(model, torso__twist=40)}, {0: model.neutral()})
     assert comparison.axis_error_deg == pytest.approx(2 * 40 / len(model.parts))
     assert comparison.per_part_axis_deg["torso"] == pytest.approx(40)
     assert comparison.per_part_axis_deg["left_calf"] == pytest.approx(0)
 
 
 def test_the_worst_frame(model):
-    raised = {3: pose(model), 4: pose(model, left_hip__elevation=30), 5: pose(model, left_hip__elevation=10)}
-    comparison = compared(model, raised, dict.fromkeys((3, 4, 5), pose(model)), range(9))
+    raised = {3: model.neutral(), 4: set_deg(model, left_hip__elevation=30), 5: set_deg(model, left_hip__elevation=10)}
+    comparison = compared(model, raised, dict.fromkeys((3, 4, 5), model.neutral()), range(9))
     n = len(model.parts)
     assert comparison.axis_error_deg == pytest.approx(2 * 40 / n / 3)
     assert (comparison.worst_axis_error_deg, comparison.worst_axis_frame) == (pytest.approx(2 * 30 / n), 4)
 
 
 def test_angles_go_the_shorter_way_round(model):
-    comparison = compared(model, {0: pose(model, torso__twist=179)}, {0: pose(model, torso__twist=-179)})
+    comparison = compared(model, {0: set_deg(model, torso__twist=179)}, {0: set_deg(model, torso__twist=-179)})
     assert comparison.angle_error_deg["torso.twist"] == pytest.approx(2)
 
 
 def test_body_size_does_not_matter_to_angles(model):
     other = load_model("gavrila22", 1.5)
-    comparison = compared(other, {3: pose(other, left_hip__elevation=10)}, {3: pose(model)}, range(9), model)
+    comparison = compared(other, {3: set_deg(other, left_hip__elevation=10)}, {3: model.neutral()}, range(9), model)
     assert comparison.axis_error_deg == pytest.approx(2 * 10 / len(model.parts))  # thigh and calf
     assert comparison.angle_error_deg["left_hip.elevation"] == pytest.approx(10)
 
 
 def test_bodies_of_other_parts_are_compared_by_the_names_of_parts(model):
     bending = load_model("gavrila34", 1.6)
-    estimate = pose(bending, waist__elevation=20, left_elbow__extension=70)
-    comparison = compared(bending, {0: estimate}, {0: pose(model, left_elbow__extension=60)}, true_model=model)
+    estimate = set_deg(bending, waist__elevation=20, left_elbow__extension=70)
+    comparison = compared(bending, {0: estimate}, {0: set_deg(model, left_elbow__extension=60)}, true_model=model)
     assert sorted(comparison.per_part_axis_deg) == sorted(model.part_index)  # no pelvis, no collars
     # Below the waist all is turned by 20 degrees; the trunk of the one is the chest of the other.
     expected = dict.fromkeys(("left_thigh", "left_calf", "right_thigh", "right_calf"), 20.0) | {"left_forearm": 10.0}
@@ -202,7 +196,7 @@ def test_bodies_of_other_parts_are_compared_by_the_names_of_parts(model):
 
 def test_no_frame_in_common(model):
     with pytest.raises(FormatError, match="no frame in common"):
-        compared(model, {0: pose(model)}, {1: pose(model)}, range(3))
+        compared(model, {0: model.neutral()}, {1: model.neutral()}, range(3))
 
 
 def test_no_part_in_common(model):
@@ -210,11 +204,11 @@ def test_no_part_in_common(model):
     joints = tuple(replace(j, child=f"{j.child}_x", parent=f"{j.parent}_x" if j.parent else "") for j in model.joints)
     other = replace(model, name="other", parts=parts, joints=joints, landmarks=())
     with pytest.raises(FormatError, match="'gavrila22' and 'other' have no part of the same name"):
-        compared(model, {0: pose(model)}, {0: pose(model)}, true_model=other)
+        compared(model, {0: model.neutral()}, {0: model.neutral()}, true_model=other)
 
 
 def test_joints_of_poses(model):
-    poses = {7: pose(model), 2: pose(model, left_elbow__extension=90)}
+    poses = {7: model.neutral(), 2: set_deg(model, left_elbow__extension=90)}
     joints = joints_of_poses(model, poses, 30.0)
     assert joints.names == JOINTS
     assert joints.frames.tolist() == [2, 7]
