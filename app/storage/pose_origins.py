@@ -53,7 +53,7 @@ def keyframes_by_annotator(store: AnnotationStore, people: Sequence[str]) -> tup
         SessionError: the annotations cannot be read.
     """
     found: dict[str, dict[str, list[int]]] = {name: {} for name in people}
-    for made in store.tasks.present_poses():
+    for made in store.tasks.makers_of_poses():
         if made.keyframe and made.person in found:
             found[made.person].setdefault(made.author, []).append(made.frame)
     return tuple({author: tuple(sorted(frames)) for author, frames in sorted(of.items())} for of in found.values())

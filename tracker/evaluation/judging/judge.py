@@ -162,10 +162,10 @@ def judge_person(
     """
     frames = [k for k in sorted(tracked) if k < len(imported.joints_world)]
     at = {n: i for i, n in enumerate(imported.names)}
-    steps = np.array([_steps(imported, tracked[k], k) for k in frames]).reshape(len(frames), len(at), 3)
+    gaps = np.array([_gaps(imported, tracked[k], k) for k in frames]).reshape(len(frames), len(at), 3)
     jumps = dict(zip(frames, reasons.jumps(imported.joints_world[frames]), strict=True)) if frames else {}
     out, usual = dict[int, dict[str, LimbVerdict]](), _usual_errors(tracked)
-    for number, (k, of_frame) in enumerate(zip(frames, steps, strict=True)):
+    for number, (k, of_frame) in enumerate(zip(frames, gaps, strict=True)):
         report("comparing", number / len(frames))
         own, verdicts = tracked[k], dict[str, LimbVerdict]()
         for limb, joints in LIMBS.items():
@@ -180,7 +180,7 @@ def judge_person(
                 reason = _reason(limb, imported, own, k, jumps[k], seen, verdicts[limb])
                 verdicts[limb] = verdicts[limb]._replace(reason=reason)
         out[k] = verdicts
-    offsets, spread = _constant(imported, tracked, frames, steps)
+    offsets, spread = _constant(imported, tracked, frames, gaps)
     points = [[tracked[k].body.model.point_names.index(n) for n in imported.names] for k in frames]
     places = np.array([tracked[k].body.joint_centers_world[p] for k, p in zip(frames, points, strict=True)])
     if not frames:
@@ -200,7 +200,7 @@ def _throughout(read: ReadPoints) -> tuple[int, tuple[str, ...]]:
     return 0 if lag is None else -lag.frames, misread
 
 
-def _steps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:
+def _gaps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:
     """Return from the tracked joints to the imported ones, (N, 3), metres."""
     model = own.body.model
     points = [model.point_names.index(n) for n in imported.names]
@@ -214,12 +214,12 @@ def _usual_errors(tracked: Mapping[int, StoredPose]) -> Array | None:
     return np.median(known, axis=0) if known else None
 
 
-def _verdict(own: StoredPose, usual: Array | None, limb: str, names: Sequence[str], steps: Array) -> LimbVerdict:
+def _verdict(own: StoredPose, usual: Array | None, limb: str, names: Sequence[str], gaps: Array) -> LimbVerdict:
     points = [own.body.model.point_names.index(n) for n in names]
     known = usual if own.record.errors is None else own.record.errors
     errors = (point_covariances(own.body.model) if known is None else known)[points]
-    off = with_doubt(probability_beyond(steps, errors), np.array(_lost(own, limb)))
-    distances = np.linalg.norm(steps, axis=1)
+    off = with_doubt(probability_beyond(gaps, errors), np.array(_lost(own, limb)))
+    distances = np.linalg.norm(gaps, axis=1)
     return LimbVerdict(float(off.max()), float(distances.max()), "", names[int(distances.argmax())])
 
 
@@ -234,14 +234,12 @@ def _lost(own: StoredPose, limb: str) -> float:
 
 
 def _constant(
-    imported: BodyPoints, tracked: Mapping[int, StoredPose], frames: Sequence[int], steps: Array
+    imported: BodyPoints, tracked: Mapping[int, StoredPose], frames: Sequence[int], gaps: Array
 ) -> tuple[dict[str, Array], dict[str, float]]:
     """Return the median step of each joint in the frame of its part, and the median distance that is left."""
     offsets, spread = dict[str, Array](), dict[str, float]()
     for i, name in enumerate(imported.names):
-        turned = [
-            _turned(tracked[k], name, s[i]) for k, s in zip(frames, steps, strict=True) if np.isfinite(s[i]).all()
-        ]
+        turned = [_turned(tracked[k], name, s[i]) for k, s in zip(frames, gaps, strict=True) if np.isfinite(s[i]).all()]
         if turned:
             offsets[name] = np.median(turned, axis=0)
             spread[name] = float(np.median(np.linalg.norm(turned - offsets[name], axis=1)))

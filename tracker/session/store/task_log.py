@@ -162,7 +162,7 @@ class TaskLog:
         """Return all comments and what happened to them, earliest first."""
         return self._all("comments", CommentRow, "time, uid")
 
-    def present_poses(self) -> list[MadePose]:
+    def makers_of_poses(self) -> list[MadePose]:
         """Return the edits that made the present poses."""
         return self._connection.all(
             f"SELECT {_MADE} FROM poses p JOIN pose_changes c ON c.id = p.change {_EDIT}", (), _made

@@ -140,7 +140,7 @@ def test_in_version_9_edits_had_no_identities_and_nothing_was_planned(version_9,
     ]  # fmt: skip
     assert (store.tasks.tasks(), store.tasks.states(), store.tasks.comments()) == ([], [], [])
     assert [(m.frame, m.author) for m in store.tasks.keyframe_edits()] == [(1, "eve"), (1, "eve")]
-    assert len({m.uid for m in store.tasks.present_poses()}) == 2
+    assert len({m.uid for m in store.tasks.makers_of_poses()}) == 2
     store.close()
     assert (version_9.read_bytes() == before) == read_only
 
