@@ -202,14 +202,14 @@ def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(controll
     comparing.note_comparison(session_state, "fit", before, session_state.costs((after,)), [0])
     session_state.save("fit", "fitted", None, 0)
     # The left leg was touched, and the right one hardly moved.
-    (named,) = encoding.state(controller.session, controller.state).compared.moved
-    assert (named.person, named.limb) == (0, "right arm")
+    ((person, move),) = controller.state.compared.moved
+    assert (person, move.limb.name) == (0, "right_forearm")
     was, now = model.points_world(before[0].values), model.points_world(after)
     i = model.point_names.index("right_wrist")
     comparing.note_comparison(session_state, "search", before, session_state.costs((after,)), [0])
     assert controller.state.compared.moved == ()
     comparing.note_comparison(session_state, "fit", before, session_state.costs((after,)), [0])
-    assert named.distance_cm == pytest.approx(100 * np.linalg.norm(now[i] - was[i]), abs=0.1)
+    assert move.distance_m == pytest.approx(np.linalg.norm(now[i] - was[i]), abs=0.001)
     lines = former_limb_lines(controller.session, controller.state, CONTOURS)
     assert {line.camera for line in lines if len(line.segments_px)} == {0, 1, 2, 3}
     u, v = controller.session.cameras[0].camera.pinhole.project(was[i])
@@ -227,6 +227,20 @@ def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(controll
     assert former_limb_lines(controller.session, controller.state, CONTOURS) == []
     with pytest.raises(TrackerError, match="undo takes back the whole fit"):
         controller.pinning.take_limb_back(0)
+
+
+def test_all_limbs_that_nobody_touched_are_taken_back_at_once(fitted):
+    controller, _ = fitted
+    before, session_state = controller.state.people, controller.session_state
+    after = np.array(before[0].values)
+    for name in ("right_shoulder.abduction", "left_hip.abduction"):
+        after[controller.models[0].value_names.index(name)] += 0.5
+    session_state.set(people=session_state.people_with_pose(0, after))
+    comparing.note_comparison(session_state, "fit", before, session_state.costs((after,)), [0])
+    assert len(controller.state.compared.moved) == 2
+    controller.pinning.take_limb_back(0, every=True)
+    np.testing.assert_array_equal(controller.state.poses[0], before[0].values)
+    assert controller.state.compared.moved == ()
 
 
 def test_a_fit_of_one_limb_leaves_the_rest_of_the_body(fitted):
