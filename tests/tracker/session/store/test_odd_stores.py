@@ -234,7 +234,7 @@ def test_odd_times_are_named(path, statement):
             store.read_log()
         if "edits" in statement:
             for read in (
-                store.history, store.tasks.edit_times, store.tasks.keyframe_edits, store.tasks.present_poses,
+                store.history, store.tasks.edit_times, store.tasks.keyframe_edits, store.tasks.makers_of_poses,
             ):  # fmt: skip
                 with pytest.raises(DamagedStoreError, match="found 'yesterday'"):
                     read()
