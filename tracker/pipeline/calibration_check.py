@@ -57,7 +57,7 @@ class CalibrationCheck:
         """Sentences on cameras that are off, the worst first; none where nothing is off."""
         if len(self.cameras) == 2:
             worst = max(self.cameras, key=lambda c: c.misfit_px)
-            apart = f"the two cameras contradict each other: by {worst.misfit_px:.1f} px; nothing shows which is off"
+            apart = f"the two cameras contradict each other by {worst.misfit_px:.1f} px; nothing shows which is off"
             return [apart] if self.diagnosis.kept else []
         by_name = {c.name: c for c in self.cameras}
         return [sentence(by_name[name], self.since.get(name), self.lost.get(name)) for name in self.named]
