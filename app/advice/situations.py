@@ -132,7 +132,7 @@ def _fitted(state: State, stored: StoredWork) -> Iterator[Advice]:
     also = f" It moved {n} {'limb' if n == 1 else 'limbs'} that you had not placed: {moved}." if n else ""
     if last.warning:
         yield Advice("contradicted", f"{_sentence(last.warning)}{also}", (before, *back), "doubt")
-    elif last.work == "fit" and last.filled.is_refused:
+    elif last.filled.is_refused:
         view = last.filled.worst_camera or ""
         share = f"{last.filled.overlaps.min():.0%} of their area in {view}"
         text = f"Bodies and silhouettes share only {share}. Drag what is off there, then fit again.{also}"

@@ -1,4 +1,4 @@
-"""What a session stores of each person, as far as the next step depends on it."""
+"""Stored poses of each person, as far as the next step depends on them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ class PersonWork:
 
 @dataclass(frozen=True)
 class StoredWork:
-    """What a session stores."""
+    """Stored poses of all people of a session."""
 
     people: tuple[PersonWork, ...]
     n_frames: int

@@ -7,6 +7,7 @@ import tyro
 
 from app.cli.arguments import OptionalName, OptionalRange, OptionalWhole, SessionArg
 from app.cli.target import Target, load_target, parse_frames
+from app.remedies import command_line_text
 from app.runtime.json_output import format_json
 from tracker.errors import SessionError, TrackerError
 
@@ -63,7 +64,7 @@ def command(arguments: Annotated[ObservabilityArguments, tyro.conf.arg(name="")]
     if arguments.json:
         print(format_json(found[0] if len(at.people) == 1 else {"people": found}))
     else:
-        print(*map(_format, found), *missing, sep="\n")
+        print(*map(_format, found), *map(command_line_text, missing), sep="\n")
 
 
 def observability(at: Target, frame: int | None, frames: str | None, another_camera: bool = False) -> dict[str, Any]:
@@ -155,7 +156,7 @@ def _another_camera(frames: "list[list[PosedBody]]", cameras: "list[Camera]", up
             "direction_deg": float(np.degrees(c.direction_rad)),
             "elevation_deg": float(np.degrees(c.elevation_rad)),
             **{f"{name}_deg": float(np.degrees(getattr(c, name))) for name in _SPREADS},
-            "gains_most": [model.dof_names[i] for i in np.argsort(-c.gains * ~model.dof_is_length)[:3]],
+            "gains_most": [model.dof_names[i] for i in np.argsort(np.where(model.dof_is_length, np.inf, -c.gains))[:3]],
         }
         for c in rank_added_cameras(alike, cameras, up)
     ]

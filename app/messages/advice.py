@@ -9,7 +9,7 @@ Deed = Literal[
     "find", "fit", "go_to", "place", "resume", "retry", "search", "show_before", "show_doubt", "show_section",
     "show_silhouettes", "show_view", "stop", "take_all_back", "take_back", "track", "track_again",
 ]  # fmt: skip
-"""What a button does; the page knows how."""
+"""Effects of buttons; the page carries them out."""
 Level = Literal["next", "work", "doubt", "fault"]
 """Whether the line names the next step, work under way, a result in doubt, or a failure."""
 
@@ -47,7 +47,7 @@ class Advice(Part, frozen=True):
 
 
 class AdviceMessage(Message, frozen=True, tag="advice"):
-    """What the line says, and what it says after that is dismissed; whenever it changed."""
+    """Sentences of the line, whenever they changed: a dismissed one gives way to the next."""
 
     said: tuple[Advice, ...]
     """The most urgent first."""

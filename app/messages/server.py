@@ -140,10 +140,6 @@ class Job(Part, frozen=True):
     """The stage that is searched."""
     evaluations: int
     """Poses scored."""
-    per_second: float
-    """Poses scored per second."""
-    best_px: float | None
-    """Cost of the best pose."""
     message: str
     """Result of the last search, or empty."""
 
@@ -162,12 +158,6 @@ class Track(Part, frozen=True):
     """Frames tracked, of the current pass."""
     total: int
     """Frames to track, of the current pass."""
-    per_second: float
-    """Frames per second."""
-    doubtful: int
-    """Frames with status `doubtful`."""
-    lost: int
-    """Frames with status `lost`."""
     stage: TrackStage
     """Stage of the run: forward, backward, or all frames together."""
     message: str

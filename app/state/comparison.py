@@ -39,7 +39,7 @@ class PoseComparison:
     moved: tuple[tuple[int, LimbMove], ...] = ()
     """Limbs that a fit moved although nobody had touched them, each after the index of its person; farthest first."""
     filled: SilhouetteCheck = field(default_factory=lambda: SilhouetteCheck((), np.zeros(0)))
-    """How far the bodies fill the silhouettes after a fit or search; no views where nothing shows them."""
+    """How far the bodies fill the silhouettes after a fit; no views where nothing shows them."""
     is_before_shown: bool = False
     """Whether the views show the poses before."""
 

@@ -14,12 +14,8 @@ class SearchState:
     """`search`, or None if there is no search."""
     stage: str | None = None
     """Name of the current stage."""
-    stages: tuple[str, ...] = ()
-    """Names of all stages, in order."""
     evaluations: int = 0
     """Poses scored since the search began."""
-    per_second: float = 0.0
-    """Poses scored per second of work."""
     best_px: float | None = None
     """Lowest cost so far, px."""
     candidate: tuple[Array, ...] | None = field(default=None, compare=False)

@@ -45,12 +45,6 @@ export function when(time) {
   return Number.isNaN(date.getTime()) ? time : WHEN.format(date);
 }
 
-/** @param {Filter} filter */
-export function filterLabel(filter) {
-  if (filter.kind === "annotator") return `keyframes of ${annotatorName(filter.name)}`;
-  return KINDS.find(({ kind }) => kind === filter.kind)?.label ?? "";
-}
-
 /**
  * Test of the frames of one person, or of all people together, that a filter lets through; null without a filter.
  *

@@ -50,8 +50,8 @@ SCALE = 150.0
 HIDDEN_LINE = np.column_stack([np.arange(100, 300), np.full(200, 60), np.arange(101, 301), np.full(200, 60)])
 """What the layer of hidden contours shows: a line of short pieces, px."""
 NO_TRACK = {
-    "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "per_second": 0.0, "doubtful": 0,
-    "lost": 0, "stage": "tracking", "message": "",
+    "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "stage": "tracking",
+    "message": "",
 }  # fmt: skip
 DISAGREEING = [44, 45]
 AMBIGUOUS = (71, 72)
@@ -219,8 +219,7 @@ class FakeEndpoint:
 
     def idle_job(self, message):
         return {
-            "running": False, "kind": None, "stage": None, "evaluations": 0, "per_second": 0.0,
-            "best_px": None, "message": message,
+            "running": False, "kind": None, "stage": None, "evaluations": 0, "message": message,
         }  # fmt: skip
 
     @property
@@ -358,7 +357,7 @@ class FakeEndpoint:
             return
         job = self.idle_job("Stopped at 1.21 px after 512 poses")
         if action == "step":
-            job |= {"kind": "step", "stage": "torso_head", "evaluations": 11, "best_px": 1.4, "per_second": 0.0}
+            job |= {"kind": "step", "stage": "torso_head", "evaluations": 11}
         self.state["job"] = job
         await self.broadcast(self.state)
 
@@ -396,7 +395,7 @@ class FakeEndpoint:
         step = 1 if track["last"] >= track["first"] else -1
         at = track["first"] if track["at"] is None else track["at"] + step
         for frame in range(at, track["last"] + step, step):
-            track |= {"at": frame, "done": track["done"] + 1, "per_second": 1 / self.frame_s}
+            track |= {"at": frame, "done": track["done"] + 1}
             cell = {
                 "source": "tracked",
                 "cost_px": 1.0,
@@ -430,12 +429,10 @@ class FakeEndpoint:
     async def run_search(self):
         """Search until it is stopped: a test on a loaded machine may take long to press the button."""
         for step in itertools.count():
-            best_px = 0.88 + 0.59 * 0.97**step
             self.state["job"] = self.idle_job("") | {
                 "running": True, "kind": "frame", "stage": STAGES[min(step // 13, 2)], "evaluations": 97 * step,
-                "per_second": 3120.0, "best_px": best_px,
             }  # fmt: skip
-            self.state["cost_px"] = best_px
+            self.state["cost_px"] = 0.88 + 0.59 * 0.97**step
             await self.broadcast(self.state)
             await self.send_overlay(candidate=0.05 * np.sin(step))
             await asyncio.sleep(0.04)

@@ -216,7 +216,7 @@ class SearchRunner:
             self._sources = [("",) * len(p) for p in poses]
             self._stage = None
             self._before = people, costs
-            session_state.set(search=SearchState(kind="search", stages=tuple(s.name for s in run.stages)))
+            session_state.set(search=SearchState(kind="search"))
         return self._job
 
     def _stepped(self, job: Job[SearchStep], step: SearchStep, seconds: float) -> None:
@@ -235,7 +235,7 @@ class SearchRunner:
             costs = session_state.costs(tuple(p.values for p in people))
             shown = replace(
                 session_state.state.search, running=job.running, kind="search", stage=step.stage.name,
-                evaluations=step.evaluations, per_second=step.evaluations / max(1e-6, seconds),
+                evaluations=step.evaluations,
                 best_px=costs["cost_px"], candidate=step.candidate, message="",
             )  # fmt: skip
             changed = any(a is not b for a, b in zip(people, session_state.state.people, strict=True))

@@ -101,10 +101,11 @@ def note_comparison(
         after_view_costs_px=state.view_costs_px,
     )
     placed = {person: _placed_points(session_state, person, before[person].values) for person in moved}
-    moves = _untouched_moves(session_state, noted, placed) if work == "fit" else ()
-    bodies = [PosedBody(m, p.values) for m, p in zip(state.models, state.people, strict=True)]
-    noted = replace(noted, filled=check_all_people(bodies, session_state.frames.cached_evidence(state.frame) or ()))
-    session_state.set(comparison=replace(noted, warning=_warning(session_state, noted, placed), moved=moves))
+    if work == "fit":
+        bodies = [PosedBody(m, p.values) for m, p in zip(state.models, state.people, strict=True)]
+        filled = check_all_people(bodies, session_state.frames.cached_evidence(state.frame) or ())
+        noted = replace(noted, moved=_untouched_moves(session_state, noted, placed), filled=filled)
+    session_state.set(comparison=replace(noted, warning=_warning(session_state, noted, placed)))
 
 
 def _placed_points(session_state: SessionState, person: int, before: Array) -> dict[str, list[PointObservation]]:

@@ -46,7 +46,7 @@ OTHER_BODY_M = 0.015
 """Standard deviation of a known joint of a body of other sizes, metres: joints of people and those of the built-in body
 differ by 1 to 4 cm (docs/decisions.md, Offsets of joint centres)."""
 MAX_ITERATIONS, TOLERANCE = 50, 1e-6
-"""Iterations after which a fit ends that is not told otherwise, and its last step, rad or metres."""
+"""Largest number of iterations of a fit, and the step at which it ends, rad or metres, unless a caller gives others."""
 CLOSE_ENOUGH = 1e-3
 """Step below which a pose that is shown or filtered is final, rad or m: no joint moves by more than a millimetre."""
 
