@@ -192,8 +192,7 @@ def with_acquired_bodies(recording: PosedRecording, session: Session, report: Re
     bodies, generic = dict[BodyModel, BodyModel](), generic_people(session)
     for n, person in enumerate(generic):
         part = part_of(report, n / len(generic), (n + 1) / len(generic), "acquiring sizes")
-        frames, settings = range(session.n_frames), AcquisitionSettings()
-        found = acquire_body(session, recording.observer, person, frames, settings, part)
+        found = acquire_body(session, recording.observer, person, range(session.n_frames), AcquisitionSettings(), part)
         bodies[session.people[person].model] = found.body
     return recording.with_bodies(bodies)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.motion.velocity import moving_bodies
+from tracker.body.motion.velocity import NEAR, moving_bodies
 from tracker.compute.progress import mapped
 from tracker.estimation.runs.frame_hypotheses import Proposal
 from tracker.estimation.runs.path_assessment import RunPose
@@ -189,8 +189,8 @@ class TrackSession:
         """Return an estimate with the cost of its poses; without one if the estimate of all frames is to move them."""
         if self.tracker.settings.whole_run:
             return found._replace(cost_px=np.nan, view_costs_px=np.empty(0))
-        poses = {k: own.poses for k, own in self.tracked.items()} | {found.frame: found.poses}
-        bodies = moving_bodies(self.subjects.models, poses, found.frame)
+        near = {k: self.tracked[k].poses for k in (found.frame + n for n in NEAR) if k in self.tracked}
+        bodies = moving_bodies(self.subjects.models, near | {found.frame: found.poses}, found.frame)
         cost = frame_cost(self.observer.origin.evidence(found.frame), bodies)
         return found._replace(cost_px=cost.total_px, view_costs_px=cost.view_costs_px)
 

@@ -8,6 +8,9 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.shortest_step import shortest_step
 from tracker.geometry.arrays import Array
 
+NEAR = (-2, -1, 0, 1, 2)
+"""Frames whose poses a velocity depends on, from its own."""
+
 
 def velocity(model: BodyModel, poses: Mapping[int, Array], frame: int) -> Array | None:
     """Return the change of a pose from one frame to the next, (n_dofs,), rad or metres; None without a neighbour.
@@ -39,6 +42,6 @@ def moving_bodies(
         poses: of all people by frame, (n_values,) each.
         frame: a frame with poses.
     """
-    near = {k: poses[k] for k in range(frame - 2, frame + 3) if k in poses}
+    near = {k: poses[k] for k in (frame + n for n in NEAR) if k in poses}
     speeds = [velocity(m, {k: own[i] for k, own in near.items()}, frame) for i, m in enumerate(models)]
     return tuple(map(PosedBody, models, poses[frame], speeds))
