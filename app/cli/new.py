@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -30,10 +30,12 @@ class NewArguments:
 
     session: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="folder to make")]
     """folder to make."""
-    calibration: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE ...")]
-    """file of all cameras, a folder, or a file for each camera, of a layout that docs/recordings.md lists."""
+    calibration: Paths = ()
+    """file of all cameras, a folder, or a file for each camera, of a layout that docs/recordings.md lists; by default
+    the one beside a folder of videos."""
     videos: Paths = ()
-    """video files or image folders, each named after its camera; images are paired by their numbers."""
+    """video files or image folders, each named after its camera, or the folder of all; images are paired by their
+    numbers. Of a folder of all, calibration, background and masks are taken, too."""
     camera: NamedPaths = ()
     """NAME=PATH: footage of a camera, under any file name."""
     cameras: Names = ()
@@ -51,7 +53,7 @@ class NewArguments:
     person_model: OptionalPath = None
     """.toml file of the person's body from an earlier session, where there is only one person."""
     height: CommonOrNamed = ()
-    """body height in metres of all people, or NAME=METRES."""
+    """body height of all people, or NAME=HEIGHT, in metres or centimetres: 1.78 or 178."""
     common_frames: bool = False
     """leave out frames that some cameras lack: those at the end, of numbered images at both ends."""
     fps: OptionalNumber = None
@@ -74,16 +76,19 @@ class NewArguments:
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
     """Make a session from videos and a calibration."""
     from app.session.camera_check import exchange_note
+    from tracker.geometry.lengths import height_m
     from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble, unfilmed_cameras
     from tracker.session.rig_summary import summarize_rig
 
+    arguments = _with_parts_of_folder(arguments)
+    heights = parse_common_or_pairs(arguments.height, "--height", lambda text: height_m(float(text)))
     request = NewSession(
         arguments.session, calibration=arguments.calibration, videos=arguments.videos,
         camera_paths=parse_pairs(arguments.camera, "--camera", Path), cameras=arguments.cameras,
         background=arguments.background, masks=arguments.masks,
         offsets=parse_pairs(arguments.offset, "--offset", finite), people=arguments.people,
         models=_models(arguments) or DEFAULT_MODEL,
-        heights=parse_common_or_pairs(arguments.height, "--height", float), common_frames=arguments.common_frames,
+        heights=heights, common_frames=arguments.common_frames,
         fps=arguments.fps, up=arguments.up, units=arguments.units, poses=arguments.poses, rescale=arguments.rescale,
         any_size=arguments.any_size,
     )  # fmt: skip
@@ -100,6 +105,33 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         print(f"note: {note}")
     if warning := exchange_note(made):
         print(f"warning: {warning}", file=sys.stderr)
+
+
+def _with_parts_of_folder(arguments: NewArguments) -> NewArguments:
+    """Return arguments with the videos of a folder and the parts that lie beside them.
+
+    Raises:
+        TrackerError: no calibration is given, and none lies there.
+    """
+    from tracker.formats.calibrations.reading import read_cameras
+    from tracker.session.footage_files import footage_in, side_parts
+    from tracker.session.matching import camera_name
+
+    folder = arguments.videos[0] if len(arguments.videos) == 1 and arguments.videos[0].is_dir() else None
+    beside = None if folder is None else side_parts(folder)
+    found = None if beside is None else beside.calibration
+    calibration = arguments.calibration or ((found,) if found else ())
+    if not calibration:
+        raise TrackerError("expected a calibration of the cameras, found none; give it with --calibration")
+    names = {c.name for c in read_cameras(calibration, arguments.units, arguments.poses, (), True).entries}
+    if folder is None or beside is None or camera_name(folder) in names:
+        return replace(arguments, calibration=calibration)
+    background, masks = arguments.background or beside.background, arguments.masks or beside.masks
+    parts = {"calibration": calibration[0], "background": background, "masks": masks}
+    print(f"{folder} with " + ", ".join(f"{name} {path}" for name, path in parts.items() if path))
+    return replace(
+        arguments, videos=tuple(footage_in(folder)), calibration=calibration, background=background, masks=masks
+    )
 
 
 def _models(arguments: NewArguments) -> Mapping[str, str] | str | None:

@@ -12,6 +12,7 @@ from app.session.path_choice import TypedPath, TypedPaths, typed_path, typed_pat
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.calibrations.convention_names import PoseConvention
 from tracker.formats.camera_section import Units
+from tracker.geometry.lengths import height_m
 from tracker.session.assemble import DEFAULT_MODEL, NewSession, SessionParts, check_parts
 from tracker.session.footage_files import footage_in
 from tracker.validation import FrameRate, Name
@@ -21,7 +22,7 @@ MAX_CAMERAS = 1000
 Report = Callable[[str, Any], None]
 """Takes the kind of a line, and its text or data."""
 
-_Height = Annotated[float, Meta(ge=30, le=300, title="Height", description="a height of 30 to 300 centimetres")]
+_Height = Annotated[float, Meta(gt=0, le=1000, title="Height", description="a height such as 1.78 or 178")]
 _Offset = Annotated[float, Meta(ge=-10_000_000, le=10_000_000, title="Offset", description="a number of frames")]
 
 
@@ -49,8 +50,8 @@ class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     people: Annotated[list[Name], Meta(min_length=1, max_length=20, title="People", description="1 to 20 names")]
     cameras: Annotated[list[CameraChoice], Meta(max_length=MAX_CAMERAS)] = []
     """Cameras to use, with their footage; empty to match the footage to the cameras by its names."""
-    heights_cm: Annotated[list[_Height], Meta(max_length=20, title="Height", description="at most 20 heights")] = []
-    """Body heights: one for all people, or one for each in their order; empty for that of the body model."""
+    heights: Annotated[list[_Height], Meta(max_length=20, title="Height", description="at most 20 heights")] = []
+    """Body heights, m or cm: one for all people, or one for each in their order; empty for that of the body model."""
     models: Annotated[
         list[TypedPath], Meta(max_length=20, title="Body model", description="at most 20 body models")
     ] = []
@@ -121,7 +122,7 @@ def _request(form: NewSessionForm) -> NewSession:
         offsets={c.name: c.offset for c in form.cameras if c.offset is not None},
         people=tuple(form.people),
         models=_of_each(form, "body model", [_model(m) for m in form.models]) or DEFAULT_MODEL,
-        heights=_of_each(form, "height", [h / 100 for h in form.heights_cm]),
+        heights=_of_each(form, "height", [height_m(h) for h in form.heights]),
         fps=form.fps,
         common_frames=form.common_frames,
         up=form.up,

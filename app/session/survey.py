@@ -14,7 +14,7 @@ from tracker.errors import TrackerError
 from tracker.formats.calibrations.convention_names import PoseConvention
 from tracker.formats.calibrations.reading import read_cameras
 from tracker.formats.camera_section import CameraEntry, Units
-from tracker.session.footage_files import footage_in
+from tracker.session.footage_files import footage_in, side_parts
 from tracker.session.matching import camera_name
 from tracker.session.rig_summary import RigSummary, summarize_rig
 
@@ -40,6 +40,8 @@ class Survey(msgspec.Struct, frozen=True):
     """Path of the footage that is named after a camera, by camera."""
     rig: dict[str, Any] | None
     """Positions and directions of the cameras (`RigSummary`); null without cameras."""
+    beside: dict[str, str]
+    """Paths of calibration, background and masks that lie beside the footage."""
     problems: list[str]
     """Sentences on what cannot be read."""
 
@@ -50,15 +52,18 @@ def survey(form: SurveyForm) -> Survey:
     entries: tuple[CameraEntry, ...] = ()
     rig: dict[str, Any] | None = None
     footage: list[Path] = []
+    beside: dict[str, str] = {}
     try:
         if form.footage is not None:
-            footage = footage_in(typed_path(form.footage))[:MAX_CAMERAS]
+            folder = typed_path(form.footage)
+            footage = footage_in(folder)[:MAX_CAMERAS]
+            beside = {name: str(path) for name, path in side_parts(folder)._asdict().items() if path is not None}
     except TrackerError as error:
         problems.append(page_text(error))
     by_name = {camera_name(path): str(path) for path in footage}
     try:
-        if form.calibration is not None:
-            calibration = read_cameras(typed_paths(form.calibration), form.units, form.poses, by_name)
+        if chosen := form.calibration or beside.get("calibration"):
+            calibration = read_cameras(typed_paths(chosen), form.units, form.poses, by_name)
             entries = calibration.entries
             rig = _rig(summarize_rig([e.camera(e.size or _likely_size(e)) for e in entries], form.up))
             rig["doubts"] = [*calibration.notes, *rig["doubts"]]
@@ -70,6 +75,7 @@ def survey(form: SurveyForm) -> Survey:
         [{"path": str(path), "name": path.name} for path in footage],
         {name: by_name[name] for name in names if name in by_name},
         rig,
+        beside,
         problems,
     )
 

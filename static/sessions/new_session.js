@@ -14,7 +14,7 @@ import { postJson } from "./session_requests.js";
  * @typedef {{cameras: [string, string], with_backgrounds: boolean, text: string}} Exchanged
  * @typedef {{passed?: string, warning?: string, failed?: string, exchanged?: Exchanged, made?: string}} Line
  * @typedef {{cameras: string[], footage: import("./camera_cards.js").Footage[], assigned: Record<string, string>,
- *   rig: import("./rig_drawing.js").Rig | null, problems: string[]}} Survey
+ *   rig: import("./rig_drawing.js").Rig | null, beside: Record<string, string>, problems: string[]}} Survey
  */
 
 /** Wait for a pause in typing before the files are looked at. */
@@ -36,8 +36,8 @@ export class NewSession {
   );
   /** Folder of the session that was made; empty before. */
   #made = "";
-  /** Folder that the form proposed. */
-  #proposed = "";
+  /** Values that the form proposed, by the name of the field. @type {Record<string, string>} */
+  #proposed = {};
   /** Footage and calibration of the cards. */
   #surveyed = "";
   #nSurveys = 0;
@@ -109,10 +109,11 @@ export class NewSession {
     const [footage, calibration] = [this.#value("footage"), this.#value("calibration")];
     const number = ++this.#nSurveys;
     /** @type {Survey} */
-    let found = { cameras: [], footage: [], assigned: {}, rig: null, problems: [] };
+    let found = { cameras: [], footage: [], assigned: {}, rig: null, beside: {}, problems: [] };
     if (footage || calibration) {
       const [up, units, poses] = ["up", "units", "poses"].map((name) => this.#value(name) || null);
-      const form = { footage: footage || null, calibration: calibration || null, up, units, poses };
+      const chosen = calibration === this.#proposed.calibration ? null : calibration || null;
+      const form = { footage: footage || null, calibration: chosen, up, units, poses };
       try {
         await postJson("sessions/survey", form, (line) => (found = JSON.parse(line)));
       } catch (error) {
@@ -120,23 +121,26 @@ export class NewSession {
       }
     }
     if (number !== this.#nSurveys) return;
+    if (found.footage.length) {
+      const folder = `${footage.replace(/\/+$/, "")}_session`;
+      Object.entries({ folder, calibration: "", background: "", masks: "", ...found.beside }).forEach(([name, value]) => this.#propose(name, value));
+    }
     this.#cards.show(found.cameras, found.footage, found.assigned, this.#files === this.#surveyed);
     this.#surveyed = this.#files;
     this.#showRig(found.rig);
     if (!this.#checks.children.length) found.problems.forEach((problem) => this.#add("is-failed", problem));
-    if (found.footage.length) this.#propose(footage);
   }
 
   /**
-   * Propose a folder for the session, beside its footage, unless the user has named one.
+   * Fill in a field unless the user has.
    *
-   * @param {string} footage
+   * @param {string} name
+   * @param {string} value
    */
-  #propose(footage) {
-    const field = this.#field("folder");
-    if (field.value && field.value !== this.#proposed) return;
-    this.#proposed = `${footage.trim().replace(/\/+$/, "")}_session`;
-    field.value = this.#proposed;
+  #propose(name, value) {
+    const field = this.#field(name);
+    if (field.value && field.value !== this.#proposed[name]) return;
+    field.value = this.#proposed[name] = value;
   }
 
   /** @param {Survey["rig"]} rig */
@@ -152,8 +156,7 @@ export class NewSession {
   /** Forget the outcome of the last attempt. */
   #begin() {
     this.#made = "";
-    this.#openIt.hidden = true;
-    this.#make.hidden = false;
+    this.#showButtons();
     this.#checks.replaceChildren();
   }
 
@@ -170,9 +173,15 @@ export class NewSession {
       this.#add("is-failed", error instanceof Error ? error.message : String(error));
     }
     this.#make.disabled = false;
-    this.#make.hidden = this.#made !== "";
-    this.#openIt.hidden = this.#made === "";
+    this.#showButtons();
     if (this.#made) this.#openIt.focus();
+  }
+
+  /** Show *Open* alone when the session is made. */
+  #showButtons() {
+    for (const part of /** @type {Iterable<HTMLElement>} */ (this.#openIt.parentElement?.children)) {
+      part.hidden = (part === this.#openIt) !== (this.#made !== "");
+    }
   }
 
   /** @param {boolean} keepsAssignment */
@@ -185,7 +194,7 @@ export class NewSession {
       footage: this.#value("footage"),
       cameras: this.#cards.chosen,
       people: list("people"),
-      heights_cm: list("heights").map(Number),
+      heights: list("heights").map(Number),
       models: list("models"),
       up: this.#value("up"),
       units: optional("units"),

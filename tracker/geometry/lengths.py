@@ -54,6 +54,12 @@ _UNITS = {word: METRES_BY_WORD[unit] for word, unit in {
 }.items()}  # fmt: skip
 
 
+def height_m(number: float) -> float:
+    """Return the height of a person in metres, of a number in metres or centimetres, whichever is nearer to usual."""
+    low, high = USUAL_SIZES["person"]
+    return min(number, number * _UNITS["centimetres"], key=lambda h: abs(np.log(h**2 / (low * high))) if h > 0 else h)
+
+
 def check_heights(heights_m: Mapping[str, float] | float | None, error: type[TrackerError]) -> None:
     """Check that people, of one height or by name, are as tall as people are.
 

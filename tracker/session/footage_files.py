@@ -1,6 +1,7 @@
 """Files of the footage of a new session: videos of a folder, backgrounds and masks by the names of cameras."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.files import entries_below, paths_in
@@ -8,11 +9,41 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.chapters import VIDEO_SUFFIXES
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import read_background, read_mask
+from tracker.formats.calibrations.reading import calibration_in
 from tracker.session.matching import find_entry
+
+_FOOTAGE, _BACKGROUND, _MASKS = ("videos", "footage"), ("background", "backgrounds"), ("masks",)
+"""Usual names of the folders of a recording, in lower case."""
+
+
+class SideParts(NamedTuple):
+    """Parts of a recording that lie beside its footage; None for each that is not there."""
+
+    calibration: Path | None
+    background: Path | None
+    masks: Path | None
+
+
+def side_parts(folder: Path) -> SideParts:
+    """Find calibration, background and masks of a recording.
+
+    Args:
+        folder: of the recording, or its folder `videos`.
+    """
+    around = folder.parent if folder.name.lower() in _FOOTAGE else folder
+    calibration = calibration_in(around) or calibration_in(folder)
+    return SideParts(calibration, *(_folder_named(around, names) for names in (_BACKGROUND, _MASKS)))
+
+
+def _folder_named(folder: Path, names: tuple[str, ...]) -> Path | None:
+    found = paths_in(folder, SessionError, lambda name: name.lower() in names)
+    return next((path for path in found if path.is_dir()), None)
 
 
 def footage_in(folder: Path) -> list[Path]:
-    """Return the videos of a folder, or its folders of images or of the chapters of a video if it has no video.
+    """Return the videos of a folder or of its folder `videos`.
+
+    Without any, its folders of images or of the chapters of a video are returned.
 
     Raises:
         SessionError: there is neither.
@@ -21,7 +52,11 @@ def footage_in(folder: Path) -> list[Path]:
         raise SessionError(f"expected a folder of videos, found none at {folder}; check the path")
     entries = paths_in(folder, SessionError)
     videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
-    found = videos or [path for path in entries if path.is_dir() and _has_footage(path)]
+    if not videos and (inner := _folder_named(folder, _FOOTAGE)):
+        return footage_in(inner)
+    beside = (*_BACKGROUND, *_MASKS)
+    folders = [path for path in entries if path.is_dir() and path.name.lower() not in beside]
+    found = videos or [path for path in folders if _has_footage(path)]
     if not found:
         raise SessionError(
             f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "

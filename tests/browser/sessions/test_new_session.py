@@ -26,7 +26,7 @@ RIG = {
 FOOTAGE = [{"path": f"/data/videos/{n}.mp4", "name": f"{n}.mp4"} for n in (*NAMES, "gopro7")]
 SURVEY = {
     "cameras": list(NAMES), "footage": FOOTAGE, "assigned": {n: f"/data/videos/{n}.mp4" for n in NAMES[:3]},
-    "rig": RIG, "problems": [],
+    "rig": RIG, "beside": {}, "problems": [],
 }  # fmt: skip
 PASSED = {"passed": "The calibration has 4 cameras."}
 EXCHANGED = {
@@ -231,7 +231,7 @@ async def test_footage_is_given_to_cameras_by_menu_drag_and_hand(form):
         ("FRONT", "FRONT.mp4", 0), ("RIGHT", "LEFT.mp4", None), ("LEFT", "gopro7.mp4", 4),
     ]  # fmt: skip
     assert sent.items() >= {
-        "people": ["ann", "bob"], "heights_cm": [170, 158.5], "models": ["gavrila22"], "masks": "/data/m",
+        "people": ["ann", "bob"], "heights": [170, 158.5], "models": ["gavrila22"], "masks": "/data/m",
         "units": "mm", "poses": "camera-to-world", "rescale": True, "common_frames": True, "keep_assignment": False,
     }.items()  # fmt: skip
 
@@ -245,6 +245,7 @@ async def test_exchanged_cameras_are_exchanged_by_a_button_before_anything_is_ma
     assert not await page.locator("#open-made-session").is_visible()
     await page.get_by_role("button", name="Exchange these two").click()
     await shows(page, "!document.querySelector('#open-made-session').hidden")
+    assert await page.locator("#new-session .popover-foot").inner_text() == "Open"
     cameras = {c["name"]: (c["footage"].split("/")[-1], c["side_name"]) for c in program.posted[1]["cameras"]}
     assert cameras["FRONT"] == ("BACK.mp4", "BACK")
     assert cameras["BACK"] == ("FRONT.mp4", "FRONT")
@@ -277,6 +278,21 @@ async def test_unreadable_files_are_named_before_anything_is_made(form):
     await page.get_by_text("no video for camera LEFT").wait_for()
     assert not await page.locator("#open-made-session").is_visible()
     assert program.posted[0]["cameras"] == []
+
+
+async def test_parts_beside_the_footage_are_filled_in_where_the_user_has_given_none(form):
+    page, program = form
+    program.survey = SURVEY | {"beside": {"calibration": "/data/Calib.toml", "background": "/data/background"}}
+    await page.fill("#new-masks", "/data/mine")
+    await page.fill("#new-footage", "/data")
+    await shows(page, "document.querySelector('#new-calibration').value === '/data/Calib.toml'")
+    values = [await page.input_value(f"#new-{name}") for name in ("background", "masks", "folder")]
+    assert values == ["/data/background", "/data/mine", "/data_session"]
+    # Those of other footage replace them, and nothing that was proposed is taken for a choice.
+    program.survey = SURVEY
+    await page.fill("#new-footage", "/other")
+    await shows(page, "document.querySelector('#new-calibration').value === ''")
+    assert program.surveyed[-1]["calibration"] is None
 
 
 @pytest.mark.slow

@@ -97,6 +97,15 @@ def read_cameras(
 # --- files ----------------------------------------------------------------------------------------------------------
 
 
+def calibration_in(folder: Path) -> Path | None:
+    """Return the only file of a folder that holds cameras, the folder if several do, and None if none can be read."""
+    try:
+        found = _in_folder(folder)
+    except CalibrationError:
+        return None
+    return found[0][0].path if len(found) == 1 else folder
+
+
 def _documents(paths: Sequence[Path]) -> list[tuple[Document, CalibrationLayout]]:
     """Read files with their layouts; of a folder those that have one.
 
