@@ -389,7 +389,8 @@ def _notes(
     if not is_sure:
         notes.append("left and right are not sure: a pose that faces the other way is about as good")
     if hull.broken:
-        notes.append(f"view {hull.broken[0]} was left out: the others agree without it; check whether it has moved")
+        why = "something covers the person there" if hull.is_covered else "check whether its camera has moved"
+        notes.append(f"view {hull.broken[0]} was left out: the others agree without it; {why}")
     if not start.is_measured:
         notes.append(f"the height stays {start.model.height_m:.2f} m: the person does not stand upright")
     cut = [s.camera.name for s in silhouettes if is_cut_off(s.mask)]

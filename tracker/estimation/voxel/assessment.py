@@ -88,7 +88,7 @@ def assess(
     if frame.broken:
         return FigureAssessment(
             "doubtful",
-            f"view {', '.join(frame.broken)} left out: it contradicts the others; check whether it has moved",
+            f"view {', '.join(frame.broken)} left out: its silhouette holds little of the body that the others show",
         )
     return FigureAssessment("good", "")
 

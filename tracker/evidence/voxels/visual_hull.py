@@ -38,6 +38,8 @@ class VisualHull(NamedTuple):
     """Share of each view's silhouette that the hull explains, (n_views,); NaN for an empty silhouette."""
     broken: tuple[str, ...]
     """Names of the views that were left out, because the others agree without them."""
+    is_covered: bool = False
+    """Whether that view shows a part of the people in their place, as behind furniture; else it may have moved."""
 
     @property
     def least_explained(self) -> int | None:
@@ -80,7 +82,9 @@ def carve_people(silhouettes: Sequence[ViewSilhouette], size_m: float) -> Visual
         )
     by_name = dict(zip(names, found, strict=True))
     of_views = np.array([by_name.get(s.camera.name, np.nan) for s in silhouettes])
-    return VisualHull(tuple(f.cropped() for f in figures), of_views, (names[broken],) if broken >= 0 else ())
+    is_covered = broken >= 0 and bool(found[broken] >= _MIN_COVERAGE)
+    left_out = (names[broken],) if broken >= 0 else ()
+    return VisualHull(tuple(f.cropped() for f in figures), of_views, left_out, is_covered)
 
 
 def coverages(voxels: Voxels, silhouettes: Sequence[ViewSilhouette]) -> Array:
