@@ -132,12 +132,18 @@ def with_sizes_of(model: BodyModel, source: BodyModel) -> BodyModel:
 
 def stature_m(model: BodyModel) -> float:
     """Return the vertical extent of a body that stands straight, from crown to sole, metres."""
+    sole_m, crown_m = standing_extent_m(model)
+    return crown_m - sole_m
+
+
+def standing_extent_m(model: BodyModel) -> tuple[float, float]:
+    """Return the heights of sole and crown over the root of a body that stands straight, metres."""
     Ts = model.kinematics(model.neutral()).Ts_world_part
     ends = []
     for shape, center, T in zip(model.shapes, model.centers_part, Ts, strict=True):
         z = (shape.triangles().vertices + center) @ T[2, :3] + T[2, 3]
         ends += [float(z.min()), float(z.max())]
-    return max(ends) - min(ends)
+    return min(ends), max(ends)
 
 
 def with_height_of_stature(model: BodyModel, like: BodyModel) -> BodyModel:

@@ -9,7 +9,7 @@ from tracker.body.model import BodyModel
 from tracker.body.motion.velocity import velocity
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.geometry.arrays import Array
-from tracker.geometry.ground_plane import up_rotation
+from tracker.geometry.ground_plane import floor_plane, up_rotation
 from tracker.geometry.triangulation import PointObservation
 from tracker.session.session import Session
 
@@ -32,10 +32,10 @@ class FramePoses:
         self._session = session
         self.R_world_up: Array = up_rotation(session.up, session.floor)
         """Rotation whose z axis points up, (3, 3)."""
-        cameras = [c.camera for c in session.cameras]
+        cameras, floor = [c.camera for c in session.cameras], floor_plane(session.up, session.floor)
         middle = (len(session.people) - 1) / 2
         self._default_poses = tuple(
-            default_pose(person.model, cameras, self.R_world_up, _APART_M * (i - middle))
+            default_pose(person.model, cameras, self.R_world_up, _APART_M * (i - middle), floor)
             for i, person in enumerate(session.people)
         )
 

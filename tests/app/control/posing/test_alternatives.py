@@ -107,7 +107,8 @@ def test_without_another_pose_there_is_nothing_to_take(tracked):
 
 @pytest.mark.parametrize("is_disputed", [True, False])
 def test_a_keyframe_shows_its_alternative_only_while_two_merged_copies_disagree(couple, session, opened, is_disputed):
-    ann, other = couple.state.poses[ANN], couple.state.poses[BOB]
+    ann, model = couple.state.poses[ANN], couple.state.models[ANN]
+    other = model.retract(ann, 0.1 * (np.arange(model.n_dofs) < 2))
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:
         record = PoseRecord(ann, ("manual",) * len(ann), couple.state.revisions[ANN], keyframe=True)
         back = Alternative(other, couple.state.revisions[ANN], None)

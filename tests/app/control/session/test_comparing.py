@@ -113,7 +113,7 @@ def test_a_search_is_compared_with_its_start(controller):
 
 def test_a_fit_that_leaves_a_placed_joint_is_reported(fitted):
     controller, _ = fitted  # the wrist alone was placed, beside the person: the fit takes it away
-    assert "left the left wrist 24 cm from where you placed it" in controller.state.compared.warning
+    assert "left the left wrist 7 cm from where you placed it" in controller.state.compared.warning
     assert "body's sizes" in controller.state.compared.warning
     controller.held_points.set(0, None, held=False)
     drag(controller, "torso", (3.0, 0.0))

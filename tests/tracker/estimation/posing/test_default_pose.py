@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from staging import camera_at, cameras_around
 
+from tracker.body.dimensions import standing_extent_m
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.geometry import rigid
-from tracker.geometry.ground_plane import UP_ROTATIONS
+from tracker.geometry.ground_plane import UP_ROTATIONS, GroundPlane
 
 
 def place(model, values, point):
@@ -42,6 +43,15 @@ def test_standing_pose_before_a_single_camera(gavrila):
     camera = camera_at("only", (1.0, 0.0, 1.0), (2.0, 0.0, 1.0))
     values = default_pose(gavrila, [camera])
     np.testing.assert_allclose(place(gavrila, values, "torso"), [5.0, 0.0, 1.0], atol=0.01)  # 4 m in front
+
+
+@pytest.mark.parametrize("floor_m", [0.4, 0.8])
+def test_a_body_stands_on_a_floor_that_lies_below_the_cameras(gavrila, floor_m):
+    """Cameras at 0.6 m look at the origin: a floor above them is none, and the root is where they look."""
+    values = default_pose(gavrila, cameras_around(3), None, 0.5, GroundPlane(np.array([0.0, 0, 1]), floor_m))
+    bodies = zip(gavrila.shapes, gavrila.centers_part, gavrila.kinematics(values).Ts_world_part, strict=True)
+    lowest = min(rigid.apply(T, s.triangles().vertices + center)[:, 2].min() for s, center, T in bodies)
+    assert lowest == pytest.approx(floor_m if floor_m < 0.6 else standing_extent_m(gavrila)[0], abs=1e-4)
 
 
 def test_up_rotations_are_rotations():
