@@ -53,6 +53,8 @@ import { defaultLayers } from "./layers.js";
  * @property {{kept: ViewPoint[], pointer: ViewPoint | null} | null} epipolar places of the epipolar check; null without one
  * @property {import("./protocol.js").EpipolarMessage | null} epipolarLines of the first of them
  * @property {boolean} livePins whether the body follows a dragged pin
+ * @property {{person: number, point: string, state: import("./protocol.js").StateMessage | null} | null} pressed the joint that was pressed last, with the
+ *   state at that time: until there is another state, it is the selected joint
  * @property {Joint | null} pinHover the pin under the pointer
  * @property {import("./protocol.js").PinMark | null} heldPin the pin that is dragged or was just released
  * @property {"all" | "one"} scope people that searches and fits move: all, or the active person only
@@ -142,6 +144,7 @@ export class Store {
     epipolar: null,
     epipolarLines: null,
     livePins: true,
+    pressed: null,
     pinHover: null,
     heldPin: null,
     scope: "all",

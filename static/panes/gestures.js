@@ -175,8 +175,9 @@ export class Gestures {
       begun: false,
     };
     pane.surface.classList.add("is-dragging");
+    const pressed = { person, point, state: this.#store.facts.state };
     const held = part === null ? { hover: { camera, person, point } } : { hoverPart: { camera, person, part } };
-    this.#store.set({ dragging: true, hover: null, hoverPart: null, ...held });
+    this.#store.set({ dragging: true, hover: null, hoverPart: null, pressed, ...held });
     this.#send({ type: "select", person, point });
   }
 

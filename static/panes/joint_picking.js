@@ -4,8 +4,8 @@
 
 /** Picking radius of a joint. */
 export const GRAB_RADIUS = 12;
-/** Penalty on the distance to joints of other people, so that the active person's joints win where people touch. */
-const OTHER_PERSON_PENALTY_PX = 4;
+/** Radius of the mark of a joint: the mark under the pointer is meant, rather than another one near it. */
+const MARK_RADIUS = 5;
 /** Joints nearer to each other than this overlap: they are offered together. */
 const OVERLAP_PX = 8;
 
@@ -26,9 +26,10 @@ export class JointPicking {
    * @returns {{meant: PlacedHandle, overlapping: PlacedHandle[]} | null}
    */
   pick(placed, at, person) {
-    const distance = (/** @type {PlacedHandle} */ one) =>
-      Math.hypot(one.x - at.x, one.y - at.y) + (one.handle.person === person ? 0 : OTHER_PERSON_PENALTY_PX);
-    const near = placed.filter((one) => distance(one) <= GRAB_RADIUS).sort((a, b) => distance(a) - distance(b));
+    const distance = (/** @type {PlacedHandle} */ one) => Math.hypot(one.x - at.x, one.y - at.y);
+    // The active person's mark comes first, then another person's, then joints beside the pointer.
+    const rank = (/** @type {PlacedHandle} */ one) => (distance(one) > MARK_RADIUS ? 2 : Number(one.handle.person !== person));
+    const near = placed.filter((one) => distance(one) <= GRAB_RADIUS).sort((a, b) => rank(a) - rank(b) || distance(a) - distance(b));
     if (near.length === 0) {
       this.forget();
       return null;

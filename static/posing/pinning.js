@@ -168,7 +168,7 @@ export class Pinning {
    * @param {number} camera
    */
   #down(event, pane, camera) {
-    const { pinning, state, shown } = this.#store.facts;
+    const { pinning, pressed, state, shown } = this.#store.facts;
     if (this.#held || event.button === 1 || !state || !shown) return;
     const at = pane.locate(event);
     const hit = this.#hit(pane, camera, at);
@@ -182,7 +182,8 @@ export class Pinning {
       return;
     }
     if (event.button !== 0) return;
-    const joint = state.point === null ? this.#joint(pane, at) : { person: state.person, point: state.point };
+    const { person, point } = pressed?.state === state ? pressed : state;
+    const joint = point === null ? this.#joint(pane, at) : { person, point };
     if (!hit && !joint) {
       this.#say("Select a joint first: click it in a view, then Ctrl+click to pin it.");
       return;

@@ -1,6 +1,7 @@
 """Which joint a press takes, which joints are held, and how sides and limbs out of reach are drawn."""
 
 import numpy as np
+import pytest
 from fake_endpoint import project
 from page_driver import dragging, handle_of, shows, to_client, until
 
@@ -21,6 +22,38 @@ async def pixels(page, places):
 
 def is_orange(colors):
     return colors[:, 0] > colors[:, 2] + 60
+
+
+async def test_a_pin_belongs_to_the_joint_pressed_just_before(page, endpoint, monkeypatch):
+    """The program has not answered the press yet, so that its state still has another joint selected."""
+    await endpoint.tell(point="l_wrist")
+    await shows(page, "quadrille.state.state.point === 'l_wrist'")
+
+    async def unanswered(message):
+        assert message["point"] == "head"
+
+    monkeypatch.setattr(endpoint, "cast", unanswered)
+    at = await to_client(page, 0, *await handle_of(page, 0, "head"))
+    await page.mouse.click(*at)
+    await page.keyboard.down("Control")
+    await page.mouse.click(at[0] + 25, at[1])
+    await page.keyboard.up("Control")
+    await until(lambda: endpoint.heard("pin")[0]["point"] == "head")
+
+
+@pytest.mark.endpoint(n_people=2)
+async def test_the_mark_of_the_active_person_under_the_pointer_is_taken(page, endpoint):
+    (u, v), active = await handle_of(page, 0, "head"), endpoint.pose[0, "head"]
+    x, y = await to_client(page, 0, u, v)
+    per_metre = (await to_client(page, 0, *project(active[None] + np.array([1.0, 0, 0]), 0)[0]))[0] - x
+    for apart_px, person in ((4.8, 0), (5.8, 1)):
+        endpoint.pose[1, "head"] = active + np.array([apart_px / per_metre, 0, 0])
+        await endpoint.send_overlay()
+        await shows(page, "quadrille.state.overlay.handles.filter((h) => h.camera === 0 && h.point === 'head')"
+                    f".some((h) => Math.abs(quadrille.toClient(0, h.u, h.v).x - {x + apart_px}) < 0.1)")  # fmt: skip
+        await page.mouse.move(x, y + 40)
+        await page.mouse.move(x + apart_px, y)  # the middle of the other's mark
+        await shows(page, f"quadrille.state.hover?.person === {person}")
 
 
 async def test_overlapping_joints_are_both_offered(page, endpoint):
