@@ -36,6 +36,8 @@ class Calibrating:
         self._session_state, self._activities, self._tracking = session_state, activities, tracking
         self._work = BackgroundWork(session_state, "calibration", "check of the cameras")
         self._set = self._work.set
+        self._is_doubt_known = False
+        """Whether the last request was answered by the doubt about the bodies."""
         self._version: tuple[int, int] | None = None
         self._tried: tuple[int, int] | None = None  # the check and the frame of the last preview
         self._previews = LatestWinsWorker(self._refit, "calibration preview")
@@ -53,10 +55,11 @@ class Calibrating:
             TrackerError: another check is at work.
         """
         doubt = generic_doubt(self._session_state.session)
-        said = f"{page_text(doubt[:1].upper() + doubt[1:], Remedy('acquire_first'))}."
-        if doubt and self._session_state.state.calibration.message != said:
+        self._is_doubt_known = bool(doubt) and not self._is_doubt_known
+        if self._is_doubt_known:
             self._work.require_free()
-            self._set(message=said, failed=False)
+            message = f"{page_text(doubt[:1].upper() + doubt[1:], Remedy('acquire_first'))}."
+            self._set(message=message, failed=False)
             return
         before = self._session_state.state.calibration
         begin = CalibrationState(n_changes=before.n_changes, outdated=before.outdated, revision=before.revision)

@@ -6,11 +6,18 @@ import numpy as np
 import pytest
 from rig_scenes import CAMERAS, FPS, NAMES, nothing_seen, turned, viewed
 
+from tracker.body.model import PosedBody
 from tracker.body.motion.pose_path import PosePath
 from tracker.errors import TrackerError
+from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.evaluation.references import read_joints
+from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import LostFrames
+from tracker.footage.recording import Recording
 from tracker.geometry.camera_correction import N_CORRECTIONS, TIME
 from tracker.pipeline.calibration_check import check_calibration, contradiction
+from tracker.pipeline.posed_recording import PosedRecording
+from tracker.session.assemble import NewSession, assemble
 
 
 class Seen:
@@ -121,3 +128,23 @@ def test_a_glance_says_nothing_of_few_frames():
     found = contradiction(Seen(frames * 7))
     assert found.startswith("camera cam1 is ")
     assert found.endswith(" or the body has other sizes")  # a figure is for the check
+
+
+@pytest.mark.slow
+def test_no_camera_changes_where_a_body_of_a_preset_is_off_before_static_ones(data_folder, tmp_path):
+    """Real footage: its cameras stood still, and the sizes of the body are those of nobody."""
+    data = data_folder("balance_real")
+    parts = {
+        "calibration": data / "Calib.toml",
+        "videos": sorted(data.glob("*.mp4")),
+        "background": data / "background",
+    }
+    session = assemble(NewSession(tmp_path / "session", **parts))
+    joints, model = read_joints(data / "reference_joints.trc", session.fps), session.people[0].model
+    known = [dict(zip(joints.names, places, strict=True)) for places in joints.points]
+    named = [{n: p for n, p in places.items() if n in model.point_names} for places in known]
+    poses = {k: PosedBody(model, fit_to_points(model, own).pose) for k, own in enumerate(named)}
+    with Recording(session.cameras) as recording:
+        observer = Observer(session.cameras, recording)
+        check = check_calibration(PosedRecording(observer, session.fps, [poses]))
+    assert (check.since, check.lost) == ({}, {})
