@@ -8,7 +8,7 @@ programs hardly change; time by the clock and the load of the machine stand besi
 import json
 import os
 import platform
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -151,13 +151,14 @@ def versions() -> dict[str, str]:
 
 
 def show(found: Mapping[str, Any], console: Console) -> None:
-    """Print a report as a table. Ratios are given as at least 1: the time in yardsticks, or the reverse."""
-    table = Table("work", "processor", "clock", "cores", "yardsticks", "must", "aim", "baseline", "")
-    for r in found["rows"]:
-        verdict = "slower" if r["slower"] else "" if r["holds"] is None else "holds" if r["holds"] else "fails"
-        ratios = [_ratio(r[k]) for k in ("ratio", "must", "aim", "baseline")]
-        times = _time(r["processor_us"]), _time(r["clock_us"]), f"{r['busy_cores']:.1f}"
-        table.add_row(r["what"], *times, *ratios, f"{verdict} {r['note']}".strip())
+    """Print a report as a table. Ratios are given as at least 1: the time in yardsticks, or the reverse.
+
+    A console that is too narrow for all columns gets those of the verdict.
+    """
+    table = _table(found, ("work", "processor", "clock", "cores", "yardsticks", "must", "aim", "baseline", ""))
+    unbounded = console.options.update(max_width=1000)
+    if console.measure(table, options=unbounded).maximum > console.width:
+        table = _table(found, ("work", "processor", "yardsticks", "must", ""))
     console.print(table)
     if found["load"] is not None:
         loads = ", ".join(f"{load:.1f}" for load in found["load"])
@@ -166,6 +167,19 @@ def show(found: Mapping[str, Any], console: Console) -> None:
     if found["slower"]:
         by = f"{100 * found['tolerance']:.0f}%"
         console.print(f"slower than the baseline by more than {by}: {', '.join(found['slower'])}", style="bold red")
+
+
+def _table(found: Mapping[str, Any], columns: Sequence[str]) -> Table:
+    table = Table(*columns, box=None)
+    for r in found["rows"]:
+        verdict = "slower" if r["slower"] else "" if r["holds"] is None else "holds" if r["holds"] else "fails"
+        cells = {
+            "work": r["what"], "processor": _time(r["processor_us"]), "clock": _time(r["clock_us"]),
+            "cores": f"{r['busy_cores']:.1f}", "yardsticks": _ratio(r["ratio"]),
+            **{name: _ratio(r[name]) for name in ("must", "aim", "baseline")}, "": f"{verdict} {r['note']}".strip(),
+        }  # fmt: skip
+        table.add_row(*(cells[column] for column in columns))
+    return table
 
 
 def _ratio(ratio: float | None) -> str:

@@ -40,6 +40,7 @@ def command(
     if json:
         print(format_json(found))
     else:
-        bench_report.show(found, Console())
+        # A file is as wide as the table; 80 columns are taken for a terminal that is not there.
+        bench_report.show(found, Console(width=None if sys.stdout.isatty() else 1000))
     if found["slower"]:
         sys.exit(1)

@@ -1,3 +1,4 @@
+import io
 import json
 import sys
 import time
@@ -6,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 import numpy as np
 import pytest
 from command_line import SAMPLE
+from rich.console import Console
 
 from app.__main__ import main
 from app.bench import acquisition_rows, calibration_rows, contour_rows, diagnosis_rows, report, voxel_rows
@@ -132,6 +134,17 @@ def test_a_ratio_beyond_the_tolerance_is_slower(tmp_path):
     assert found["tolerance"] == 0.3
     assert {"python", "numpy", "numba", "opencv-python-headless"} <= found["versions"].keys()
     json.dumps(found)
+
+
+@pytest.mark.parametrize(("width", "n_columns"), [(1000, 8), (95, 4)])
+def test_a_table_breaks_no_word_and_shows_the_verdict(width, n_columns):
+    work = "a search of the trunk in six views of a child"
+    found = report.report([row(work, 125, must=0.11)], {"tolerance": 0.3, "ratios": {}})
+    console = Console(width=width, file=io.StringIO())
+    report.show(found, console)
+    head, line, *_ = console.file.getvalue().splitlines()
+    assert len(head.split()) == n_columns
+    assert (work in line, line.rstrip().endswith("fails")) == (True, True)
 
 
 def test_the_baseline_knows_every_row():
