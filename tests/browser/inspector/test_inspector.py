@@ -303,7 +303,7 @@ async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page,
         "sizes": [{"name": "thigh, length", "before_m": 0.4, "after_m": 0.445, "sigma_m": 0.008}],
         "front": lines, "side": lines,
     }  # fmt: skip
-    note = "Shoulder centre not observable: it turned by 19 degrees; hip centre not observable: it turned by 9 degrees."
+    note = "The shoulder turned by 19 degrees only, which does not show its centre; the hip turned by 9 degrees."
     await endpoint.broadcast(work | {"running": False, "stage": "", "message": note, "result": result})
     await page.locator(".acquisition-sizes").wait_for()
     assert await page.locator(".acquisition-status").inner_text() == note

@@ -105,7 +105,7 @@ def unobservable_joints(acquisition: Acquisition) -> list[str]:
     """Say which joint centres the poses of an acquisition do not show; nothing where joints were given."""
     swings = [] if acquisition.joints_are_given else joint_swings(acquisition)
     return [
-        f"{s.name} centre not observable: it turned by {np.degrees(s.swing_rad):.0f} degrees"
+        f"the {s.name} turned by {np.degrees(s.swing_rad):.0f} degrees only, which does not show its centre"
         for s in swings
         if not s.is_observable
     ]

@@ -55,7 +55,7 @@ def test_the_result_is_a_draft_that_is_applied_and_undone(posed, acquiring):
     wait_for(lambda: not posed.state.acquisition.running)
     found = posed.state.acquisition
     assert (found.frames, found.cost_before_px, found.cost_after_px) == ((0,), 3.0, 2.0)
-    assert found.message.startswith("Shoulder centre not observable: it turned by 0 degrees; ")
+    assert found.message.startswith("The shoulder turned by 0 degrees only, which does not show its centre; ")
     assert posed.models[0] is before  # nothing but the draft has changed
     assert posed.body_sizes.model(0).height_m == pytest.approx(before.height_m * np.exp(0.05))
     message = inspector.acquisition(found)

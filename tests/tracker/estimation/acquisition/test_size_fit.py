@@ -247,8 +247,8 @@ def test_joints_that_hardly_turn_are_said_to_be_unobservable(acquisition):
         "shoulder": 19, "elbow": 31, "hip": 50, "knee": 0,
     }  # fmt: skip
     assert unobservable_joints(shown) == [
-        "shoulder centre not observable: it turned by 19 degrees",
-        "knee centre not observable: it turned by 0 degrees",
+        "the shoulder turned by 19 degrees only, which does not show its centre",
+        "the knee turned by 0 degrees only, which does not show its centre",
     ]
     assert unobservable_joints(shown._replace(joints_are_given=True)) == []
 

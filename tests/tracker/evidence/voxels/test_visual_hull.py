@@ -83,7 +83,7 @@ def test_the_silhouette_that_is_explained_least_is_named():
         mask = np.zeros_like(views[i].mask)
         mask[margin:-margin, margin:-margin] = True
         views[i] = views[i]._replace(mask=mask)
-    with pytest.raises(TrackerError, match=r"little can be explained \(c1 \d+%, c4 \d+%\)") as error:
+    with pytest.raises(TrackerError, match=r"the others hardly explain \(c1 \d+%, c4 \d+%\)") as error:
         carve_people(views, SIZE_M)
     assert error.value.camera == "c4"
 
