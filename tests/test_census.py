@@ -11,7 +11,7 @@ from code_counts import code_lines, git, numbers, private_names, unexplained_ris
 MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 991, 224, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
-MAX_CODE_LINES = {"tracker": 49015, "app": 20766, "js": 14266, "css": 4182, "tests": 65517}
+MAX_CODE_LINES = {"tracker": 49015, "app": 20750, "js": 14266, "css": 4182, "tests": 65517}
 """Lines without blanks, comments and docstrings."""
 MAX_HIDDEN_SUBJECTS = 25
 MAX_PRIVATE = 207

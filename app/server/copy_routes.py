@@ -9,10 +9,8 @@ import msgspec
 from aiohttp import web
 
 from app.control.controller import Controller
-from app.remedies import page_text
 from app.server.page_requests import read_body
 from app.session.path_choice import TypedPath, typed_path
-from tracker.errors import TrackerError
 
 
 class _CopyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -41,9 +39,6 @@ class CopyRoutes:
     async def _open(self, request: web.Request) -> web.Response:
         body = await read_body(request, _CopyRequest, self._refusal)
         async with self._busy:
-            try:
-                folder = await asyncio.to_thread(lambda: typed_path(body.folder).resolve())
-                await asyncio.to_thread(self._controller.other_copies.open, folder)
-            except TrackerError as error:
-                raise web.HTTPBadRequest(text=page_text(error)) from error
+            folder = await asyncio.to_thread(lambda: typed_path(body.folder).resolve())
+            await asyncio.to_thread(self._controller.other_copies.open, folder)
         return web.json_response({"opened": True})

@@ -17,7 +17,6 @@ from urllib.parse import quote
 
 from aiohttp import web
 
-from app.remedies import page_text
 from app.runtime.jobs import StoppedError
 from app.runtime.temporary_folder import TemporaryFolder
 from app.server import connections
@@ -105,8 +104,6 @@ class ExportRoutes:
             with closing(TemporaryFolder(tempfile.gettempdir())) as folder:
                 try:
                     made = await asyncio.to_thread(make, folder.path)
-                except TrackerError as error:
-                    raise web.HTTPBadRequest(text=page_text(error)) from error
                 except StoppedError:
                     raise web.HTTPServiceUnavailable(text="The export was stopped.") from None
                 finally:

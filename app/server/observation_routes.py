@@ -87,10 +87,7 @@ class ObservationRoutes:
         """Read and check files; the answer describes them, and the views show their points."""
         form = await read_body(request, ImportForm, self._refusal)
         async with self._busy:
-            try:
-                found = await asyncio.to_thread(self._planned, form)
-            except TrackerError as error:
-                raise web.HTTPBadRequest(text=page_text(error)) from error
+            found = await asyncio.to_thread(self._planned, form)
         return web.json_response(found)
 
     def _planned(self, form: ImportForm) -> dict[str, Any]:
@@ -114,20 +111,14 @@ class ObservationRoutes:
         """Store the files that were read last."""
         require_page(request, self._refusal)
         async with self._busy:
-            try:
-                await asyncio.to_thread(self._controller.observing.store)
-            except TrackerError as error:
-                raise web.HTTPBadRequest(text=page_text(error)) from error
+            await asyncio.to_thread(self._controller.observing.store)
         return web.json_response({"stored": True})
 
     async def _report(self, request: web.Request) -> web.Response:
         """Send the report of the last judgement as a download."""
         require_page(request, None)
         async with self._busy:
-            try:
-                name, made = await asyncio.to_thread(self._reported)
-            except TrackerError as error:
-                raise web.HTTPBadRequest(text=page_text(error)) from error
+            name, made = await asyncio.to_thread(self._reported)
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name)}"}
         return web.Response(body=made, content_type="text/html", charset="utf-8", headers=headers)
 

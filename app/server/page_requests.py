@@ -1,12 +1,14 @@
 """Requests that only the page of the program's own user may send: where they come from, and what they hold."""
 
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import msgspec
 from aiohttp import web
 
+from app.remedies import page_text
 from app.state.role import Role
-from tracker.errors import SessionError
+from tracker.errors import SessionError, TrackerError
 from tracker.validation import check
 
 ROLE: web.RequestKey[Role] = web.RequestKey("role")
@@ -30,6 +32,17 @@ def require_page(request: web.Request, refusal: str | None) -> None:
         raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")
 
 
+@web.middleware
+async def answer_errors(
+    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+) -> web.StreamResponse:
+    """Answer with the sentence of an error that a user can mend."""
+    try:
+        return await handler(request)
+    except TrackerError as error:
+        raise web.HTTPBadRequest(text=page_text(error)) from error
+
+
 async def read_body(request: web.Request, declaration: Any, refusal: str | None) -> Any:
     """Return the body of a request of the page, checked against its declaration.
 
@@ -40,7 +53,8 @@ async def read_body(request: web.Request, declaration: Any, refusal: str | None)
 
     Raises:
         HTTPForbidden: it is not of the page.
-        HTTPBadRequest: it does not fit the declaration.
+        HTTPBadRequest: it is no JSON.
+        SessionError: it does not fit the declaration.
     """
     require_page(request, refusal)
     # A foreign page can send a form without asking, JSON it cannot. The guard has seen the Origin.
@@ -48,8 +62,7 @@ async def read_body(request: web.Request, declaration: Any, refusal: str | None)
         raise web.HTTPForbidden(text="Expected a request of this page, found another.")
     data = await request.read()
     try:
-        return check(msgspec.json.decode(data), declaration, "the form", SessionError)
+        decoded = msgspec.json.decode(data)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
         raise web.HTTPBadRequest(text=f"Expected a request in JSON, found other data ({error}).") from error
-    except SessionError as error:
-        raise web.HTTPBadRequest(text=str(error)) from error
+    return check(decoded, declaration, "the form", SessionError)

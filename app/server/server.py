@@ -19,7 +19,7 @@ from aiohttp.typedefs import Handler, Middleware
 
 from app.server import connections, viser_proxy
 from app.server.access import NO_TOKEN, Access, root_of
-from app.server.page_requests import ROLE
+from app.server.page_requests import ROLE, answer_errors
 from app.server.static_files import KEPT, POLICY, PREFIX, ROUTE, PageFiles, connect_sources
 from app.state.role import Role
 
@@ -56,7 +56,7 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
         access: the check of every request.
         static: the folder of the page (`static_files.static_folder`).
     """
-    app = web.Application(middlewares=[_guard(access)])
+    app = web.Application(middlewares=[_guard(access), answer_errors])
     app[_SOCKETS] = weakref.WeakSet()
     app[_ROOTS] = access.roots
     proxy, files = viser_proxy.ViserProxy(viser_socket), PageFiles(static)

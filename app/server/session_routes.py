@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import msgspec
 from aiohttp import web
 
-from app.remedies import page_text
 from app.server.new_session_routes import NewSessionRoutes
 from app.server.page_requests import ROLE, read_body, require_page
 from app.session.path_choice import TypedPath, completions, typed_path
@@ -103,10 +102,7 @@ class SessionRoutes:
         body = await read_body(request, _OpenRequest, self._refusal)
         if self.is_chosen.is_set():
             raise web.HTTPConflict(text="Another session is being opened; wait for it.")
-        try:
-            folder = await asyncio.to_thread(self._checked, body)
-        except TrackerError as error:
-            raise web.HTTPBadRequest(text=page_text(error)) from error
+        folder = await asyncio.to_thread(self._checked, body)
         self.chosen = ChosenSession(folder, body.frame, body.person)
         self.is_chosen.set()
         return web.json_response({"name": folder.name})

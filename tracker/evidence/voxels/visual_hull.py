@@ -76,7 +76,7 @@ def carve_people(silhouettes: Sequence[ViewSilhouette], size_m: float) -> Visual
     poor = [f"{n} {100 * c:.0f}%" for n, c in zip(names, found, strict=True) if c < _MIN_COVERAGE]
     if len(poor) > (broken >= 0):
         raise TrackerError(
-            f"expected silhouettes of one person, found views whose silhouettes the others hardly explain ({', '.join(poor)}); check "
+            f"expected silhouettes that agree, found some that the others hardly explain ({', '.join(poor)}); check "
             "that no camera has moved, that the videos start at the same time, and the background",
             camera=names[int(np.argmin(found))],
         )

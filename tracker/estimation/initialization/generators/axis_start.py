@@ -68,7 +68,7 @@ def _spreads() -> list[tuple[float, float, float]]:
 
 def _coarse(search: "_Search", axis: BodyAxis) -> list[Hypothesis]:
     """Return for each twist on an axis the best pose among a few."""
-    notes = (f"left out: {', '.join(axis.left_out)}, whose silhouette leans otherwise than the other views show",) if axis.left_out else ()
+    notes = (f"view {', '.join(axis.left_out)} was left out: its silhouette leans otherwise",) if axis.left_out else ()
     found, near = [], None
     for i in range(_N_TWISTS):
         near = _trunk(search.model, axis, _frame(axis.up, 2 * np.pi * i / _N_TWISTS), near)
