@@ -146,9 +146,9 @@ class Controller:
         follow = (*restored, self.held_points.follow, self.tracking.follow_history)
         self.history = History(session_state, activities, follow)
         """Moves along the history."""
-        self.cost_landscape = CostLandscapes(session_state, activities)
+        self.cost_landscape = CostLandscapes(session_state)
         """Samples the cost along one degree of freedom."""
-        self.cost_map = CostMaps(session_state, activities)
+        self.cost_map = CostMaps(session_state)
         """Samples the cost over two degrees of freedom."""
         self.reasons = Reasons(session_state)
         """Explains the shown pose by what each view shows of each part."""

@@ -51,7 +51,7 @@ def _cost_map(controller: Controller, page: int, message: wire.ShowCostMap) -> N
 def _set_two(controller: Controller, _: int, message: wire.SetCostMapPlace) -> None:
     factors = dof_labels.factors(controller.models[message.person])
     values = [v / factors[d] if d < len(factors) else np.nan for v, d in zip(message.values, message.dofs, strict=True)]
-    controller.cost_map.set_values(message.person, message.dofs, (float(values[0]), float(values[1])))
+    controller.pose_edits.set_along(message.person, message.dofs, values)
 
 
 def _reason(controller: Controller, page: int, message: wire.AskReason) -> None:
@@ -74,5 +74,5 @@ SEARCH_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.ShowCostMap: _cost_map,
     wire.SetCostMapPlace: _set_two,
     wire.AskReason: _reason,
-    wire.SetLandscapeDof: lambda controller, _, m: controller.cost_landscape.set_value(m.person, m.dof, m.value),
+    wire.SetLandscapeDof: lambda controller, _, m: controller.pose_edits.set_along(m.person, [m.dof], [m.value]),
 }

@@ -1,7 +1,7 @@
 """Change poses without a drag: by values, by steps, or as a whole. Each change is one entry of the history."""
 
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -14,7 +14,7 @@ from tracker.errors import TrackerError
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.posing import grab as grabbing
 from tracker.estimation.posing.drag import drag
-from tracker.estimation.posing.edits import copy_dofs, copy_joint_angles, limb_of, mirror_pose
+from tracker.estimation.posing.edits import copy_dofs, copy_joint_angles, limb_of, mirror_pose, poses_along
 from tracker.estimation.posing.orient import orient
 from tracker.geometry.arrays import Array
 
@@ -55,6 +55,23 @@ class PoseEdits:
             dof_values = self._dof_values(person)
             dof_values[dof] = value
             self._set_dof_values(person, dof, dof_values, f"set {display_name(model.dof_names[dof])}")
+
+    def set_along(self, person: int, dofs: Sequence[int], values: Sequence[float]) -> None:
+        """Set degrees of freedom to a place in a landscape or map of the cost, rad or metres, see `poses_along`.
+
+        Raises:
+            TrackerError: the person has no such degrees of freedom, one is locked, or a value is not finite.
+        """
+        models = self._session_state.models
+        is_known = 0 <= person < len(models) and all(0 <= dof < models[person].n_dofs for dof in dofs)
+        if not is_known or not np.isfinite(values).all():
+            raise TrackerError("expected finite values of the body's degrees of freedom, found others; reload the page")
+        if locked := [models[person].dof_names[d] for d in dofs if d in self._session_state.state.locked[person]]:
+            raise TrackerError(f"expected degrees of freedom that may move, found {locked[0]} locked; unlock it first")
+        with self._on(person, None) as model:
+            (moved,) = poses_along(model, self._session_state.state.poses[person], dofs, np.array([values]))
+            names = " and ".join(display_name(model.dof_names[d]) for d in dofs)
+            self._apply(person, model.clip(moved), f"set {names}")
 
     def set_values(self, person: int, values: Array, frame: int | None = None) -> None:
         """Set a whole pose, (n_values,), within the limits of the joints; locked degrees of freedom stay.

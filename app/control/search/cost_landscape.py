@@ -4,17 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.control.session.watching_pages import WatchingPages
 from app.runtime.jobs import LatestWinsWorker
 from app.state.search import CostLandscape
 from app.state.state import State
-from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.estimation.chamfer.settings import TrackSettings, pose_cost
-from tracker.estimation.posing.edits import joint_of
+from tracker.estimation.posing.edits import current_value, is_plain, joint_of, poses_along
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
 
@@ -28,14 +26,9 @@ _REST_S = 0.08
 class CostLandscapes:
     """Computes the landscape of the newest pose in the background while a page displays it."""
 
-    def __init__(self, session_state: SessionState, activities: Activities) -> None:
-        """Subscribe to the state; nothing is computed until a page displays the landscape.
-
-        Args:
-            session_state: holds the state.
-            activities: ends jobs and gestures before an edit.
-        """
-        self._session_state, self._activities = session_state, activities
+    def __init__(self, session_state: SessionState) -> None:
+        """Subscribe to the state; nothing is computed until a page displays the landscape."""
+        self._session_state = session_state
         self._pages = WatchingPages[None](session_state, self._changed)
         self._chosen: tuple[int, str | None, str] | None = None  # selected person and point, name of the dof
         self._computed: tuple[object, ...] = ()
@@ -69,28 +62,6 @@ class CostLandscapes:
             )
         self._chosen = state.person, state.point, dof
         self._latest.offer(self._session_state.state)
-
-    def set_value(self, person: int, dof: int, value: float) -> None:
-        """Set a degree of freedom to the clicked value, rad or metres; one entry of the history.
-
-        Raises:
-            TrackerError: the person or degree of freedom is unknown or locked, or the value is not finite.
-        """
-        models = self._session_state.models
-        if not (0 <= person < len(models) and 0 <= dof < models[person].n_dofs and np.isfinite(value)):
-            raise TrackerError(
-                "expected a value of one of the body's degrees of freedom, found another; reload the page"
-            )
-        if dof in self._session_state.state.locked[person]:
-            raise TrackerError(
-                f"expected a degree of freedom that may move, "
-                f"found {models[person].dof_names[dof]} locked; unlock it first"
-            )
-        with self._activities.editing():
-            model, state = models[person], self._session_state.state
-            values = model.clip(along(model, state.poses[person], dof, np.array([value]))[0])
-            self._session_state.show_pose(person, values)
-            self._session_state.save(f"set {display_name(model.dof_names[dof])}", "manual", None, person)
 
     def close(self) -> None:
         """End the thread."""
@@ -146,26 +117,9 @@ def landscape(
     model = models[person]
     current = current_value(model, poses[person], dof)
     reach = _REACH_M if model.dof_is_length[dof] else _REACH_RAD
-    low, high = model.limits[dof] if _is_plain(model, dof) else (-np.inf, np.inf)
+    low, high = model.limits[dof] if is_plain(model, dof) else (-np.inf, np.inf)
     low, high = (low if np.isfinite(low) else current - reach), (high if np.isfinite(high) else current + reach)
     values = np.linspace(min(low, current), max(high, current), SAMPLES)
     cost = pose_cost(views, models, poses, settings, velocities)
-    totals_px, view_costs_px = cost.of_person(person, along(model, poses[person], dof, values), poses)
+    totals_px, view_costs_px = cost.of_person(person, poses_along(model, poses[person], [dof], values[:, None]), poses)
     return CostLandscape(person, dof, current, cost(poses).total_px, values, totals_px, view_costs_px)
-
-
-def current_value(model: BodyModel, pose: Array, dof: int) -> float:
-    """Return the value of a degree of freedom, rad or metres; 0 for a ball joint, which turns from its present pose."""
-    return float(pose[model.dof_value[dof]]) if _is_plain(model, dof) else 0.0
-
-
-def along(model: BodyModel, pose: Array, dof: int, values: Array) -> Array:
-    """Return poses, (N, n_values), with one degree of freedom at each of some values, (N,), rad or metres."""
-    steps = np.zeros((len(values), model.n_dofs))
-    steps[:, dof] = values - current_value(model, pose, dof)
-    return model.retract(pose, steps)
-
-
-def _is_plain(model: BodyModel, dof: int) -> bool:
-    """Return whether a degree of freedom is a value of the pose, not an axis of a ball joint."""
-    return model.value_names[model.dof_value[dof]] == model.dof_names[dof]

@@ -4,20 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.control.search.cost_landscape import current_value
-from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.control.session.watching_pages import WatchingPages
 from app.runtime.jobs import LatestWinsWorker
 from app.state.identity import Identity
 from app.state.search import CostMap
 from app.state.state import State
-from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.by_frame.frame_problem import Bodies
 from tracker.estimation.by_frame.pose_score import scorer_without_prediction
 from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.posing.edits import current_value, poses_along
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
 
@@ -32,14 +30,9 @@ _REST_S = 0.1
 class CostMaps:
     """Computes the map of the newest pose in the background while a page displays one."""
 
-    def __init__(self, session_state: SessionState, activities: Activities) -> None:
-        """Subscribe to the state; nothing is computed until a page asks.
-
-        Args:
-            session_state: holds the state.
-            activities: ends jobs and gestures before an edit.
-        """
-        self._session_state, self._activities = session_state, activities
+    def __init__(self, session_state: SessionState) -> None:
+        """Subscribe to the state; nothing is computed until a page asks."""
+        self._session_state = session_state
         self._pages = WatchingPages[tuple[int, tuple[int, int]]](session_state, self._changed)  # person, dofs
         self._computed: tuple[object, ...] = ()
         self._latest = LatestWinsWorker(self._compute, "cost map", _REST_S)
@@ -57,27 +50,6 @@ class CostMaps:
     def leave(self, page: int) -> None:
         """Note that a page displays no map."""
         self._pages.leave(page)
-
-    def set_values(self, person: int, dofs: tuple[int, int], values: tuple[float, float]) -> None:
-        """Set two degrees of freedom, rad or metres, within their limits; one entry of the history.
-
-        Raises:
-            TrackerError: the person has no such degrees of freedom, one is locked, or a value is not finite.
-        """
-        self._require(person, dofs)
-        model = self._session_state.models[person]
-        locked = [model.dof_names[d] for d in dofs if d in self._session_state.state.locked[person]]
-        if locked or not np.isfinite(values).all():
-            raise TrackerError(
-                f"expected two finite values of degrees of freedom that may move, found {locked or values}; unlock "
-                "the joint first"
-            )
-        with self._activities.editing():
-            model, pose = self._session_state.models[person], self._session_state.state.poses[person]
-            (moved,) = poses_over(model, pose, dofs, np.array(values[:1]), np.array(values[1:]))
-            self._session_state.show_pose(person, model.clip(moved))
-            names = " and ".join(display_name(model.dof_names[d]) for d in dofs)
-            self._session_state.save(f"set {names}", "manual", None, person)
 
     def close(self) -> None:
         """End the thread."""
@@ -134,17 +106,10 @@ def cost_map(
     across, up = (_values(model, pose, dof) for dof in dofs)
     scorer = scorer_without_prediction(views, bodies, person, settings)
     present = float(scorer.costs_with_priors(model, pose[None])[0])
-    nats = scorer.costs_with_priors(model, poses_over(model, pose, dofs, across, up)) - present
+    places = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
+    nats = scorer.costs_with_priors(model, poses_along(model, pose, dofs, places)) - present
     current = tuple(current_value(model, pose, dof) for dof in dofs)
     return CostMap(person, dofs, (current[0], current[1]), across, up, nats.reshape(len(up), len(across)))
-
-
-def poses_over(model: BodyModel, pose: Array, dofs: tuple[int, int], across: Array, up: Array) -> Array:
-    """Return poses, (len(up) * len(across), n_values), with two degrees of freedom at values, rad or metres."""
-    steps = np.zeros((len(up), len(across), model.n_dofs))
-    steps[..., dofs[0]] = across - current_value(model, pose, dofs[0])
-    steps[..., dofs[1]] = up[:, None] - current_value(model, pose, dofs[1])
-    return model.retract(pose, steps.reshape(-1, model.n_dofs))
 
 
 def _values(model: BodyModel, pose: Array, dof: int) -> Array:

@@ -1,5 +1,7 @@
 """Edit whole poses: mirror them, copy from another frame or person, reset a limb."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,23 @@ from tracker.validation import ROUNDING
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])
 """Reflection that swaps the body's left and right: y points to the left in every part's frame."""
+
+
+def is_plain(model: BodyModel, dof: int) -> bool:
+    """Return whether a degree of freedom is a value of the pose, not an axis of a ball joint."""
+    return model.value_names[model.dof_value[dof]] == model.dof_names[dof]
+
+
+def current_value(model: BodyModel, pose: Array, dof: int) -> float:
+    """Return the value of a degree of freedom, rad or metres; 0 for a ball joint, which turns from its present pose."""
+    return float(pose[model.dof_value[dof]]) if is_plain(model, dof) else 0.0
+
+
+def poses_along(model: BodyModel, pose: Array, dofs: Sequence[int], values: Array) -> Array:
+    """Return poses, (N, n_values), with some degrees of freedom, (k,), at values, (N, k), rad or metres."""
+    steps = np.zeros((len(values), model.n_dofs))
+    steps[:, list(dofs)] = values - np.array([current_value(model, pose, dof) for dof in dofs])
+    return model.retract(pose, steps)
 
 
 def copy_dofs(model: BodyModel, pose: Array, other: Array, dofs: NDArray[np.bool_]) -> Array:

@@ -70,15 +70,15 @@ def test_it_begins_with_the_selected_point_and_follows_it(controller):
 def test_a_value_is_set_as_an_edit(controller):
     dof = controller.models[0].dof_names.index("left_elbow.extension")
     before = controller.state.poses[0][dof]
-    controller.cost_landscape.set_value(0, dof, 0.4)
+    controller.pose_edits.set_along(0, [dof], [0.4])
     assert controller.state.poses[0][dof] == pytest.approx(0.4)
     assert controller.state.undo == "set left elbow extension, frame 0"
     controller.history.undo()
     assert controller.state.poses[0][dof] == before
     controller.dof_locks.set(0, [dof], True)
     with pytest.raises(TrackerError, match="unlock it first"):
-        controller.cost_landscape.set_value(0, dof, 0.4)
-    with pytest.raises(TrackerError, match="found another"):
-        controller.cost_landscape.set_value(0, 0, float("nan"))
+        controller.pose_edits.set_along(0, [dof], [0.4])
+    with pytest.raises(TrackerError, match="found others"):
+        controller.pose_edits.set_along(0, [0], [float("nan")])
     with pytest.raises(TrackerError, match="choose one from the list"):
         controller.cost_landscape.choose("tail.wag")

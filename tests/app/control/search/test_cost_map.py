@@ -44,7 +44,7 @@ def test_it_follows_the_pose_while_a_page_looks_and_a_place_is_taken(opened):
     assert controller.state.cost_map is None  # nobody looks
     controller.cost_map.watch(PAGE, 0, dofs)
     wait_for(lambda: controller.state.cost_map is not None, 60)
-    controller.cost_map.set_values(0, dofs, (0.4, 0.7))
+    controller.pose_edits.set_along(0, dofs, (0.4, 0.7))
     assert tuple(controller.state.poses[0][list(dofs)]) == pytest.approx((0.4, 0.7))
     assert controller.state.undo == f"set {names}, frame 0"
     wait_for(lambda: controller.state.cost_map.current == pytest.approx((0.4, 0.7)), 60)
@@ -62,8 +62,8 @@ def test_wrong_degrees_of_freedom_are_refused(controller):
     for wrong in ((dofs[0], dofs[0]), (0, 999), (-1, 2)):
         with pytest.raises(TrackerError, match="expected two different degrees of freedom"):
             controller.cost_map.watch(PAGE, 0, wrong)
-    with pytest.raises(TrackerError, match="expected two finite values"):
-        controller.cost_map.set_values(0, dofs, (0.1, np.nan))
+    with pytest.raises(TrackerError, match="expected finite values"):
+        controller.pose_edits.set_along(0, dofs, (0.1, np.nan))
     controller.dof_locks.set(0, [dofs[1]], True)
     with pytest.raises(TrackerError, match=r"left_elbow\.extension"):
-        controller.cost_map.set_values(0, dofs, (0.1, 0.2))
+        controller.pose_edits.set_along(0, dofs, (0.1, 0.2))
