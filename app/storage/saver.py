@@ -1,6 +1,6 @@
 """Read and write the annotations of an open session: poses, pins, settings, history."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
@@ -23,7 +23,13 @@ from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.calibration_check import CalibrationCheck
-from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames, outdated_sizes
+from tracker.pipeline.calibration_revisions import (
+    apply_check,
+    change_calibration,
+    follow_history,
+    outdated_frames,
+    outdated_sizes,
+)
 from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
@@ -40,6 +46,7 @@ from tracker.session.store.records import (
     PoseChange,
     PoseRecord,
 )
+from tracker.session.synchronize import with_starts
 
 T = TypeVar("T")
 
@@ -128,6 +135,18 @@ class Saver:
         """
         self._require_written()
         return self._with_cameras(apply_check(self._session, self._store, check))
+
+    def set_clocks(
+        self, starts: Mapping[str, float], rates: Mapping[str, float], label: str, amends: int | None
+    ) -> Session:
+        """Give cameras other starts and drifts, by name, as an entry of the history; see `change_calibration`.
+
+        Raises:
+            SessionError: a start does not fit the footage, or as `correct_cameras`.
+        """
+        self._require_written()
+        changed = with_starts(self._session, starts, rates)
+        return self._with_cameras(change_calibration(self._session, self._store, changed, label, amends))
 
     def follow_calibration(self) -> Session:
         """Return the session with the calibration that belongs to its history; the same session if it has it.
