@@ -45,7 +45,7 @@ export function clocksSection({ store, send, navigation }) {
     { text: "+ frame", label: "a frame later", by: () => 1 },
   ].map(({ text, label, by }) => ({ text, label, run: () => use("nudge", { camera, frames: by() }) }));
 
-  const table = make("table", "acquisition-sizes");
+  const table = make("table", "number-table");
   const none = /** @type {[string, string][]} */ ([]);
   const choice = choiceRow({ label: "Camera", title: "Camera that is nudged", options: none, change: (value) => choose(Number(value), other) });
   const buttons = nudges.map(({ text, label, run }) => textButton(text, `Show pictures taken ${label}; undo restores the clock`, run));

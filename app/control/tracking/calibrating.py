@@ -20,6 +20,7 @@ from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.geometry.camera_correction import corrected, later_s
 from tracker.pipeline.body_acquisition import generic_doubt, with_acquired_bodies
 from tracker.pipeline.calibration_check import CalibrationCheck, check_calibration, held_out_scores, n_better
+from tracker.pipeline.calibration_revisions import apply_check
 from tracker.pipeline.posed_recording import PosedRecording
 from tracker.session.session import Session
 
@@ -92,7 +93,7 @@ class Calibrating:
             session_state, found = self._session_state, self._session_state.state.calibration
             if found.refused:
                 raise TrackerError(found.refused)
-            corrected_session = session_state.saver.correct_cameras(check)
+            corrected_session = session_state.saver.change_cameras(lambda own, store: apply_check(own, store, check))
             message, sizes = f"Corrected: {', '.join(check.named)}.", session_state.saver.outdated_sizes()
             if sizes:
                 message += f" Acquire the sizes of {', '.join(sizes)} again, which fit the former cameras, then track."

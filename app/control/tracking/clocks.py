@@ -1,6 +1,6 @@
 """Nudge the clocks of the cameras, estimate them, and find a moment to compare them by."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from app.control.session.activities import Activities
@@ -9,9 +9,11 @@ from app.control.session.session_state import SessionState
 from app.control.tracking.calibrating import Calibrating
 from app.state.calibration import ClocksState
 from tracker.errors import TrackerError
-from tracker.pipeline.calibration_revisions import starts_by_motion
+from tracker.pipeline.calibration_revisions import change_calibration, starts_by_motion
 from tracker.pipeline.fast_moment import find_fast_moment
-from tracker.session.synchronize import FoundStart, find_starts
+from tracker.session.session import Session
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.synchronize import FoundStart, find_starts, with_starts
 
 
 class Clocks:
@@ -28,7 +30,7 @@ class Clocks:
         self._session_state, self._activities, self._calibrating = session_state, activities, calibrating
         self._work = BackgroundWork(session_state, "clocks", "work on the clocks")
         self.stop = self._work.stop
-        self._nudged: tuple[int, int] | None = None  # the camera and the entry of the history that go on
+        self._nudged: tuple[int | None, int] | None = None  # the camera and the entry of the history that go on
 
     def nudge(self, camera: int, frames: float) -> None:
         """Let a camera show pictures of a later time, frames; negative for an earlier one.
@@ -39,7 +41,8 @@ class Clocks:
             TrackerError: its footage has no such picture, a check of the cameras is under way, or another person works.
         """
         source = self._session_state.session.cameras[camera]
-        self._change({source.camera.name: source.start_frames + frames}, {}, f"clock of {source.camera.name}", camera)
+        to = FoundStart(source.camera.name, source.start_frames + frames, None, None, True)
+        self._change(to, f"clock of {to.camera}", camera)
         self._work.set(found=(), notes=(), way="", message="")  # they were relative to the former clock
 
     def estimate(self, way: str) -> None:
@@ -59,10 +62,9 @@ class Clocks:
         """
         name, state = self._session_state.session.camera_names[camera], self._session_state.state.clocks
         found = next((f for f in state.found if f.camera == name and f.is_clear), None)
-        if found is None or found.start_frames is None:
+        if found is None:
             raise TrackerError(f"expected a clear estimate of the clock of '{name}', found none; estimate it first")
-        rates = {} if found.rate is None else {name: found.rate}
-        self._change({name: found.start_frames}, rates, f"clock of {name} by {state.way}")
+        self._change(found, f"clock of {name} by {state.way}")
 
     def find_moment(self, views: Sequence[int]) -> None:
         """Begin to look for a moment at which something moves fast in two views, by their indices.
@@ -72,27 +74,29 @@ class Clocks:
         """
         self._work.start(lambda: self._find_moment(views), self._session_state.state.clocks)
 
-    def _change(
-        self, starts: Mapping[str, float], rates: Mapping[str, float], label: str, camera: int | None = None
-    ) -> None:
-        """Change the clock of a camera; `camera` is the index of one that is nudged."""
+    def _change(self, found: FoundStart, label: str, nudged: int | None = None) -> None:
+        """Give a camera another clock; `nudged` is its index if successive changes are one entry of the history."""
+        rates = {} if found.rate is None else {found.camera: found.rate}
+
+        def change(session: Session, store: AnnotationStore) -> Session:
+            last = tuple(e.edit for e in store.history(1))  # one that is undone, too
+            amends = last[0] if nudged is not None and self._nudged == (nudged, *last) else None
+            changed = with_starts(session, {found.camera: found.start_frames or 0.0}, rates)
+            changed = change_calibration(session, store, changed, label, amends)
+            self._nudged = nudged, store.history(1)[-1].edit
+            return changed
+
         with self._activities.editing(alone=True):
-            saver = self._session_state.saver
             self._calibrating.require_free()
-            nudged, last = self._nudged, (e.edit for e in saver.moves.entries(1))  # one that is undone, too
-            amends = nudged[1] if nudged and nudged == (camera, *last) else None
-            self._calibrating.exchange_cameras(saver.set_clocks(starts, rates, label, amends), "")
-            self._nudged = None if camera is None else (camera, saver.moves.entries(1)[-1].edit)
+            self._calibrating.exchange_cameras(self._session_state.saver.change_cameras(change), "")
 
     def _estimate(self, way: str) -> dict[str, Any]:
         session, report = self._session_state.session, self._work.report
-        found, notes = list[FoundStart](), list[str]()
-        if way == "motion":
-            _, check = self._calibrating.check(report)
-            found, notes = starts_by_motion(session, check), [*check.notes]
-        else:
+        if way != "motion":
             found, notes = find_starts(session, way, report)
-        return {"found": tuple(found), "notes": tuple(notes)}
+            return {"found": tuple(found), "notes": tuple(notes)}
+        _, check = self._calibrating.check(report)
+        return {"found": tuple(starts_by_motion(session, check)), "notes": check.notes}
 
     def _find_moment(self, views: Sequence[int]) -> dict[str, Any]:
         session, recording = self._session_state.session, self._session_state.frames.observer.recording

@@ -164,16 +164,15 @@ def acquisition(found: AcquisitionState) -> wire.AcquisitionMessage:
     """Describe an acquisition of sizes."""
     result, outlines = None, found.outlines
     if outlines is not None:
-        result = wire.AcquisitionResult(
-            frames=found.frames,
-            cost_before_px=found.cost_before_px,
-            cost_after_px=found.cost_after_px,
+        result = made_of(
+            wire.AcquisitionResult,
+            found,
             sizes=tuple(wire.AcquiredSizeRow(*row) for row in found.sizes),
             size_px=outlines.size_px,
             front=wire.OutlinePair(outlines.front.before, outlines.front.after),
             side=wire.OutlinePair(outlines.side.before, outlines.side.after),
         )
-    return wire.AcquisitionMessage(found.person, found.running, found.stage, found.share, found.message, result)
+    return made_of(wire.AcquisitionMessage, found, result=result)
 
 
 def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
@@ -184,9 +183,7 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
         cameras: names of all cameras.
     """
     axes = tuple(wire.SilhouetteAxes(cameras.index(n), people) for n, people in found.axes.items() if n in cameras)
-    return wire.FindingMessage(
-        found.running, found.stage, found.share, found.notes, found.message, found.failed, found.frame, axes,
-    )  # fmt: skip
+    return made_of(wire.FindingMessage, found, axes=axes)
 
 
 def calibration(found: CalibrationState, n_people: int, field: MisfitField) -> wire.CalibrationMessage:
@@ -216,9 +213,7 @@ def observations(found: ObservationsState, people: Sequence[str]) -> observed.Ob
         found: their state.
         people: names of the people of the session.
     """
-    sets = tuple(
-        observed.ObservedSetInfo(s.name, s.format, s.people, s.is_in_space, s.n_frames, s.problem) for s in found.sets
-    )
+    sets = tuple(made_of(observed.ObservedSetInfo, s) for s in found.sets)
     judged = tuple(
         observed.JudgedPerson(j.person, j.share_in_order, len(j.frames), tuple(j.sentences)) for j in found.judgements
     )
@@ -298,9 +293,7 @@ def clocks(session: Session, found: ClocksState) -> wire.ClocksMessage:
     )
     at = found.moment
     moment = None if at is None else wire.ComparedMoment(at.frame, found.views, at.centers_px, at.source)
-    return wire.ClocksMessage(
-        found.running, found.stage, found.share, found.message, found.failed, cameras, found.way, found.notes, moment
-    )
+    return made_of(wire.ClocksMessage, found, cameras=cameras, moment=moment)
 
 
 def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:
