@@ -48,7 +48,8 @@ def _not_found(state: State, stored: StoredWork) -> Iterator[Advice]:
 
 
 def _failed(state: State, _: StoredWork) -> Iterator[Advice]:
-    parts = {"sizes": state.acquisition, "calibration": state.calibration, "observations": state.observations}
+    parts = {"sizes": state.acquisition, "calibration": state.calibration, "clocks": state.clocks}
+    parts |= {"observations": state.observations}
     for section, work in parts.items():
         if work.failed and work.message:
             yield Advice("failed", _sentence(work.message), (_section(section),), "fault")

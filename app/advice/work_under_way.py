@@ -25,10 +25,13 @@ def work_under_way(state: State, stored: StoredWork) -> Iterator[Advice]:
         yield _work(
             f"Acquiring the sizes of {stored.people[state.acquisition.person].name}", state.acquisition, "sizes"
         )
-    if state.calibration.running:
-        yield _work("Checking the cameras", state.calibration, "calibration")
-    if state.observations.running:
-        yield _work("Working on observations", state.observations, "observations")
+    for of, (text, work) in {
+        "calibration": ("Checking the cameras", state.calibration),
+        "clocks": ("Working on the clocks", state.clocks),
+        "observations": ("Working on observations", state.observations),
+    }.items():
+        if work.running:
+            yield _work(text, work, of)
     if state.ranges.running:
         yield _on_range(state.ranges)
     if state.search.kind is not None or state.search.running:

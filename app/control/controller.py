@@ -38,6 +38,7 @@ from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
 from app.control.session.taking_over import FollowingHost, TakingOver
 from app.control.tracking.calibrating import Calibrating
+from app.control.tracking.clocks import Clocks
 from app.control.tracking.comparing_runs import ComparingRuns
 from app.control.tracking.finding import FindingPeople
 from app.control.tracking.inconsistent_frames import InconsistentFrames
@@ -135,6 +136,8 @@ class Controller:
             host.calibrating if host else Calibrating(session_state, activities, self.tracking)
         )
         """Checks and corrects the cameras."""
+        self.clocks: Clocks = host.clocks if host else Clocks(session_state, activities, self.calibrating)
+        """Changes and estimates the clocks of the cameras."""
         self.observing: Observing = host.observing if host else Observing(session_state, activities, self.finding)
         """Shows, judges and imports observations of other programs."""
         reader = None if host is None else host.annotating
@@ -229,6 +232,7 @@ class Controller:
             self.body_acquisition.stop()
             self.finding.stop()
             self.calibrating.close()
+            self.clocks.stop()
             self.observing.stop()
             self._save_retry.close()
         with self.activities.editing():

@@ -25,6 +25,7 @@ from app.messages.inspector import (
     SetPartSizes,
     SetTrackSettings,
     SetView3d,
+    UseClocks,
 )
 from app.messages.observation import SetCopyTolerance, UseCopy, UseObservations, WatchProvenance
 from app.messages.pose import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
@@ -259,8 +260,8 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
     FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
-    DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseObservations, WatchProvenance, UseCopy, SetCopyTolerance,
-    PlanTasks, DecideTask, WriteComment, ResolveComment, AskNextClick,
+    DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseClocks, UseObservations, WatchProvenance, UseCopy,
+    SetCopyTolerance, PlanTasks, DecideTask, WriteComment, ResolveComment, AskNextClick,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

@@ -142,6 +142,20 @@ class CheckCalibration(Command, frozen=True, tag="calibration_check"):
     action: Literal["start", "stop", "preview", "leave", "apply", "track_again"]
 
 
+class UseClocks(Command, frozen=True, tag="clocks"):
+    """Nudge the clock of a camera, estimate the clocks or stop that, take an estimate, or find a fast moment."""
+
+    action: Literal["nudge", "estimate", "take", "moment", "stop"]
+    camera: Index = 0
+    """Index of the camera; not of an estimate, which is of all."""
+    other: Index = 0
+    """Index of the camera whose picture is shown beside it; of a moment."""
+    frames: float = 0.0
+    """Time by which the camera is to show later pictures, frames; of a nudge."""
+    way: Literal["motion", "sound", "flash", "time code"] = "motion"
+    """Data that the clocks are estimated by."""
+
+
 # --- to the page ----------------------------------------------------------------------------------------------------
 
 
@@ -422,3 +436,56 @@ class CalibrationMessage(Message, frozen=True, tag="calibration"):
     """Number of the present calibration, from 1 on; each correction makes another."""
     outdated: tuple[tuple[tuple[int, int], ...], ...]
     """Of each person, the first and last frames of intervals with poses of an earlier calibration."""
+
+
+class FoundClock(Part, frozen=True):
+    """An estimate of the clock of a camera."""
+
+    offset_frames: float | None
+    """As `CameraClock.offset_frames`; null where nothing was found."""
+    drift_ms_per_s: float | None
+    """Null where it is not estimated."""
+    sigma_ms: float | None
+    """Standard deviation of the offset; null where it is not known."""
+    is_clear: bool
+    """Whether it can be taken."""
+
+
+class CameraClock(Part, frozen=True):
+    """The clock of a camera against that of the session."""
+
+    offset_frames: float
+    """Frame of the footage, with its fraction, at the time of frame 0."""
+    drift_ms_per_s: float
+    """Change of the time of its pictures after each second."""
+    found: FoundClock | None
+    """Null for the camera that the others are compared with, and without an estimate."""
+
+
+class ComparedMoment(Part, frozen=True):
+    """A moment at which a point moves fast in two views."""
+
+    frame: int
+    views: tuple[int, ...]
+    """Indices of the cameras."""
+    centers: tuple[tuple[float, float], ...]
+    """Place of the point in each, undistorted px."""
+    source: str
+    """Data that it was found by, for display."""
+
+
+class ClocksMessage(Message, frozen=True, tag="clocks"):
+    """The clocks of all cameras, in their order, and the work on them."""
+
+    running: bool
+    stage: str
+    share: float
+    message: str
+    failed: bool
+    """As `calibration` has them."""
+    cameras: tuple[CameraClock, ...]
+    way: str
+    """Data of the last estimate; empty without one."""
+    notes: tuple[str, ...]
+    """Sentences on clocks that disagree with the estimate."""
+    moment: ComparedMoment | None

@@ -24,8 +24,8 @@ _MOVED: tuple[type[Command], ...] = (wire.Seek, wire.Select)
 """Change the frame and person that one participant sees, and nothing that is stored."""
 _OF_HOST: tuple[type[Command], ...] = (
     wire.SetHeight, wire.SetPartSizes, wire.SetGirdleWidth, wire.ApplySizes, wire.ChangeBody, wire.DraftSizes,
-    wire.AcquireSizes, wire.FindPeople, wire.CheckCalibration, wire.EditFloor, wire.MarkFloor, wire.SetView3d,
-    wire.LookThrough, UseObservations,
+    wire.AcquireSizes, wire.FindPeople, wire.CheckCalibration, wire.UseClocks, wire.EditFloor, wire.MarkFloor,
+    wire.SetView3d, wire.LookThrough, UseObservations,
 )  # fmt: skip
 """Change what belongs to the session, not to a pose, or the 3-D view, which shows what the host shows."""
 _DECIDED = ("verify", "reject")

@@ -14,6 +14,7 @@ from app.messages.inspector import (
     AcquisitionMessage,
     BodySizesMessage,
     CalibrationMessage,
+    ClocksMessage,
     FindingMessage,
     SettingsMessage,
     View3dMessage,
@@ -386,8 +387,8 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, AdviceMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
     RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
-    AcquisitionMessage, FindingMessage, CalibrationMessage, ObservationsMessage, ReasonMessage, CostMapMessage,
-    AnnotationMessage, PresenceMessage,
+    AcquisitionMessage, FindingMessage, CalibrationMessage, ClocksMessage, ObservationsMessage, ReasonMessage,
+    CostMapMessage, AnnotationMessage, PresenceMessage,
     ProvenanceMessage, AnnotatorsMessage, OtherCopyMessage,
 ]  # fmt: skip
 

@@ -96,6 +96,21 @@ def _calibration(controller: Controller, _: int, message: wire.CheckCalibration)
     actions[message.action]()
 
 
+def _clocks(controller: Controller, _: int, message: wire.UseClocks) -> None:
+    clocks, n_cameras = controller.clocks, len(controller.session.cameras)
+    for camera in (message.camera, message.other):
+        if camera >= n_cameras:
+            raise MessageError(f"a camera below {n_cameras}", str(camera))
+    actions: dict[str, Callable[[], None]] = {
+        "nudge": lambda: clocks.nudge(message.camera, message.frames),
+        "estimate": lambda: clocks.estimate(message.way),
+        "take": lambda: clocks.take(message.camera),
+        "moment": lambda: clocks.find_moment((message.camera, message.other)),
+        "stop": clocks.stop,
+    }
+    actions[message.action]()
+
+
 def _observations(controller: Controller, _: int, message: UseObservations) -> None:
     observing = controller.observing
     actions: dict[str, Callable[[], None]] = {
@@ -158,6 +173,7 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.AcquireSizes: _acquire,
     wire.FindPeople: _find_people,
     wire.CheckCalibration: _calibration,
+    wire.UseClocks: _clocks,
     UseObservations: _observations,
     plan_wire.PlanTasks: _plan,
     plan_wire.DecideTask: _decide,

@@ -32,14 +32,16 @@ class FootageCrops:
             indices: folder in which the lists of frames are cached.
         """
         self._indices = indices
+        self._recording: Recording | None = None
         self.set_cameras(cameras)
         self._scales = [min(1.0, float(np.sqrt(_AREA_PX / (c.camera.width * c.camera.height)))) for c in cameras]
-        self._recording: Recording | None = None
         self._lock = threading.Lock()
 
     def set_cameras(self, cameras: Sequence[CameraSource]) -> None:
         """Continue with other calibrations of the same cameras."""
         self._sources = tuple(cameras)
+        if self._recording is not None:
+            self._recording = self._recording.with_cameras(cameras)
         self._views = lru_cache(_N_VIEWS)(self._view)
 
     @property

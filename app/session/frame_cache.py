@@ -65,7 +65,7 @@ class FrameCache:
         Raises:
             RecordingError: a background cannot be read.
         """
-        self.observer = Observer(cameras, self.observer.recording)
+        self.observer = self.observer.with_sources(cameras)
         self._empty_caches()
 
     def _empty_caches(self) -> None:

@@ -7,6 +7,8 @@ from app.state.progress import WorkState
 from tracker.body.model import PosedBody
 from tracker.geometry.cameras import Camera
 from tracker.pipeline.calibration_check import CalibrationCheck
+from tracker.pipeline.fast_moment import FastMoment
+from tracker.session.synchronize import FoundStart
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +24,20 @@ class CorrectedFrame:
     """Half the weighted sum of squares of the contours, nats, with the present cameras."""
     cost_after: float
     """The same with the corrected ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClocksState(WorkState):
+    """Estimates of the clocks of the cameras, and a moment to compare them by."""
+
+    way: str = ""
+    """Kind of data of the last estimate: `motion`, `sound`, `flash` or `time code`; empty before."""
+    found: tuple[FoundStart, ...] = ()
+    notes: tuple[str, ...] = ()
+    """Sentences on clocks that disagree with the estimate."""
+    views: tuple[int, ...] = ()
+    """Indices of the cameras that `moment` is of."""
+    moment: FastMoment | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from typing import TypedDict
 import numpy as np
 
 from app.state.annotation import AnnotationState
-from app.state.calibration import CalibrationState
+from app.state.calibration import CalibrationState, ClocksState
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
 from app.state.observations import ObservationsState
@@ -84,6 +84,7 @@ class State:
     """Search for people whom nobody has placed."""
     calibration: CalibrationState = field(default_factory=CalibrationState)
     """Check of the cameras."""
+    clocks: ClocksState = field(default_factory=ClocksState)
     observations: ObservationsState = field(default_factory=ObservationsState)
     """Imported observations."""
     annotation: AnnotationState = field(default_factory=AnnotationState)
@@ -266,6 +267,7 @@ class StateChanges(TypedDict, total=False):
     track: TrackState
     finding: FindState
     calibration: CalibrationState
+    clocks: ClocksState
     observations: ObservationsState
     annotation: AnnotationState
     other_copy: OtherCopy | None

@@ -22,8 +22,7 @@ from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.pipeline.calibration_check import CalibrationCheck
-from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames, outdated_sizes
+from tracker.pipeline.calibration_revisions import follow_history, outdated_frames, outdated_sizes
 from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
@@ -120,14 +119,16 @@ class Saver:
         """Store a setting with the session; it is no part of the history."""
         self._store.set_setting(key, value)
 
-    def correct_cameras(self, check: CalibrationCheck) -> Session:
-        """Correct the cameras that a check names, as one entry of the history; returns the session with them.
+    def change_cameras(self, change: Callable[[Session, AnnotationStore], Session]) -> Session:
+        """Return the session with the cameras that a function stores as an entry of the history.
 
         Raises:
             SessionError: a queued edit still cannot be written, or the calibration cannot be.
         """
-        self._require_written()
-        return self._with_cameras(apply_check(self._session, self._store, check))
+        self.retry()
+        if self.error is not None:
+            raise SessionError(f"the cameras cannot change while an edit is not saved: {self.error}")
+        return self._with_cameras(change(self._session, self._store))
 
     def follow_calibration(self) -> Session:
         """Return the session with the calibration that belongs to its history; the same session if it has it.
@@ -141,11 +142,6 @@ class Saver:
     def _with_cameras(self, found: Session) -> Session:
         self._session = replace(self._session, cameras=found.cameras)
         return self._session
-
-    def _require_written(self) -> None:
-        self.retry()
-        if self.error is not None:
-            raise SessionError(f"the cameras cannot change while an edit is not saved: {self.error}")
 
     @property
     def calibration_revision(self) -> int:

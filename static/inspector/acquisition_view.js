@@ -91,7 +91,7 @@ function picture({ size_px: [width, height] }, { before, after }, name) {
 
 /** @param {Result} result */
 function table({ sizes }) {
-  const element = make("table", "acquisition-sizes");
+  const element = make("table", "acquisition-sizes number-table");
   const head = element.createTHead().insertRow();
   for (const text of ["Changed most, cm", "before", "after", "±"]) {
     head.append(make("th", { scope: "col" }, text));

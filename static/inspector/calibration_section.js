@@ -36,7 +36,7 @@ const NUMBERS = {
  * @param {import("../model/index.js").Context} context
  * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
  */
-export function calibrationSection({ store, send, say }) {
+export function calibrationSection({ store, send }) {
   const act = (/** @type {Action} */ action) => send({ type: "calibration_check", action });
   const start = textButton("Check the cameras", "Compare contours of the tracked people with the calibration; changes nothing", () => act("start"));
   start.className = "is-primary";
@@ -55,7 +55,6 @@ export function calibrationSection({ store, send, say }) {
   const again = textButton("Track again", "Track the frames of an earlier calibration with the present one; keyframes stay", () => act("track_again"));
   const body = make("div", "acquisition", start, work.element, work.status, result, buttons, fit, outdated, again);
 
-  let wasCurrent = true;
   const isNamed = () => !!store.facts.calibration?.cameras.some(({ kinds }) => kinds.length);
 
   /** @param {Calibration} found */
@@ -78,9 +77,6 @@ export function calibrationSection({ store, send, say }) {
     again.hidden = tracked === 0;
     again.disabled = hasTrack(store.facts.state);
     outdated.textContent = sentences(tracked, keyframes).join(" ");
-    const isNews = tracked > 0 && wasCurrent && store.facts.timeline.size > 0; // cells tell keyframes from the others
-    if (isNews || tracked === 0) wasCurrent = !isNews;
-    if (isNews) say(`${sentences(tracked, 0)[0]} Track them again in the inspector (Alt+I), section Calibration.`);
   };
 
   store.on(["calibration", "showsMisfits", "state", "timeline", "lanes"], () => store.facts.calibration && show(store.facts.calibration));

@@ -7,6 +7,7 @@
 import { button } from "../widgets/elements.js";
 import { inArea } from "../widgets/key_matching.js";
 import { calibrationSection } from "./calibration_section.js";
+import { clocksSection } from "./clocks_section.js";
 import { copySection } from "./copy_section.js";
 import { findSection } from "./find_section.js";
 import { BodySection } from "./body_section.js";
@@ -38,6 +39,7 @@ const THEMES = [
 export function mount(context, { panes, posing, timeline, scene, sessions }) {
   const joint = jointSection(context, posing);
   const calibration = calibrationSection(context);
+  const clocks = clocksSection(context);
   const observations = observationsSection(context, panes, sessions);
   const provenance = provenanceSection(context, timeline);
   const finding = findSection(context);
@@ -50,6 +52,7 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
     trackSection(context),
     searchSection(context),
     calibration,
+    clocks,
     observations,
     provenance,
     copy,
@@ -91,6 +94,7 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
     },
     { keys: [], label: "Find people", words: "start automatically initialize bootstrap first pose acquire track nobody placed", run: findPeople },
     ...calibration.bindings(() => inspector.reveal("calibration")),
+    ...clocks.bindings(() => inspector.reveal("clocks")),
     ...observations.bindings(() => inspector.reveal("observations")),
     ...provenance.bindings(() => inspector.reveal("provenance")),
     ...copy.bindings(() => inspector.reveal("copy")),

@@ -82,6 +82,7 @@ export class Receiver {
     if (message.type === "session") return this.#begin(message);
     if (message.type === "timeline") return this.#mergeTimeline(message);
     if (message.type === "notice") return this.#notify(message);
+    if (message.type === "clocks") this.#recent.clear(); // a camera may show pictures of another time
     if (message.type === "presence" && message.refusal) this.#refuse(message.refusal);
     const change = /** @type {((message: TextMessage, facts: Facts) => Partial<Facts>) | undefined} */ (CHANGES[message.type]);
     this.#store.set(change?.(message, this.#store.facts) ?? { [factOf(message.type)]: message });

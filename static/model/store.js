@@ -114,6 +114,7 @@ export class Store {
     acquisition: null,
     finding: null,
     calibration: null,
+    clocks: null,
     observations: null,
     annotation: null,
     presence: null,

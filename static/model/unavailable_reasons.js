@@ -37,7 +37,7 @@ const LOOK = ["view", "epipolar", "curves", "history"];
 /** Messages that move in a place of one's own. @type {ClientMessage["type"][]} */
 const MOVES = ["seek", "select"];
 /** Messages that change what belongs to the session, which only its host does. @type {ClientMessage["type"][]} */
-const OF_HOST = ["acquire", "find_people", "calibration_check", "floor", "view_3d", "snap", "observations"];
+const OF_HOST = ["acquire", "find_people", "calibration_check", "clocks", "floor", "view_3d", "snap", "observations"];
 const DECISIONS = new Set(["verify", "reject", "comment", "resolve", "reopen"]);
 /** Messages that the page sends by itself, or many in a row, so that a refusal needs no notice. @type {ClientMessage["type"][]} */
 const SILENT = ["watch", "provenance", "pause_3d", "seek", "select", "view_3d"];

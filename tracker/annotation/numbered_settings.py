@@ -50,7 +50,7 @@ def numbered_settings(log: EditLog) -> Numbered:
         if int(edit) in log.numbers
     }
     known = log.settings.get(CALIBRATIONS, [])
-    parts = [{"toml": c["toml"], "clocks": c.get("clocks", {}), "lost": c.get("lost", {})} for c in known]
+    parts = [{"toml": c["toml"]} | {part: c.get(part, {}) for part in ("clocks", "lost", "offsets")} for c in known]
     texts = [json.dumps(own, sort_keys=True) for own in parts]
     named = [n for pair in log.settings.get(CALIBRATION_EDITS, {}).values() for n in pair]
     if max([*named, *log.settings.get(CALIBRATIONS_OF_EDITS, {}).values()], default=0) > len(texts):

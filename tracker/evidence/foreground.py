@@ -2,6 +2,7 @@
 
 import threading
 from concurrent.futures import Executor, Future
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -64,6 +65,17 @@ class Foreground:
         self._executor, self._background = executor, read_background(source)
         self._measuring: Future[_Empty | None] | None = None
         self._lock = threading.Lock()
+
+    def of(self, source: CameraSource) -> "Foreground":
+        """Return the foreground of the same view with another clock or other masks.
+
+        The background is read again where it or the calibration is another; see `__init__`.
+        """
+        if (source.camera, source.background) != (self._source.camera, self._source.background):
+            return Foreground(source, self._executor)
+        other = copy(self)
+        other._source = source
+        return other
 
     def measure_empty_scene(self) -> Future[_Empty | None]:
         """Begin to measure the empty scene, at the first call.

@@ -100,6 +100,15 @@ class Observer:
         """Return an observer of the same views to which key points are evidence, too; None: to which they are not."""
         return self._with(range(len(self.cameras)), keypoints, self._is_in_time)
 
+    def with_sources(self, cameras: Sequence[CameraSource]) -> "Observer":
+        """Return an observer of the same cameras, all of them, with other calibrations, clocks and masks.
+
+        Raises:
+            RecordingError: a background cannot be read.
+        """
+        views = [view.of(source) for view, source in zip(self._views, cameras, strict=True)]
+        return Observer(cameras, self.recording.with_cameras(cameras), None, views)
+
     def in_time(self) -> "Observer":
         """Return an observer of the same views that takes the picture of each that is nearest in time to the frame.
 

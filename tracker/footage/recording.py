@@ -5,6 +5,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from copy import copy
 from pathlib import Path
 from types import TracebackType
 
@@ -21,7 +22,34 @@ from tracker.geometry.arrays import Image
 DEFAULT_CACHE_BYTES = 256 * 2**20
 """Memory of decoded frames of all cameras, bytes: 72 frames of four cameras of 640x480."""
 _Key = tuple[int, int, int]
-"""Camera, version of its footage, frame."""
+"""Camera, version of its footage, frame of the footage."""
+
+
+class _DecodedFrames:
+    """The decoded frames that were used last, bounded in bytes. Thread-safe."""
+
+    def __init__(self, max_bytes: int) -> None:
+        self._images: OrderedDict[_Key, Image] = OrderedDict()
+        self._max_bytes, self._bytes, self._lock = max_bytes, 0, threading.Lock()
+
+    def __contains__(self, key: _Key) -> bool:
+        with self._lock:
+            return key in self._images
+
+    def get(self, key: _Key) -> Image | None:
+        with self._lock:
+            if key in self._images:
+                self._images.move_to_end(key)
+            return self._images.get(key)
+
+    def keep(self, key: _Key, image: Image) -> None:
+        with self._lock:
+            if key in self._images:  # another thread was faster
+                return
+            self._images[key] = image
+            self._bytes += image.nbytes
+            while self._bytes > self._max_bytes:
+                self._bytes -= self._images.popitem(last=False)[1].nbytes
 
 
 class Recording:
@@ -60,9 +88,13 @@ class Recording:
         if not in_background:
             self._check_offsets()
         self.fps = next((f.fps for f in self._footage if f.fps is not None), None)
-        self._cache: OrderedDict[_Key, Image] = OrderedDict()
-        self._cache_bytes, self._cached_bytes = cache_bytes, 0
-        self._cache_lock = threading.Lock()
+        self._decoded = _DecodedFrames(cache_bytes)
+
+    def with_cameras(self, cameras: Sequence[CameraSource]) -> "Recording":
+        """Return the same open footage, read with other offsets of the same cameras; either closes it for both."""
+        other = copy(self)
+        other._cameras = tuple(cameras)
+        return other
 
     @property
     def n_frames(self) -> int:
@@ -139,8 +171,8 @@ class Recording:
 
     def cached(self, k: int) -> bool:
         """Return whether frame k of every camera is in the cache."""
-        with self._cache_lock:
-            return all((i, f.version, k) in self._cache for i, f in enumerate(self._footage))
+        keys = ((i, f.version, k + self._cameras[i].offset) for i, f in enumerate(self._footage))
+        return all(key in self._decoded for key in keys)
 
     def close(self) -> None:
         """Release all files."""
@@ -173,28 +205,14 @@ class Recording:
                 )
 
     def _read_one(self, camera: int, k: int) -> Image | None:
-        footage = self._footage[camera]
-        with self._cache_lock:
-            key = camera, footage.version, k
-            image = self._cache.get(key)
+        footage, at = self._footage[camera], k + self._cameras[camera].offset
+        image = self._decoded.get((camera, footage.version, at))
+        if image is None:
+            image = footage.read(at)
             if image is not None:
-                self._cache.move_to_end(key)
-                return image
-        image = footage.read(k + self._cameras[camera].offset)
-        if image is not None:
-            image.setflags(write=False)  # all readers share it
-            self._keep((camera, footage.version, k), image)
+                image.setflags(write=False)  # all readers share it
+                self._decoded.keep((camera, footage.version, at), image)
         return image
-
-    def _keep(self, key: _Key, image: Image) -> None:
-        with self._cache_lock:
-            if key in self._cache:  # another thread was faster
-                return
-            self._cache[key] = image
-            self._cached_bytes += image.nbytes
-            while self._cached_bytes > self._cache_bytes:
-                _, oldest = self._cache.popitem(last=False)
-                self._cached_bytes -= oldest.nbytes
 
 
 def check_size(camera: str, path: Path, found: tuple[int, int], calibrated: tuple[int, int]) -> None:

@@ -11,6 +11,7 @@ __all__ = [
     "calibration_check",
     "calibration_revisions",
     "chain",
+    "fast_moment",
     "find_people",
     "given_pose",
     "keyframe_stretches",

@@ -1,5 +1,6 @@
 """Change the calibration of a session: corrections are entries of the history (`store.calibration_log`)."""
 
+import itertools
 import math
 import tomllib
 from collections.abc import Mapping
@@ -7,9 +8,12 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
+from tracker.calibration.check.fault_search import Fault
 from tracker.errors import SessionError
 from tracker.files import refuse_links, write_text_atomic
-from tracker.footage.camera_source import Clock, LostFrames
+from tracker.footage.camera_source import CameraSource, Clock, LostFrames
 from tracker.formats.anipose import format_calibration
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.geometry.arrays import TINY, Array
@@ -27,6 +31,7 @@ from tracker.session.store.calibration_log import (
     revisions_of_poses,
 )
 from tracker.session.store.edit_tree import now
+from tracker.session.synchronize import FoundStart
 
 
 def apply_check(session: Session, store: AnnotationStore, check: CalibrationCheck) -> Session:
@@ -73,7 +78,31 @@ def with_corrections(
     return replace(session, cameras=tuple(cameras))
 
 
-def change_calibration(session: Session, store: AnnotationStore, changed: Session, label: str) -> Session:
+def starts_by_motion(session: Session, check: CalibrationCheck) -> list[FoundStart]:
+    """Return the starts and drifts of cameras by the motion of the people, as a check has found them.
+
+    A camera that is not named by its clock has the start that its contours alone would give it, and is not clear.
+    """
+    late, steps = np.zeros_like(check.corrections), check.diagnosis.steps
+    is_clear = [{"time", "drift"} & set(c.kinds) and not {c.name} & {*check.since, *check.lost} for c in check.cameras]
+    for i, (found, clear) in enumerate(zip(check.cameras, is_clear, strict=True)):
+        alone = steps.get(Fault(i, "time"))
+        likely = found.correction if clear or alone is None else alone.correction
+        late[i, [TIME, DRIFT]] = likely[[TIME, DRIFT]]
+    return [
+        FoundStart(
+            c.camera.name, c.start_frames if found.is_seen else None, float(1000 * found.sigma[TIME]), None,
+            bool(clear), c.clock.rate,
+        )
+        for c, found, clear in zip(
+            with_corrections(session, late, check.middle_s).cameras, check.cameras, is_clear, strict=True
+        )
+    ]  # fmt: skip
+
+
+def change_calibration(
+    session: Session, store: AnnotationStore, changed: Session, label: str, amends: int | None = None
+) -> Session:
     """Give a session other cameras, as one entry of the history that undo reverts.
 
     Args:
@@ -81,11 +110,20 @@ def change_calibration(session: Session, store: AnnotationStore, changed: Sessio
         store: its annotations.
         changed: the same session with other cameras.
         label: of the entry.
+        amends: the last entry of the history, if this change goes on with it and nothing was made under it.
     """
-    before, after = _number(store, _content(session)), _number(store, _content(changed))
-    forget_unfinished(store)  # An interrupted run would go on under another calibration.
-    edits = store.setting(CALIBRATION_EDITS, {})
-    store.commit(label, [], settings=lambda edit: {CALIBRATION_EDITS: {**edits, str(edit): [before, after]}})
+    known, edits = _revisions(session, store), store.setting(CALIBRATION_EDITS, {})
+    former = None if amends is None else edits.pop(str(amends))
+    if former is not None and former[1] == len(known) and former[1] not in itertools.chain(*edits.values(), former[:1]):
+        known.pop()  # A gesture of many steps leaves its last calibration alone.
+    before = _number(known, _content(session)) if former is None else former[0]
+    after = _number(known, _content(changed))
+    store.set_setting(CALIBRATIONS, known)
+    if former is not None:
+        store.set_setting(CALIBRATION_EDITS, {**edits, str(amends): [before, after]})
+    else:
+        forget_unfinished(store)  # An interrupted run would go on under another calibration.
+        store.commit(label, [], settings=lambda edit: {CALIBRATION_EDITS: {**edits, str(edit): [before, after]}})
     return _write(session, _content(changed))
 
 
@@ -95,11 +133,11 @@ def follow_history(session: Session, store: AnnotationStore) -> Session:
     A calibration that is no revision stays: somebody has replaced the file.
     """
     revision = present_revision(store)
-    known, present = store.setting(CALIBRATIONS, []), _content(session)
+    known, present = _revisions(session, store), _content(session)
     if revision is None or _same(present, known[revision - 1]):
         return session
     # A change that was cut off has the cameras of one revision and the clocks of another.
-    for parts in (("toml",), ("clocks", "lost")):
+    for parts in (("toml",), ("clocks", "lost", "offsets")):
         if not any(_same({**c, **{part: present[part] for part in parts}}, c) for c in known):
             return session
     return _write(session, known[revision - 1])
@@ -134,20 +172,25 @@ def same_calibration(one: Session, other: Session) -> bool:
     return _same(_content(one), _content(other))
 
 
-def _number(store: AnnotationStore, content: Mapping[str, Any]) -> int:
-    """Return the number of a calibration, which is stored if it is new."""
-    known = store.setting(CALIBRATIONS, [])
+def _revisions(session: Session, store: AnnotationStore) -> list[dict[str, Any]]:
+    """Return the stored revisions. Former programs stored no offsets, because nothing changed them."""
+    offsets = _content(session)["offsets"]
+    return [{"offsets": offsets, "lost": {}, **revision} for revision in store.setting(CALIBRATIONS, [])]
+
+
+def _number(known: list[dict[str, Any]], content: Mapping[str, Any]) -> int:
+    """Return the number of a calibration among the known ones, which it joins if it is new."""
     for number, revision in enumerate(known, 1):
         if _same(revision, content):
             return number
-    store.set_setting(CALIBRATIONS, [*known, {**content, "time": now()}])
-    return len(known) + 1
+    known.append({**content, "time": now()})
+    return len(known)
 
 
 def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """Return whether two revisions are equal but for rounding: writing keeps 12 digits."""
-    clocks, lost = (one["clocks"], other["clocks"]), (one.get("lost", {}), other.get("lost", {}))
-    return _alike(*clocks) and _alike(*lost) and _alike(tomllib.loads(one["toml"]), tomllib.loads(other["toml"]))
+    parts = all(_alike(one[part], other[part]) for part in ("clocks", "lost", "offsets"))
+    return parts and _alike(tomllib.loads(one["toml"]), tomllib.loads(other["toml"]))
 
 
 def _alike(a: object, b: object) -> bool:
@@ -161,11 +204,13 @@ def _alike(a: object, b: object) -> bool:
 
 
 def _content(session: Session) -> dict[str, Any]:
-    """Return the calibration of a session as a revision holds it: the cameras, and by name their clocks and the frames
-    that some have lost."""
+    """Return the calibration of a session as a revision holds it: the cameras, and by name their clocks, offsets and
+    lost frames."""
     clocks = {c.camera.name: [float(c.clock.ahead_frames), float(c.clock.rate)] for c in session.cameras}
     lost = {c.camera.name: [list(own) for own in c.clock.lost] for c in session.cameras if c.clock.lost}
-    return {"toml": format_calibration([c.camera for c in session.cameras]), "clocks": clocks, "lost": lost}
+    offsets = {c.camera.name: c.offset for c in session.cameras}
+    toml = format_calibration([c.camera for c in session.cameras])
+    return {"toml": toml, "clocks": clocks, "lost": lost, "offsets": offsets}
 
 
 def _write(session: Session, content: Mapping[str, Any]) -> Session:
@@ -177,12 +222,15 @@ def _write(session: Session, content: Mapping[str, Any]) -> Session:
         raise SessionError(
             f"cannot write {session.folder / CALIBRATION_FILE}: {error}; see that you may write to the folder"
         ) from error
-    loaded, clocks, lost = load_session(session.folder), content["clocks"], content.get("lost", {})
+    loaded, is_same = load_session(session.folder), content["toml"] == _content(session)["toml"]
 
-    def clock(name: str) -> Clock:
-        ahead_frames, rate = clocks[name]
-        return Clock(ahead_frames, rate, tuple(LostFrames(*own) for own in lost.get(name, ())))
+    def source(before: CameraSource, own: CameraSource) -> CameraSource:
+        name = own.camera.name
+        if name not in content["clocks"]:
+            return own
+        ahead_frames, rate = content["clocks"][name]
+        clock = Clock(ahead_frames, rate, tuple(LostFrames(*lost) for lost in content["lost"].get(name, ())))
+        camera = before.camera if is_same else own.camera  # the same object, so that nothing is computed again from it
+        return replace(own, camera=camera, offset=content["offsets"].get(name, own.offset), clock=clock)
 
-    return save_camera_files(
-        loaded, [replace(c, clock=clock(c.camera.name)) if c.camera.name in clocks else c for c in loaded.cameras]
-    )
+    return save_camera_files(loaded, [*map(source, session.cameras, loaded.cameras)])

@@ -1,12 +1,14 @@
 """Find and set when cameras of a session began, to a fraction of a frame."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import ceil
 from typing import NamedTuple
 
+from tracker.compute.progress import Report, unreported
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.flash import find_flash
+from tracker.footage.flash import Flash, find_flash
 from tracker.footage.recording import Recording
 from tracker.footage.sound import read_sound, sound_delay
 from tracker.footage.start_times import read_start_times
@@ -21,11 +23,11 @@ from tracker.session.footage_clocks import (
 )
 from tracker.session.matching import check_names
 from tracker.session.missing_files import missing_files
-from tracker.session.session import Session, save_camera_files
+from tracker.session.session import Session, check_content
 
 
 class FoundStart(NamedTuple):
-    """The start of a camera against that of the first one, by a sound or a flash."""
+    """The start of a camera against that of the first one, by a sound or a flash, or against all others, by motion."""
 
     camera: str
     start_frames: float | None
@@ -36,6 +38,8 @@ class FoundStart(NamedTuple):
     """How much the peak or the flash stands out from the next largest."""
     is_clear: bool
     """Whether it stands out enough to be taken."""
+    rate: float | None = None
+    """Drift of the clock, see `Clock`; None where it was not estimated."""
 
 
 def require_footage(session: Session) -> None:
@@ -52,6 +56,33 @@ def require_footage(session: Session) -> None:
                 f"camera '{missing.camera}': its footage {missing.path} is not there",
                 Remedy("relink", session=session.folder),
             )
+
+
+def find_starts(session: Session, way: str, report: Report = unreported) -> tuple[list[FoundStart], list[str]]:
+    """Find the starts of the cameras in their footage.
+
+    Args:
+        session: of the cameras.
+        way: `sound`, `flash` or `time code`.
+        report: shows progress. An exception that it raises ends the search.
+
+    Returns:
+        The starts, and sentences on clocks that disagree with them.
+
+    Raises:
+        SessionError: footage is missing or has nothing to compare.
+        RecordingError: footage cannot be read.
+    """
+    require_footage(session)
+    report(f"comparing by {way}", 0.0)
+    if way == "time code":
+        return starts_by_clock(session)
+    if way == "sound":
+        found = starts_by_sound(session)
+    else:
+        with Recording(session.cameras) as recording:
+            found = starts_by_flash(session, recording, report)
+    return found, clock_disagreement(session, way, found)
 
 
 def starts_by_sound(session: Session) -> list[FoundStart]:
@@ -87,13 +118,21 @@ def starts_by_sound(session: Session) -> list[FoundStart]:
     return out
 
 
-def starts_by_flash(session: Session, recording: Recording) -> list[FoundStart]:
+def starts_by_flash(session: Session, recording: Recording, report: Report = unreported) -> list[FoundStart]:
     """Return the starts of all cameras but the first, by a light that goes on in all pictures.
+
+    Args:
+        session: of the cameras.
+        recording: their footage.
+        report: shows progress. An exception that it raises ends the search.
 
     Raises:
         RecordingError: footage cannot be read.
     """
-    found = [find_flash(recording, i, session.n_frames) for i in range(len(session.cameras))]
+    found, n = list[Flash | None](), len(session.cameras)
+    for i in range(n):
+        report("comparing by flash", i / n)
+        found.append(find_flash(recording, i, session.n_frames))
     first, seen = session.cameras[0], found[0]
     if seen is None or not seen.is_clear:
         return [FoundStart(c.camera.name, None, None, None, False) for c in session.cameras[1:]]
@@ -181,7 +220,7 @@ def _clocks(session: Session) -> tuple[ClockStarts | None, list[str]]:
 
 
 def with_starts(session: Session, starts: Mapping[str, float], rates: Mapping[str, float]) -> Session:
-    """Give cameras of a session other starts and drifts, and write them into session.toml.
+    """Give cameras of a session other starts and drifts. Nothing is stored.
 
     Poses stay as they are: those tracked before are at the former times.
 
@@ -199,7 +238,9 @@ def with_starts(session: Session, starts: Mapping[str, float], rates: Mapping[st
     """
     names = [c.camera.name for c in session.cameras]
     check_names([*starts, *rates], names, "camera", "the offsets")
-    return save_camera_files(session, [_started(session, c, starts, rates) for c in session.cameras])
+    changed = replace(session, cameras=tuple(_started(session, c, starts, rates) for c in session.cameras))
+    check_content(changed)
+    return changed
 
 
 def _started(

@@ -53,40 +53,22 @@ def synchronize(
     Raises:
         TrackerError: nothing is asked for, or too much; footage cannot be read, or an offset does not fit it.
     """
-    from tracker.footage.recording import Recording
     from tracker.session.lock import SessionLock
-    from tracker.session.session import load_session
-    from tracker.session.synchronize import (
-        clock_disagreement,
-        require_footage,
-        starts_by_clock,
-        starts_by_flash,
-        starts_by_sound,
-        with_starts,
-    )
+    from tracker.session.session import load_session, save_camera_files
+    from tracker.session.synchronize import find_starts, with_starts
 
     if len(ways) + bool(offsets or drifts) != 1:
         raise TrackerError(
             "expected one of --sound, --flash, --timecode, or --offset and --drift; say how to find the offsets"
         )
-    session, found, notes = load_session(folder), [], []
-    if ways:
-        require_footage(session)
-    if "time code" in ways:
-        found, notes = starts_by_clock(session)
-    elif ways:
-        if "sound" in ways:
-            found = starts_by_sound(session)
-        else:
-            with Recording(session.cameras) as recording:
-                found = starts_by_flash(session, recording)
-        notes = clock_disagreement(session, ways[0], found)
+    session = load_session(folder)
+    found, notes = find_starts(session, ways[0]) if ways else ([], [])
     if apply:
         offsets = {f.camera: f.start_frames for f in found if f.is_clear and f.start_frames is not None} or offsets
     written = bool(drifts or (offsets and (apply or not found)))
     if written:
         with SessionLock(session.folder):
-            session = with_starts(session, offsets, drifts)
+            session = save_camera_files(session, with_starts(session, offsets, drifts).cameras)
     return {
         "folder": str(session.folder),
         "found": [f._asdict() for f in found],

@@ -14,12 +14,15 @@ from app.state.calibration import CalibrationState, CorrectedFrame
 from app.state.state import State
 from tracker.body.model import PosedBody
 from tracker.calibration.check.single_frames import score_frame
+from tracker.compute.progress import Report
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.geometry.camera_correction import corrected, later_s
 from tracker.pipeline.body_acquisition import generic_doubt, with_acquired_bodies
 from tracker.pipeline.calibration_check import CalibrationCheck, check_calibration, held_out_scores, n_better
+from tracker.pipeline.calibration_revisions import apply_check
 from tracker.pipeline.posed_recording import PosedRecording
+from tracker.session.session import Session
 
 
 class Calibrating:
@@ -35,7 +38,7 @@ class Calibrating:
         """
         self._session_state, self._activities, self._tracking = session_state, activities, tracking
         self._work = BackgroundWork(session_state, "calibration", "check of the cameras")
-        self._set = self._work.set
+        self._set, self.require_free = self._work.set, self._work.require_free
         self._is_doubt_known = False
         """Whether the last request was answered by the doubt about the bodies."""
         self._version: tuple[int, int] | None = None
@@ -93,12 +96,11 @@ class Calibrating:
             session_state, found = self._session_state, self._session_state.state.calibration
             if found.refused:
                 raise TrackerError(found.refused)
-            session_state.set_cameras(session_state.saver.correct_cameras(check))
+            corrected_session = session_state.saver.change_cameras(lambda own, store: apply_check(own, store, check))
             message, sizes = f"Corrected: {', '.join(check.named)}.", session_state.saver.outdated_sizes()
             if sizes:
                 message += f" Acquire the sizes of {', '.join(sizes)} again, which fit the former cameras, then track."
-            self._set(check=None, is_previewed=False, preview=None, message=message)
-            self._show_cameras()
+            self.exchange_cameras(corrected_session, message)
 
     def track_again(self) -> None:
         """Track the frames again on which somebody has a pose of an earlier calibration. Keyframes stay.
@@ -135,14 +137,13 @@ class Calibrating:
         session_state = self._session_state
         changed = session_state.saver.follow_calibration()
         if changed is not session_state.session:
-            session_state.set_cameras(changed)
-            self._set(check=None, is_previewed=False, preview=None, message="The calibration followed the history.")
-            self._show_cameras()
+            self.exchange_cameras(changed, "The calibration followed the history.")
 
-    def _show_cameras(self) -> None:
-        """Draw and score the shown frame with other cameras."""
-        session_state = self._session_state
-        self._set(n_changes=session_state.state.calibration.n_changes + 1)
+    def exchange_cameras(self, session: Session, message: str) -> None:
+        """Draw and score the shown frame with other cameras; a check of the former ones is void."""
+        session_state, n = self._session_state, self._session_state.state.calibration.n_changes
+        session_state.set_cameras(session)
+        self._set(check=None, is_previewed=False, preview=None, message=message, n_changes=n + 1)
         session_state.show_frame(session_state.state.frame)
         session_state.refresh_saving()
 
@@ -154,10 +155,18 @@ class Calibrating:
             )
         return check
 
+    def check(self, report: Report) -> tuple[PosedRecording, CalibrationCheck]:
+        """Check the cameras by the poses of the session, in bodies that are acquired for it. Nothing is stored.
+
+        Raises:
+            TrackerError: fewer than three frames have credible poses.
+        """
+        recording = with_acquired_bodies(self._recording(), self._session_state.session, report)
+        return recording, check_calibration(recording, report=report)
+
     def _check(self) -> dict[str, Any]:
-        recording, report, session = self._recording(), self._work.report, self._session_state.session
-        recording = with_acquired_bodies(recording, session, report)
-        check = check_calibration(recording, report=report)
+        report = self._work.report
+        recording, check = self.check(report)
         scores = held_out_scores(recording, check, report=report) if check.named else []
         refused = ""
         try:

@@ -15,7 +15,7 @@ from app.messages import observation as observed
 from app.messages.base import Message, made_of
 from app.messages.search import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
 from app.state.annotation import AnnotationState, ProposedClick
-from app.state.calibration import CalibrationState
+from app.state.calibration import CalibrationState, ClocksState
 from app.state.floor_picking import FloorState
 from app.state.identity import are_same
 from app.state.observations import ObservationsState
@@ -35,6 +35,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.camera_correction import KINDS, in_units
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.methods import METHODS
+from tracker.session.session import Session
 
 _MAX_LISTED = 500
 """Entries of the list by severity that a page receives: more than a person goes through at once."""
@@ -59,6 +60,7 @@ class InspectorFeed:
         now: list[Message] = [
             settings(state.settings, state.run_choices), view_3d(controller, state), body_sizes(controller, state),
             acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
+            clocks(controller.session, state.clocks),
             calibration(state.calibration, len(state.people), self._misfits(controller, state.calibration.check)),
             observations(state.observations, [p.name for p in controller.session.people]),
             annotation(state.annotation, [p.name for p in controller.session.people], controller.session.camera_names),
@@ -81,8 +83,8 @@ def _ingredients(state: State) -> tuple[object, ...]:
     return (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
-        state.finding, state.calibration, state.observations, state.annotation, state.reasons, state.reason,
-        state.frame, state.people[state.person].trace, state.cost_map,
+        state.finding, state.calibration, state.clocks, state.observations, state.annotation, state.reasons,
+        state.reason, state.frame, state.people[state.person].trace, state.cost_map,
     )  # fmt: skip
 
 
@@ -162,16 +164,15 @@ def acquisition(found: AcquisitionState) -> wire.AcquisitionMessage:
     """Describe an acquisition of sizes."""
     result, outlines = None, found.outlines
     if outlines is not None:
-        result = wire.AcquisitionResult(
-            frames=found.frames,
-            cost_before_px=found.cost_before_px,
-            cost_after_px=found.cost_after_px,
+        result = made_of(
+            wire.AcquisitionResult,
+            found,
             sizes=tuple(wire.AcquiredSizeRow(*row) for row in found.sizes),
             size_px=outlines.size_px,
             front=wire.OutlinePair(outlines.front.before, outlines.front.after),
             side=wire.OutlinePair(outlines.side.before, outlines.side.after),
         )
-    return wire.AcquisitionMessage(found.person, found.running, found.stage, found.share, found.message, result)
+    return made_of(wire.AcquisitionMessage, found, result=result)
 
 
 def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
@@ -182,9 +183,7 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
         cameras: names of all cameras.
     """
     axes = tuple(wire.SilhouetteAxes(cameras.index(n), people) for n, people in found.axes.items() if n in cameras)
-    return wire.FindingMessage(
-        found.running, found.stage, found.share, found.notes, found.message, found.failed, found.frame, axes,
-    )  # fmt: skip
+    return made_of(wire.FindingMessage, found, axes=axes)
 
 
 def calibration(found: CalibrationState, n_people: int, field: MisfitField) -> wire.CalibrationMessage:
@@ -214,9 +213,7 @@ def observations(found: ObservationsState, people: Sequence[str]) -> observed.Ob
         found: their state.
         people: names of the people of the session.
     """
-    sets = tuple(
-        observed.ObservedSetInfo(s.name, s.format, s.people, s.is_in_space, s.n_frames, s.problem) for s in found.sets
-    )
+    sets = tuple(made_of(observed.ObservedSetInfo, s) for s in found.sets)
     judged = tuple(
         observed.JudgedPerson(j.person, j.share_in_order, len(j.frames), tuple(j.sentences)) for j in found.judgements
     )
@@ -283,6 +280,20 @@ def _proposal(found: ProposedClick, cameras: Sequence[str]) -> plan_wire.ClickPr
         found.number, found.running, found.message, described, error, interval,
         None if found.after_mm is None else round(found.after_mm, 2),
     )  # fmt: skip
+
+
+def clocks(session: Session, found: ClocksState) -> wire.ClocksMessage:
+    """Describe the clocks of the cameras and the work on them."""
+    estimates = {
+        f.camera: wire.FoundClock(f.start_frames, None if f.rate is None else 1000 * f.rate, f.sigma_ms, f.is_clear)
+        for f in found.found
+    }
+    cameras = tuple(
+        wire.CameraClock(c.start_frames, 1000 * c.clock.rate, estimates.get(c.camera.name)) for c in session.cameras
+    )
+    at = found.moment
+    moment = None if at is None else wire.ComparedMoment(at.frame, found.views, at.centers_px, at.source)
+    return made_of(wire.ClocksMessage, found, cameras=cameras, moment=moment)
 
 
 def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:

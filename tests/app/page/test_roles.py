@@ -70,7 +70,7 @@ def test_a_page_that_looks_moves_in_a_place_of_its_own_only():
     assert not allowed("look", wire.ToggleMark("reviewed"))
 
 
-@pytest.mark.parametrize("message", [wire.FindPeople("start"), wire.EditFloor("begin")])
+@pytest.mark.parametrize("message", [wire.FindPeople("start"), wire.UseClocks("nudge"), wire.EditFloor("begin")])
 def test_bodies_cameras_and_floor_are_the_hosts(message):
     assert allowed("host", message)
     assert not allowed("annotate", message)

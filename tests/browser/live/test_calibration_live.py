@@ -192,3 +192,30 @@ async def test_a_late_camera_is_named_and_moved_in_time(browser, tmp_path):
         await undone(page, (await state_of(page))["state"]["undo"])
         await undone(page, "calibration of FRONT corrected")
         assert not any(c.clock.ahead_frames for c in load_session(folder).cameras)
+
+
+async def test_a_late_camera_is_estimated_taken_nudged_while_playing_and_given_back(browser, tmp_path):
+    folder = tmp_path / "session"
+    tracked_copy(folder, late)
+    frames = "quadrille.state.clocks.cameras.map((c) => c.offset_frames).join()"
+    async with started(folder) as program, visited(browser, program.address) as page:
+        await page.evaluate(SECTION.replace("'calibration'", "'clocks'"))
+        await reloaded(page, "window.quadrille?.state.overlay", 60)
+        section = page.locator("[data-section=clocks]")
+        await section.get_by_role("button", name="Fast moment").click()
+        await shows(page, "quadrille.state.clocks.moment?.frame === quadrille.state.shown.frame", 30)
+        await section.get_by_role("button", name="Estimate").click()
+        await shows(page, "quadrille.state.clocks.cameras[0].found", 120)
+        await section.get_by_role("button", name="Take").click()
+        await shows(page, f"Math.abs({frames.replace('.join()', '[0]')}) < 0.15", 20)
+        await undone(page, "clock of FRONT by motion")
+        await page.locator("#loop").click()
+        await page.locator("#play").click()
+        for name in ("− frame", "+ ms", "+ ms"):
+            await section.get_by_role("button", name=name, exact=True).click()
+        await shows(page, f"{frames} === '0.05,0,0,0'", 20)
+        assert await page.evaluate("quadrille.state.playing")
+        await page.locator("#play").click()
+        await undone(page, "clock of FRONT")
+        await shows(page, f"{frames} === '1,0,0,0'", 20)
+        assert load_session(folder).cameras[FRONT].offset == 1

@@ -52,7 +52,7 @@ async def test_it_says_why_not(page, endpoint):
     assert "No range is marked" in await page.locator("#palette-why").inner_text()
     await page.locator("#palette-query").fill("500")
     assert await page.locator("#palette-why").inner_text() == "The last frame is 119."
-    for nowhere in ("clock", "share", "qwrtz"):  # letters of several words are no answer
+    for nowhere in ("stopwatch", "share", "qwrtz"):  # letters of several words are no answer
         await page.locator("#palette-query").fill(nowhere)
         assert f"No results for “{nowhere}”" in await page.locator("#palette-why").inner_text()
     palette = await page.locator("#palette").bounding_box()

@@ -59,7 +59,7 @@ def test_cache_is_bounded_and_keeps_the_latest(two, frames):
     recording = Recording(two, cache_bytes=frames * FRAME_BYTES)
     for k in range(20):
         recording.read(k)
-        assert recording._cached_bytes == sum(i.nbytes for i in recording._cache.values()) <= frames * FRAME_BYTES
+        assert sum(map(recording.cached, range(20))) == min(k + 1, frames // 2)
     assert [k for k in range(20) if recording.cached(k)] == list(range(20 - frames // 2, 20))
 
 

@@ -1,28 +1,36 @@
 """Revisions of the calibration: entries of the history, undone and redone, and named by poses."""
 
+import operator
 import shutil
 from contextlib import closing
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from command_line import SAMPLE
 
+from tracker.calibration.check.fault_search import Fault
+from tracker.calibration.check.findings import CameraFinding
 from tracker.errors import SessionError
 from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model
 from tracker.geometry.camera_correction import DRIFT, N_CORRECTIONS, TIME
+from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.calibration_revisions import (
     apply_check,
     change_calibration,
     follow_history,
     outdated_frames,
+    starts_by_motion,
     with_corrections,
 )
-from tracker.session.session import load_session
+from tracker.session.session import load_session, save_camera_files
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.calibration_log import CALIBRATION_EDITS, present_revision, revisions_of_poses
+from tracker.session.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, present_revision, revisions_of_poses
 from tracker.session.store.records import AssessmentChange, PoseChange, PoseRecord
+from tracker.session.synchronize import with_starts
 
 
 @pytest.fixture
@@ -154,3 +162,42 @@ def test_a_keyframe_that_was_only_assessed_stays_of_its_calibration(session, sto
     store.commit("audit", [AssessmentChange(name, 3, values, "good", "", (), None)], by_program=True)
     assert store.pose(name, 3).status == "good"
     assert outdated_frames(session, store) == {name: [3]}
+
+
+def test_offsets_and_an_amended_change_follow_undo_and_redo(session, store):
+    short = replace(session, n_frames=session.n_frames - 3)
+    edit, changed = None, save_camera_files(short, short.cameras)
+    for start in (1.0, 2.0, 2.5):
+        changed = change_calibration(changed, store, with_starts(changed, {"BACK": start}, {}), "clock of BACK", edit)
+        (edit,) = store.done_edits()
+    assert len(store.setting(CALIBRATIONS)) == 2  # those on the way are forgotten
+    for move, start in ((store.undo, 0.0), (store.redo, 2.5)):
+        move()
+        changed = follow_history(changed, store)
+        assert [c.start_frames for c in load_session(session.folder).cameras] == [0.0, 0.0, start, 0.0]
+        assert all(map(operator.is_, [c.camera for c in changed.cameras], [c.camera for c in short.cameras]))
+
+
+def test_revisions_of_former_programs_have_the_offsets_of_the_session(session, store):
+    changed = change_calibration(session, store, turned(session), "FRONT corrected")
+    former = [{k: v for k, v in c.items() if k != "offsets"} for c in store.setting(CALIBRATIONS)]
+    store.set_setting(CALIBRATIONS, former)
+    assert follow_history(changed, store) is changed
+    change_calibration(changed, store, with_starts(changed, {"BACK": -0.5}, {}), "clock of BACK")
+    assert [c["offsets"]["BACK"] for c in store.setting(CALIBRATIONS)] == [0, 0, 0]
+    assert present_revision(store) == 3
+
+
+def test_motion_gives_starts_that_are_clear_where_a_clock_was_named(session):
+    correction, sigma = np.zeros(N_CORRECTIONS), np.full(N_CORRECTIONS, 0.002)
+    correction[[TIME, DRIFT]] = 0.02, 1e-4
+    alone = SimpleNamespace(correction=correction / 2)
+    cameras = [CameraFinding(c, (), 0 * correction, sigma, 1.0, 1.0, 1.0, {}, True) for c in session.camera_names]
+    cameras[1] = cameras[1]._replace(kinds=("time", "drift"), correction=correction)
+    cameras[3] = cameras[3]._replace(is_seen=False)
+    check = CalibrationCheck((0,), tuple(cameras), {}, SimpleNamespace(steps={Fault(2, "time"): alone}), 1.0)
+    found = starts_by_motion(session, check)
+    assert [f.is_clear for f in found] == [False, True, False, False]
+    at_frame_0 = (0.02 - 1e-4 * 1.0) * session.fps
+    assert [f.start_frames for f in found] == [0, pytest.approx(-at_frame_0), pytest.approx(-at_frame_0 / 2), None]
+    assert (found[1].rate, found[1].sigma_ms) == (pytest.approx(1e-4), pytest.approx(2.0))

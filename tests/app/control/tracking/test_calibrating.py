@@ -52,8 +52,8 @@ def corrected(controller):
     saver, session = controller.session_state.saver, controller.session
     corrections = np.zeros((len(session.cameras), N_CORRECTIONS))
     corrections[0, 1] = 0.02
-    change_calibration(session, saver._store, with_corrections(session, corrections), "corrected")
-    controller.calibrating._show_cameras()
+    changed = change_calibration(session, saver.store, with_corrections(session, corrections), "corrected")
+    controller.calibrating.exchange_cameras(changed, "")
     wait_for(lambda: controller.state.calibration.revision == 2)
 
 
