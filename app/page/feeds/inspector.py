@@ -183,7 +183,8 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
     """
     axes = tuple(wire.SilhouetteAxes(cameras.index(n), people) for n, people in found.axes.items() if n in cameras)
     return wire.FindingMessage(
-        found.running, found.stage, found.share, found.notes, found.message, found.failed, found.frame, axes,
+        found.running, found.trying or found.stage, found.share, found.notes, found.message, found.failed, found.frame,
+        axes,
     )  # fmt: skip
 
 
