@@ -6,7 +6,7 @@ import msgspec
 
 from app.advice.stored_work import StoredWork
 from app.messages.advice import Action, Advice
-from app.state.progress import RangeState, TrackState, WorkState
+from app.state.progress import FindState, RangeState, TrackState, WorkState
 from app.state.search import SearchState
 from app.state.state import State
 
@@ -18,9 +18,10 @@ def work_under_way(state: State, stored: StoredWork) -> Iterator[Advice]:
     if state.track.first is not None:
         advice = _tracking(state.track, "find" if state.finding.running else "track")
         waits = state.compiling is not None and state.track.done == 0
-        yield msgspec.structs.replace(advice, done="waiting for compilation") if waits else advice
+        advice = msgspec.structs.replace(advice, done="waiting for compilation") if waits else advice
+        yield _in_chain(advice, state.finding, "estimate" if state.track.stage == "solve" else "track")
     elif state.finding.running:
-        yield _work("Finding people", state.finding, "find")
+        yield _finding(state.finding)
     if state.acquisition.running:
         yield _work(
             f"Acquiring the sizes of {stored.people[state.acquisition.person].name}", state.acquisition, "sizes"
@@ -46,6 +47,22 @@ def work_under_way(state: State, stored: StoredWork) -> Iterator[Advice]:
 
 def _stop(of: str) -> Action:
     return Action("stop", "Stop", of=of)
+
+
+def _finding(finding: FindState) -> Advice:
+    if not finding.trying:
+        return _in_chain(_work("Finding people", finding, "find"), finding, finding.step)
+    take = () if finding.takable is None else (Action("take_found", "Take this pose", finding.takable),)
+    text = finding.trying[:1].upper() + finding.trying[1:]
+    advice = Advice("find", text, (*take, _stop("find")), "work", finding.share, at_most_s=finding.left_s)
+    return _in_chain(advice, finding, finding.step)
+
+
+def _in_chain(advice: Advice, finding: FindState, step: str) -> Advice:
+    """Return advice with the steps of the chain that the work belongs to, if there is one."""
+    if not finding.running or step not in finding.steps:
+        return advice
+    return msgspec.structs.replace(advice, steps=finding.steps, step=finding.steps.index(step))
 
 
 def _work(text: str, work: WorkState, of: str) -> Advice:

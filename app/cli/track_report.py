@@ -6,14 +6,15 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from app.remedies import command_line_text
-from app.runtime.progress import Reporter
+from app.runtime.progress import Reporter, duration_text
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import Remedy
 from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
+from tracker.pipeline.find_people import FINDING
 from tracker.pipeline.track_session import EstimateStep
 
 if TYPE_CHECKING:
-    from tracker.estimation.initialization.first_pose import FirstPoses
+    from tracker.estimation.initialization.first_pose import Trying
     from tracker.pipeline.stored_run import TrackPlan
     from tracker.pipeline.track_session import Step, TrackSession
     from tracker.session.session import Session
@@ -23,7 +24,7 @@ _PASSES = {BackwardStep: "tracking backward", EstimateStep: "estimating all fram
 
 
 class ChainProgress:
-    """The sink of a chain: one bar for people and sizes, one for each pass of the run, and a line for each sentence."""
+    """The sink of a chain: a bar for each step and each pass of the run, and a line for each frame and sentence."""
 
     def __init__(self, progress: Reporter) -> None:
         """Show nothing yet.
@@ -31,7 +32,7 @@ class ChainProgress:
         Args:
             progress: shows bars and lines.
         """
-        self._progress, self._bar, self._stage = progress, ExitStack(), ""
+        self._progress, self._bar, self._stage, self._tried = progress, ExitStack(), "", ""
         self._advance: Callable[[float], None] = lambda share: None
         self._tick: Callable[[], None] = lambda: None
         self._pass: tuple[type, int] | None = None
@@ -46,20 +47,23 @@ class ChainProgress:
 
     def report(self, stage: str, share: float, text: str = "", /) -> None:
         """See `Sink.report`."""
-        if not self._stage:
-            if not compiled_mark().exists():
-                self._progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
-            if share < 1:
-                self._advance = self._bar.enter_context(self._progress.share("before tracking"))
+        if not self._stage and not compiled_mark().exists():
+            self._progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
         if stage != self._stage and share < 1:
-            self._progress.say(stage)
+            self._bar.close()
+            self._advance = self._bar.enter_context(self._progress.share(stage, is_timed=stage != FINDING))
         self._stage = stage
         if text:
             self._progress.say(text)
         self._advance(share)
 
-    def show(self, frame: int, found: "FirstPoses | None") -> None:
+    def show(self, trying: "Trying") -> None:
         """See `Sink.show`; a terminal shows no poses."""
+        if trying.text == self._tried or (trying.frame is not None and trying.n_figures is None):
+            return
+        self._tried = trying.text
+        left = "" if trying.left_s is None else f", at most {duration_text(trying.left_s)} left"
+        self._progress.say(trying.text + left)
 
     def take(self, run: "TrackSession", step: "Step") -> None:
         """See `Sink.take`."""

@@ -7,7 +7,7 @@ from app.messages.base import Message, Part
 Deed = Literal[
     "accept", "acquire", "apply_correction", "apply_sizes", "by_key_points", "check_cameras", "detect", "export",
     "find", "fit", "go_to", "place", "resume", "retry", "search", "show_before", "show_doubt", "show_section",
-    "show_silhouettes", "show_view", "stop", "take_all_back", "take_back", "track", "track_again",
+    "show_silhouettes", "show_view", "stop", "take_all_back", "take_back", "take_found", "track", "track_again",
 ]  # fmt: skip
 """Effects of buttons; the page carries them out."""
 Level = Literal["next", "work", "doubt", "fault"]
@@ -44,6 +44,12 @@ class Advice(Part, frozen=True):
     """Share of the work that is done, 0 to 1; null where there is none, or where it cannot be known."""
     done: str = ""
     """How much of the work is done, for people to read."""
+    steps: tuple[str, ...] = ()
+    """Steps of the whole work in order, for people to read; `share` is that of the present one."""
+    step: int = 0
+    """Rank of the present step, from 0."""
+    at_most_s: float | None = None
+    """Longest time that the present step still takes, s; null while unknown, or where it follows from the share."""
 
 
 class AdviceMessage(Message, frozen=True, tag="advice"):

@@ -131,9 +131,12 @@ class AcquireSizes(Command, frozen=True, tag="acquire"):
 
 
 class FindPeople(Command, frozen=True, tag="find_people"):
-    """Find the people whom nobody has placed, acquire their sizes and track them, or stop that."""
+    """Find the people whom nobody has placed, acquire their sizes and track them, or stop that.
 
-    action: Literal["start", "stop"]
+    `take` ends the search with the best poses so far, and goes on with them.
+    """
+
+    action: Literal["start", "stop", "take"]
 
 
 class CheckCalibration(Command, frozen=True, tag="calibration_check"):
@@ -355,9 +358,9 @@ class FindingMessage(Message, frozen=True, tag="finding"):
 
     running: bool
     stage: str
-    """The kind of work."""
+    """The kind of work, or the frame that is tried."""
     share: float
-    """Share of the work before tracking that is done, 0 to 1."""
+    """Share of the present step that is done, 0 to 1."""
     notes: tuple[str, ...]
     """Sentences on what was tried, then on who was found and how."""
     message: str

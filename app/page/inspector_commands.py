@@ -77,10 +77,8 @@ def _acquire(controller: Controller, _: int, message: wire.AcquireSizes) -> None
 
 
 def _find_people(controller: Controller, _: int, message: wire.FindPeople) -> None:
-    if message.action == "start":
-        controller.finding.start()
-    else:
-        controller.finding.stop()
+    finding = controller.finding
+    {"start": finding.start, "stop": finding.stop, "take": finding.take_best}[message.action]()
 
 
 def _calibration(controller: Controller, _: int, message: wire.CheckCalibration) -> None:

@@ -84,12 +84,17 @@ class Reporter:
             yield tick
 
     @contextmanager
-    def share(self, what: str) -> Generator[Callable[[float], None], None, None]:
+    def share(self, what: str, is_timed: bool = True) -> Generator[Callable[[float], None], None, None]:
         """Yield a function to call with the share of the work that is done, 0 to 1, after each step.
 
-        Steps are of any size, so that the time left follows from the share, not from the number of calls.
+        Steps are of any size, so that the time left follows from the share, not from the number of calls. It is shown
+        unless `is_timed` is False, where the share can jump.
         """
         began, shown = time.monotonic(), 0
+
+        def left_text(share: float) -> str:
+            return share_text(share, time.monotonic() - began) if is_timed else ""
+
         columns = (TextColumn(what), BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[left]}"))
         if self._silent or not self._console.is_terminal:
 
@@ -98,8 +103,7 @@ class Reporter:
                 if self._silent or int(10 * share) <= shown:
                     return
                 shown = int(10 * share)
-                left = share_text(share, time.monotonic() - began)
-                self._console.print(f"{what}: {100 * share:.0f}%{left}", highlight=False)
+                self._console.print(f"{what}: {100 * share:.0f}%{left_text(share)}", highlight=False)
 
             yield line
             return
@@ -107,8 +111,7 @@ class Reporter:
             task = bar.add_task(what, total=1.0, left="")
 
             def advance(share: float) -> None:
-                left = share_text(share, time.monotonic() - began)
-                bar.update(task, completed=share, left=left.removeprefix(", "))
+                bar.update(task, completed=share, left=left_text(share).removeprefix(", "))
 
             yield advance
 
@@ -122,10 +125,11 @@ def share_text(share: float, elapsed_s: float) -> str:
     """
     if not 0 < share < 1:
         return ""
-    return f", {_duration(elapsed_s * (1 - share) / share)} left"
+    return f", {duration_text(elapsed_s * (1 - share) / share)} left"
 
 
-def _duration(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
+    """Return a time as text, such as `12 s`."""
     return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
 
 
@@ -134,7 +138,7 @@ def pace_text(pace: Pace, left: int) -> str:
     if pace.item_s is None:
         return ""
     seconds = left * pace.item_s
-    return f", {1 / pace.item_s:.1f}/s" + (f", {_duration(seconds)} left" if left else "")
+    return f", {1 / pace.item_s:.1f}/s" + (f", {duration_text(seconds)} left" if left else "")
 
 
 class _PaceColumn(ProgressColumn):

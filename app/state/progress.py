@@ -10,6 +10,9 @@ Line = tuple[float, float, float, float]
 """x0, y0, x1, y1, undistorted px."""
 
 
+CHAIN_STEPS = ("find", "sizes", "track", "estimate")
+"""Steps from a recording without poses to tracked ones, as words for the user: find people, acquire their sizes, track
+forward and backward, estimate all frames together."""
 TrackStage = Literal["tracking", "back", "solve"]
 """Stages of a run: forward, backward, all frames together."""
 
@@ -62,8 +65,16 @@ class TrackState:
 
 @dataclass(frozen=True)
 class FindState(WorkState):
-    """The search for people whom nobody has placed; tracking has no share in its progress."""
+    """The search for people whom nobody has placed, and the chain that it begins. Tracking has its own progress."""
 
+    steps: tuple[str, ...] = ()
+    """Steps of the chain in order, as words for the user."""
+    step: str = ""
+    """The present one before tracking."""
+    trying: str = ""
+    """Phrase on the frame that is tried; empty before and after."""
+    left_s: float | None = None
+    """Longest time that the search still takes, s; None while unknown, and once it has ended."""
     notes: tuple[str, ...] = ()
     """Sentences on who was found and how."""
     tried: int | None = None
@@ -73,7 +84,9 @@ class FindState(WorkState):
     sought: frozenset[int] = frozenset()
     """Indices of the people who are sought; empty when the search has ended."""
     candidates: Mapping[int, Mapping[int, PosedBody]] = field(default_factory=dict)
-    """By frame and index of the person, the first poses found so far; empty when the search has ended."""
+    """By frame and index of the person, the best first poses so far; empty when the search has ended."""
+    takable: int | None = None
+    """Frame of the best first poses so far if they are credible; they can be taken then."""
     frame: int | None = None
     """Frame on which people were found; None before."""
     axes: Mapping[str, tuple[tuple[Line, ...], ...]] = field(default_factory=dict)

@@ -21,6 +21,7 @@ export function workRow(title, stop, announced = { role: "status" }) {
   const status = make("p", { className: "section-note", ...announced });
   return {
     element,
+    progress,
     status,
     /**
      * @param {{running: boolean, share: number, stage: string, message: string, failed?: boolean} | null} work

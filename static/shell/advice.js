@@ -1,6 +1,7 @@
 /** The line over the views: what holds and the next step, or for a while the answer to what the user just did. */
 
 import { button, byId, make } from "../widgets/elements.js";
+import { StepsBar } from "../widgets/steps_bar.js";
 import { percent } from "../widgets/text.js";
 import { TimeLeft, timeText } from "../widgets/time_left.js";
 import { AdviceLog } from "./advice_log.js";
@@ -13,7 +14,7 @@ const TICK_MS = 1000;
  * @typedef {import("../model/protocol.js").Advice} Advice
  * @typedef {import("../model/protocol.js").Action} Action
  * @typedef {import("../model/protocol.js").NoticeMessage} Notice
- * @typedef {Pick<Advice, "text" | "level" | "share" | "done"> & {actions: Action[]}} Line
+ * @typedef {Pick<Advice, "text" | "level" | "share" | "done" | "steps" | "step" | "at_most_s"> & {actions: Action[]}} Line
  */
 
 export class AdviceLine {
@@ -27,6 +28,7 @@ export class AdviceLine {
   #buttons = byId("advice-actions", HTMLElement);
   #close;
   #left = new TimeLeft();
+  #steps = new StepsBar();
   /** @type {Notice | null} */
   #answer = null;
   #timer = 0;
@@ -42,9 +44,10 @@ export class AdviceLine {
     this.#store = store;
     this.#perform = perform;
     this.#close = button("dismiss-advice", () => void this.dismiss());
+    this.#bar.after(this.#steps.element);
     store.on(["session"], () => this.#dismissed.clear());
     store.on(["advice", "connected", "session", "opening", "openingStep", "exporting"], () => this.#show());
-    setInterval(() => !this.#bar.hidden && this.#showFigures(), TICK_MS);
+    setInterval(() => this.#now?.level === "work" && this.#showFigures(), TICK_MS);
     this.#show();
   }
 
@@ -89,7 +92,7 @@ export class AdviceLine {
     if (this.#answer) return line(this.#answer.text, this.#answer.level === "error" ? "fault" : "next");
     if (exporting === null) return this.#said;
     const stop = { deed: /** @type {const} */ ("stop"), text: "Stop", frame: null, person: null, camera: null, of: "export" };
-    return { text: "Exporting", level: "work", share: exporting, done: percent(exporting), actions: [stop] };
+    return { ...line("Exporting", "work"), share: exporting, done: percent(exporting), actions: [stop] };
   }
 
   #show() {
@@ -101,7 +104,9 @@ export class AdviceLine {
       this.#text.textContent = this.#text.title = text;
       if (text && this.#store.facts.connected && !this.#answer) this.log.add(text, now?.level === "fault");
     }
-    this.#bar.hidden = now?.level !== "work" || now.share === null;
+    const steps = now?.steps ?? [];
+    this.#steps.show(steps, now?.step ?? 0, now?.share ?? 0);
+    this.#bar.hidden = now?.level !== "work" || now.share === null || steps.length > 0;
     this.#bar.value = now?.share ?? 0;
     this.#left.note(text, now?.share ?? null, performance.now() / 1000);
     this.#showFigures();
@@ -112,7 +117,10 @@ export class AdviceLine {
   #showFigures() {
     const now = this.#now;
     const seconds = now?.share == null ? null : this.#left.at(performance.now() / 1000);
-    const text = [now?.done, seconds === null ? "" : timeText(seconds)].filter(Boolean).join(", ");
+    const bound = now?.at_most_s ?? null;
+    const left = bound !== null ? `at most ${timeText(bound)}` : seconds === null ? "" : timeText(seconds);
+    const isPart = left && now && now.step < now.steps.length - 1;
+    const text = [now?.done, left && left + (isPart ? " in this step" : "")].filter(Boolean).join(", ");
     if (this.#figures.textContent !== text) this.#figures.textContent = text;
   }
 
@@ -141,7 +149,7 @@ export class AdviceLine {
  * @returns {Line}
  */
 function line(text, level) {
-  return { text, level, share: null, done: "", actions: [] };
+  return { text, level, share: null, done: "", steps: [], step: 0, at_most_s: null, actions: [] };
 }
 
 /** @param {Advice} advice */

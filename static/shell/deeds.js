@@ -69,6 +69,7 @@ export function deeds({ store, send, say, actions, navigation, layers }, rooms, 
     show_view: ({ camera }) => camera !== null && camera !== store.facts.filled && rooms.panes.grid.toggleFill(camera),
     stop: ({ of }) => stops[of](),
     take_all_back: ({ frame }) => frame !== null && send({ type: "limb_back", frame, every: true }),
+    take_found: () => send({ type: "find_people", action: "take" }),
     take_back: () => rooms.posing.pinning.takeLimbBack(),
     track: ({ frame, of }) => {
       goTo(frame);

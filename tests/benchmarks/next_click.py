@@ -159,7 +159,7 @@ class Silent:
     def report(self, stage, share, text="", /):
         """See `Sink`."""
 
-    def show(self, frame, found):
+    def show(self, trying):
         """See `Sink`."""
 
     def take(self, run, step):

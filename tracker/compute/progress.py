@@ -1,5 +1,6 @@
 """How long work reports its progress."""
 
+import time
 from collections.abc import Callable, Generator
 from typing import Protocol, TypeVar
 
@@ -48,6 +49,34 @@ def stages(report: Report, *names: str) -> list[Callable[[float], None]]:
 
 def unreported(stage: str, share: float, text: str = "", /) -> None:
     """Show no progress."""
+
+
+class PartPace:
+    """The longest time of a part of some work, learned from the parts before it. Some are done at the same time."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        """Know nothing yet; `now` is a clock, s."""
+        self._now, self._durations_s = now, list[float]()
+        self.begin()
+
+    def begin(self) -> None:
+        """Note that one or several parts begin."""
+        self._began = self._now()
+
+    def end(self, n_parts: int) -> None:
+        """Note that they are done."""
+        self._durations_s.append((self._now() - self._began) / n_parts)
+        self.begin()
+
+    def left_s(self, n_left: int) -> float | None:
+        """Return the time that further parts take if each is as slow as the slowest, s; None before any is done.
+
+        Args:
+            n_left: number of these parts, with those that began.
+        """
+        if not self._durations_s:
+            return None
+        return max(0.0, n_left * max(self._durations_s) - (self._now() - self._began))
 
 
 def result_of(steps: Generator[object, None, T]) -> T:

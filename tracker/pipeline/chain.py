@@ -15,13 +15,13 @@ from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.estimation.fitting.gauss_newton import PointTargets
-from tracker.estimation.initialization.first_pose import FirstPoses
+from tracker.estimation.initialization.first_pose import FirstPoses, Trying
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
 from tracker.pipeline.calibration_revisions import follow_history, outdated_sizes
-from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found
+from tracker.pipeline.find_people import FINDING, FindSettings, find_people, sentences, store_found
 from tracker.pipeline.keyframe_stretches import KeyframeStretch, stretches_to_track
 from tracker.pipeline.keypoint_evidence import (
     SEEN_BODIES,
@@ -39,10 +39,10 @@ from tracker.session.relink import require_files
 from tracker.session.session import Session
 from tracker.session.store.annotation_store import AnnotationStore
 
+ACQUIRING = "acquiring sizes"
+"""The stage of the chain after the search for people."""
 FOLLOWED = ("tracked", "interpolated")
 """Sources of poses that follow from those of other frames, so that no run starts from them."""
-_FINDING = 0.5
-"""Share of the work before tracking that ends with the first poses, where sizes are acquired after them."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,10 @@ class Sink(Protocol):
     """Receives progress and results of a chain. Raise from any method to stop it; what was stored stays."""
 
     def report(self, stage: str, share: float, text: str = "", /) -> None:
-        """Receive the progress of finding and acquiring; see `tracker.compute.progress.Report`."""
+        """Receive the progress of finding or of acquiring; see `tracker.compute.progress.Report`."""
 
-    def show(self, frame: int, found: FirstPoses | None) -> None:
-        """Receive a frame that is tried: at first with None, then with the poses if some were found on it."""
+    def show(self, trying: Trying) -> None:
+        """Receive how far the search for people is, from several threads; see `Show`, also for how to end it."""
 
     def take(self, run: TrackSession, step: Step) -> None:
         """Receive a step of the run that tracks, after its results are stored."""
@@ -138,25 +138,24 @@ def begin_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
         TrackerError: no frame shows the people well enough, people are placed on different frames alone, or somebody
             has no pose and nobody is looked for.
     """
-    track, end = plan.track, _FINDING if plan.acquire else 1.0
+    track = plan.track
     missing = unplaced(opened, track.people)
     if missing and plan.find is None:
         names = ", ".join(f"'{opened.session.people[i].name}'" for i in missing)
         raise TrackerError(f"expected a pose of {names}, found none", Remedy("find_or_place"))
     if missing and plan.find is not None:
-        of_finding = part_of(sink.report, 0.0, end)
-        found = find_people(opened.session, opened.observer, missing, track.frames, plan.find, of_finding, sink.show)
-        of_finding("finding first poses", 1.0)  # the last chance to stop before anything is stored
+        found = find_people(opened.session, opened.observer, missing, track.frames, plan.find, sink.report, sink.show)
+        sink.report(FINDING, 1.0)  # the last chance to stop before anything is stored
         opened.store_found(found)
         for sentence in sentences(opened.session, found):
-            of_finding("finding first poses", 1.0, sentence)
+            sink.report(FINDING, 1.0, sentence)
         start = found.frame
     else:
         start = start_frame([opened.sources(i) for i in track.people], track.frames)
     people = tuple(i for i in track.people if start in opened.sources(i))
     track = replace(track, people=people, start=start)
     if not opened.is_interrupted(track):  # a run goes on in the bodies in which it was begun
-        of_sizes = part_of(sink.report, end if missing else 0.0, 1.0, "acquiring sizes")
+        of_sizes = part_of(sink.report, 0.0, 1.0, ACQUIRING)
         points = {} if track.keypoints is None else read_points(opened.session, track.keypoints)
         acquired = _acquire([i for i in plan.acquire if i in people], track, points, opened, of_sizes)
         if track.keypoints is not None:

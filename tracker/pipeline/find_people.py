@@ -9,10 +9,10 @@ import numpy as np
 from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
 from tracker.estimation.initialization.first_pose import (
-    ENOUGH_FRAMES,
     FirstPose,
     FirstPoses,
     Show,
+    Trying,
     find_first_poses,
     find_first_poses_anywhere,
 )
@@ -27,6 +27,8 @@ from tracker.session.session import Session, save_model
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseChange, PoseRecord
 
+FINDING = "finding first poses"
+"""The stage of the search, for progress."""
 AXES = "silhouette_axes"
 """Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera.
 For each person these are the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
@@ -67,20 +69,9 @@ def frames_to_try(frames: Sequence[int], first: int | None) -> list[int]:
     return order[:MAX_FRAMES]
 
 
-def expected_steps(n_frames: int, done: int, good: int) -> int:
-    """Return how many trials of frames there will have been tried if all that follow are good.
-
-    Args:
-        n_frames: frames that may be tried.
-        done: number of them so far.
-        good: number of them that gave good first poses.
-    """
-    return max(done, min(n_frames, done + max(0, ENOUGH_FRAMES - good)))
-
-
 def find_people(
     session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int], settings: FindSettings,
-    report: Report = unreported, show: Show = lambda frame, found: None,
+    report: Report = unreported, show: Show = lambda trying: None,
 ) -> FirstPoses:  # fmt: skip
     """Find the first poses of people, all on one frame. Nothing is stored; see `store_found`.
 
@@ -91,7 +82,7 @@ def find_people(
         frames: the frames that may be used.
         settings: of the search.
         report: shows progress.
-        show: shows each frame that is tried and the first poses on it.
+        show: shows each frame that is tried, and the best first poses so far.
 
     Raises:
         TrackerError: no frame shows the people well enough.
@@ -100,21 +91,19 @@ def find_people(
         by = (settings.generator,)
         return find_first_poses(session, observer, people, [settings.frame], by, settings.voxel_m)
     tried = frames_to_try(frames, settings.frame)
-    done, good, share = 0, 0, 0.0
-
-    def count(frame: int, found: FirstPoses | None) -> None:
-        nonlocal good
-        good += found is not None and found.is_good
-        show(frame, found)
+    share = 0.0
 
     def say(text: str) -> None:
-        nonlocal done, share
-        done += 1
-        share = max(share, min(0.95, done / expected_steps(len(tried), done, good)))
-        report("finding first poses", share, text)
+        report(FINDING, share, text)
 
     def go_on() -> None:
-        report("finding first poses", share, "")
+        say("")
+
+    def shown(trying: Trying) -> None:
+        nonlocal share
+        share = trying.share
+        go_on()
+        show(trying)
 
     go_on()
     by_points = None
@@ -129,7 +118,7 @@ def find_people(
             return found
         by_points = by_points or found
     try:
-        found = find_first_poses_anywhere(session, observer, people, tried, settings.voxel_m, say, count, go_on)
+        found = find_first_poses_anywhere(session, observer, people, tried, settings.voxel_m, say, shown)
     except TrackerError:
         if by_points is None:
             raise

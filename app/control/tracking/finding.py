@@ -1,5 +1,6 @@
 """Find people whom nobody has placed, acquire their sizes and track them: one job, and one entry of the history."""
 
+import math
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -13,15 +14,15 @@ from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
 from app.control.tracking.tracking import Tracking
 from app.runtime.jobs import StoppedError
-from app.state.progress import FindState, Line
+from app.state.progress import CHAIN_STEPS, FindState, Line
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition
-from tracker.estimation.initialization.first_pose import FirstPoses
+from tracker.estimation.initialization.first_pose import FirstPoses, TakenError, Trying
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.body_acquisition import SIZES_EDITS, resized_start, with_sizes_changed
-from tracker.pipeline.chain import ChainPlan, Sink, run_chain, unplaced
+from tracker.pipeline.chain import ACQUIRING, ChainPlan, Sink, run_chain, unplaced
 from tracker.pipeline.find_people import AXES, FindSettings, axes_record, first_record
 from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, with_keypoints
 from tracker.pipeline.stored_run import TrackPlan
@@ -30,7 +31,7 @@ from tracker.session.session import Session, save_model
 from tracker.session.store.records import PoseChange, PoseRecord
 from tracker.session.store.stored_poses import StoredPose
 
-_ENDED: dict[str, Any] = {"candidates": {}, "sought": frozenset()}
+_ENDED: dict[str, Any] = {"candidates": {}, "sought": frozenset(), "takable": None, "trying": "", "left_s": None}
 """Fields of a search that found nobody."""
 
 
@@ -56,6 +57,8 @@ class FindingPeople:
         self._shown: int | None = None
         """Frame at which the user is shown what is tried; another frame is one that the user has gone to."""
         self._first_tried: int | None = None
+        self._is_taken = threading.Event()
+        self._best: FirstPoses | None = None
         frame, axes = _axes(session_state.saver.setting(AXES))
         session_state.set(finding=FindState(frame=frame, axes=axes))
 
@@ -86,12 +89,25 @@ class FindingPeople:
             everybody, frames = tuple(range(len(session_state.present))), range(session_state.session.n_frames)
             track = TrackPlan(frames, everybody, settings, keypoints=of if as_evidence else None)
             plan = ChainPlan(track, FindSettings(keypoints=of), people if acquire else ())
-            begin = FindState(sought=frozenset(people), frame=before.frame, axes=before.axes)
+            self._best = None
+            self._is_taken.clear()
+            steps = tuple(step for step in CHAIN_STEPS if acquire or step != "sizes")
+            begin = FindState(sought=frozenset(people), frame=before.frame, axes=before.axes, steps=steps)
             self._work.start(lambda: self._run(plan), begin)
 
     def stop(self) -> None:
         """Stop the work; what was stored stays. The caller must not hold the lock."""
         self._work.stop(before_waiting=self._tracking.stop)
+
+    def take_best(self) -> None:
+        """End the search with the best poses so far, and go on with them.
+
+        Raises:
+            TrackerError: there are none that are credible.
+        """
+        if self._work.state.takable is None:
+            raise TrackerError("expected a pose that can be taken, found none; wait until a frame shows one")
+        self._is_taken.set()
 
     def _run(self, plan: ChainPlan) -> dict[str, Any]:
         try:
@@ -128,27 +144,39 @@ class FindingPeople:
     def report(self, stage: str, share: float, text: str = "", /) -> None:
         """See `Sink.report`."""
         self._work.report(stage, share)
+        step = "sizes" if stage == ACQUIRING else "find"
+        if step != self._work.state.step:
+            self._set(step=step)
         if text:
             self._set(notes=(*self._work.state.notes, text))
 
-    def show(self, frame: int, found: FirstPoses | None) -> None:
-        """See `Sink.show`: draw the first poses of a frame, and go there unless the user looks or works elsewhere.
+    def show(self, trying: Trying) -> None:
+        """See `Sink.show`: draw the best first poses so far, and go there unless the user looks or works elsewhere.
 
-        Candidates stay in sight while the next frames are tried.
+        Raises:
+            TakenError: the user takes them.
         """
-        session_state = self._session_state
-        self._first_tried = frame if self._first_tried is None else self._first_tried
+        session_state, best = self._session_state, trying.best
+        if self._is_taken.is_set() and best is not None:
+            raise TakenError
+        self._first_tried = trying.frame if self._first_tried is None else self._first_tried
         with session_state.lock:
             state = session_state.state
-            candidates = dict(state.finding.candidates)
-            if found is not None:
-                candidates[frame] = {i: p.start.body for i, p in found.poses.items()}
-            finding = replace(state.finding, tried=frame, candidates=candidates)
-            is_news = found is not None or not candidates
-            if is_news and self._is_watched() and state.frame != frame:
+            candidates = state.finding.candidates
+            if best is not None and best is not self._best:
+                candidates = {best.frame: {i: p.start.body for i, p in best.poses.items()}}
+            self._best = best
+            takable = best.frame if best is not None and best.is_credible else None
+            left_s = None if trying.left_s is None else math.ceil(trying.left_s)
+            finding = replace(
+                state.finding, trying=trying.text, tried=trying.frame, takable=takable, left_s=left_s,
+                candidates=candidates,
+            )  # fmt: skip
+            frame = trying.frame if best is None else best.frame
+            if frame is not None and self._is_watched() and state.frame != frame:
                 self._shown = frame
                 session_state.show_frame(frame, finding=finding)
-            else:
+            elif finding != state.finding:
                 session_state.set(finding=finding)
 
     def _failed(self, error: Exception) -> dict[str, Any]:
@@ -186,7 +214,7 @@ class FindingPeople:
             self._session_state.saver.store_setting(AXES, axes)
             frame, lines = _axes(axes)
             before = self._session_state.state.finding
-            finding = replace(before, frame=frame, axes=lines, tried=None, candidates={}, sought=frozenset())
+            finding = replace(before, frame=frame, axes=lines, tried=None, **_ENDED)
             self._session_state.show_frame(found.frame, finding=finding)
 
     def place(self, found: FirstPoses, label: str) -> int | None:

@@ -183,7 +183,7 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
         cameras: names of all cameras.
     """
     axes = tuple(wire.SilhouetteAxes(cameras.index(n), people) for n, people in found.axes.items() if n in cameras)
-    return made_of(wire.FindingMessage, found, axes=axes)
+    return made_of(wire.FindingMessage, found, axes=axes, stage=found.trying or found.stage)
 
 
 def calibration(found: CalibrationState, n_people: int, field: MisfitField) -> wire.CalibrationMessage:

@@ -62,6 +62,10 @@ ROWS = [
     ("tracking", state(track=TrackState(True, 0, 8, 8, 4, 9, stage="solve")), TRACKED, "Estimating all", ["stop"]),
     ("paused", state(track=TrackState(False, 0, 89, 3, 4, 90)), TRACKED, "paused at frame 3", ["resume", "stop"]),
     ("find", state(finding=FindState(True, "first poses", 0.3)), NOBODY, "Finding people: first poses", ["stop"]),
+    (
+        "find", state(finding=FindState(True, trying="trying frame 4 of 12, 3 people's figures seen", takable=30)),
+        NOBODY, "Trying frame 4 of 12, 3 people's figures seen", ["take_found", "stop"],
+    ),
     ("sizes", state(acquisition=AcquisitionState(True, "fitting", 0.4)), TRACKED, "sizes of Ann: fitting", ["stop"]),
     ("calibration", state(calibration=CalibrationState(True, "judging")), TRACKED, "Checking the cameras", ["stop"]),
     ("observations", state(observations=ObservationsState(True, "judging")), TRACKED, "observations", ["stop"]),

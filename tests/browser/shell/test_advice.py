@@ -16,8 +16,9 @@ def action(deed, text="Do it", frame=None, person=None, camera=None, of=""):
     return {"deed": deed, "text": text, "frame": frame, "person": person, "camera": camera, "of": of}
 
 
-def said(text, *actions, situation="done", level="next", share=None, done=""):
-    return dict(situation=situation, text=text, actions=actions, level=level, share=share, done=done)
+def said(text, *actions, situation="done", level="next", share=None, done="", steps=(), step=0, at_most_s=None):
+    work = dict(share=share, done=done, steps=steps, step=step, at_most_s=at_most_s)
+    return dict(situation=situation, text=text, actions=actions, level=level, **work)
 
 
 async def advise(endpoint, *advice):
@@ -57,6 +58,7 @@ DEEDS = [
     (action("go_to", frame=40), "seek", {"frame": 40}),
     (action("place", person=0), "select", {"person": 0, "point": "torso"}),
     (action("resume"), None, {}),
+    (action("take_found", frame=3), "find_people", {"action": "take"}),
     (action("retry"), "save", {}),
     (action("search"), "search", {"action": "frame", "person": None}),
     (action("show_before"), None, {}),
@@ -177,3 +179,12 @@ async def test_the_line_is_whole_in_every_window(page, endpoint):
         await page.set_viewport_size({"width": width, "height": height})
         await shows(page, f"innerWidth === {width}")
         assert await page.evaluate(CUT_OFF) == [], width
+
+
+async def test_the_steps_of_a_chain_are_one_bar(page, endpoint):
+    chain = dict(steps=("find", "sizes", "track"), step=1, share=0.25, at_most_s=62)
+    await advise(endpoint, said("Trying frame 4 of 12", action("take_found"), level="work", **chain))
+    await shows(page, "document.querySelector('#advice [aria-current=step]')?.textContent === 'sizes'")
+    assert await page.locator("#advice .steps-bar li").all_inner_texts() == ["find", "sizes", "track"]
+    assert await page.locator("#advice-share").is_hidden()
+    assert await page.locator("#advice-figures").inner_text() == "at most 65 s left in this step"

@@ -19,7 +19,7 @@ from tracker.estimation.chamfer.method import CHAMFER
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.fitting.retarget import retarget_pose
-from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses, Trying
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.pipeline import chain, track_session
@@ -48,8 +48,8 @@ class Notes:
     def report(self, stage, share, text=""):
         self.said += [text] if text else []
 
-    def show(self, frame, found):
-        self.said.append(f"tried {frame}")
+    def show(self, trying):
+        self.said.append(f"tried {trying.frame}")
 
     def take(self, run, step):
         self.steps.append(step)
@@ -67,7 +67,7 @@ def found(monkeypatch):
         model = session.people[0].model
         start = Hypothesis(PosedBody(model, model.neutral()), "voxels", is_measured=True)
         first = FirstPose(FRAME, start, "good", 1.5, True, ("left arm unresolved",))
-        show(FRAME, None)
+        show(Trying(FRAME, 1, 2, "", None, None, None))
         return FirstPoses(FRAME, {0: first})
 
     monkeypatch.setattr(chain, "find_people", find)

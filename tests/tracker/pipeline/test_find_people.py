@@ -19,6 +19,7 @@ from tracker.estimation.initialization import first_pose, known_start, own_figur
 from tracker.estimation.initialization.first_pose import (
     FirstPose,
     FirstPoses,
+    TakenError,
     find_first_poses,
     find_first_poses_anywhere,
 )
@@ -27,7 +28,7 @@ from tracker.estimation.initialization.start_fit import StartTrack
 from tracker.evidence.voxels.visual_hull import VisualHull
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
-from tracker.pipeline.find_people import AXES, FindSettings, expected_steps, find_people, frames_to_try, store_found
+from tracker.pipeline.find_people import AXES, FindSettings, find_people, frames_to_try, store_found
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 
@@ -73,6 +74,16 @@ def fitter(track, status=lambda start: "good", step=lambda: None):
 OBSERVER = SimpleNamespace(recording=None)
 
 
+def frames_in(tried):
+    """Return what adds each frame that is tried to a list."""
+
+    def show(trying):
+        if trying.frame is not None and trying.frame not in tried:
+            tried.append(trying.frame)
+
+    return show
+
+
 def find(session, size_m=0.05):
     return find_first_poses(session, OBSERVER, [0], [3], size_m=size_m)
 
@@ -83,13 +94,6 @@ def test_frames_are_tried_far_from_one_another():
     assert len(tried) == len(set(tried)) == 12
     assert frames_to_try(range(10, 14), 12) == [12, 10, 11, 13]
     assert set(frames_to_try(range(0, 60, 3), None)) <= set(range(0, 60, 3))
-
-
-def test_the_share_that_is_done_counts_the_frames_that_will_be_tried():
-    """Two good frames are enough of twelve, so that the first good one is half the work, not a twelfth."""
-    assert [expected_steps(12, done, done) for done in range(4)] == [2, 2, 2, 3]
-    assert [expected_steps(12, done, 0) for done in (0, 4, 12, 14)] == [2, 6, 12, 14]
-    assert expected_steps(2, 2, 1) == 2
 
 
 @pytest.mark.slow
@@ -137,21 +141,57 @@ def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_not
     assert [text.split(":")[0] for text in said] == [f"frame 3, {name}" for name in generators]
 
 
-@pytest.mark.slow
-def test_two_frames_that_agree_end_the_trial(session, silhouettes, fits, monkeypatch):
-    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
-    tried = list[int]()
-    frames = [20, 10, 30, 15]
-    find_first_poses_anywhere(
-        session, OBSERVER, [0], frames, 0.05, show=lambda frame, found: found is None and tried.append(frame)
+def searched(session, monkeypatch, statuses, heights, show=lambda trying: None):
+    """Search four frames that give starts of some statuses and heights, by person; return the start and the trials."""
+    bodies = session.people[0].model
+
+    def poses_on(trial, frame, generators):
+        people = zip(statuses[frame], heights[frame], strict=True)
+        posed = [(s, PosedBody(b := bodies.with_height(h), b.neutral())) for s, h in people]
+        poses = {i: FirstPose(frame, Hypothesis(p, "axis"), s, 9.0 - frame, True, ()) for i, (s, p) in enumerate(posed)}
+        return FirstPoses(frame, poses)
+
+    trials = []
+    monkeypatch.setattr(first_pose._Trial, "_poses_on", poses_on)
+    found = find_first_poses_anywhere(
+        session, OBSERVER, [0, 1], range(4), 0.05, show=lambda trying: (trials.append(trying), show(trying))
     )
-    assert tried == [20, 10]
-    monkeypatch.setattr(first_pose, "_HEIGHTS_AGREE", 0.0)
-    tried.clear()
-    find_first_poses_anywhere(
-        session, OBSERVER, [0], frames, 0.05, show=lambda frame, found: found is None and tried.append(frame)
-    )
-    assert tried == frames
+    return found, [t for k, t in enumerate(trials) if t[:2] != trials[k - 1][:2]]
+
+
+GOOD, DOUBTFUL = ("good", "good"), ("good", "doubtful")
+
+
+@pytest.mark.parametrize(
+    ("statuses", "heights", "n_tried", "start"),
+    [
+        ([GOOD, DOUBTFUL, GOOD, GOOD], [(1.8, 1.6)] * 4, 2, 0),
+        ([GOOD, DOUBTFUL, GOOD, GOOD], [(1.8, 1.6), (1.6, 1.8), (1.8, 1.6), (1.8, 1.6)], 2, 0),
+        ([GOOD, DOUBTFUL, DOUBTFUL, GOOD], [(1.8, 1.6), (1.4, 1.4), (1.6, 1.2), (1.8, 1.6)], 4, 3),
+        ([DOUBTFUL, DOUBTFUL, GOOD, DOUBTFUL], [(1.8, 1.6)] * 4, 4, 2),
+    ],
+)
+def test_a_search_ends_when_no_other_frame_can_win(
+    session, silhouettes, monkeypatch, statuses, heights, n_tried, start
+):
+    """No status is better than good, and a doubtful start measures the height as well, in whatever order people are."""
+    found, trials = searched(session, monkeypatch, statuses, heights)
+    assert found.frame == start
+    assert len({t.frame for t in trials} - {None}) == n_tried
+
+
+def test_a_search_shows_its_frames_and_can_be_ended_with_the_best(session, silhouettes, monkeypatch):
+    def take(trying):
+        if trying.number == 3:
+            raise TakenError
+
+    found, trials = searched(session, monkeypatch, [DOUBTFUL] * 4, [(1.8, 1.6)] * 4, take)
+    assert found.frame == 1  # that which costs least so far
+    last = trials[-1]
+    assert (last.frame, last.text, last.share, last.best) == (2, "trying frame 3 of 4", 0.5, found)
+    assert last._replace(n_figures=1).text == "trying frame 3 of 4, 1 person's figure seen"
+    assert last._replace(n_figures=3).text == "trying frame 3 of 4, 3 people's figures seen"
+    assert found.is_credible
 
 
 @pytest.mark.slow
@@ -162,9 +202,7 @@ def test_frames_on_which_silhouettes_agree_go_first(session, silhouettes, fits, 
     seen = SimpleNamespace(silhouettes=lambda k, person=None: {20: nobody, 10: poor}.get(k, whole), close=lambda: None)
     monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording, step: seen)
     tried = list[int]()
-    find_first_poses_anywhere(
-        session, OBSERVER, [0], [20, 10, 30, 15], 0.05, show=lambda frame, found: found is None and tried.append(frame)
-    )
+    find_first_poses_anywhere(session, OBSERVER, [0], [20, 10, 30, 15], 0.05, show=frames_in(tried))
     assert tried == [30, 15]
 
 
@@ -190,7 +228,7 @@ def test_the_search_ends_after_so_many_pictures(session, silhouettes, monkeypatc
 def test_the_first_two_frames_are_tried_at_the_same_time(session, silhouettes, monkeypatch):
     silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
     at_once = threading.Barrier(2, timeout=20)
-    shown = []
+    shown = list[int]()
 
     def starts(observer, frame, later, others, step):
         at_once.wait()
@@ -198,10 +236,8 @@ def test_the_first_two_frames_are_tried_at_the_same_time(session, silhouettes, m
         return fitter(lambda start: (start.pose, next(costs)))()
 
     monkeypatch.setattr(first_pose, "StartFitter", starts)
-    found = find_first_poses_anywhere(
-        session, OBSERVER, [0], [20, 10, 30], 0.05, show=lambda frame, found: shown.append((frame, found is None))
-    )
-    assert shown == [(20, True), (20, False), (10, True), (10, False)]  # as if one after the other
+    found = find_first_poses_anywhere(session, OBSERVER, [0], [20, 10, 30], 0.05, show=frames_in(shown))
+    assert shown == [20, 10]  # as if one after the other
     assert found.frame == 20
 
 

@@ -8,13 +8,14 @@ The most likely track is kept. It is doubtful where another start is as likely, 
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import combinations, product
+from itertools import product
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from tracker.body.model import BodyModel
+from tracker.compute.progress import PartPace
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.initialization.frame_ranking import ranked_frames
@@ -38,8 +39,8 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.session.session import Session
 
-ENOUGH_FRAMES = 2
-"""Number of frames with good starts whose heights agree that end the trial of `auto`."""
+_AT_ONCE = 2
+"""Number of frames that are tried at the same time: one start needs another frame whose heights agree."""
 _PICTURES = 16
 """Pictures in which `auto` looks for voxels of one person, or otherwise for several: some 20 s of processor time on six
 views of 960x540, measured with simulated people."""
@@ -49,8 +50,9 @@ _LARGER = 0.02
 """Share by which some silhouette grows with what looks like shadows, above which it is worth another start."""
 
 Say = Callable[[str], None]
-Show = Callable[[int, "FirstPoses | None"], None]
-"""Is given each frame that is tried, at first with None, and then with the poses if some were found."""
+Show = Callable[["Trying"], None]
+"""Is given how far a search is when a frame begins or ends, between fits and for each silhouette, from several threads.
+An exception ends the search; after `TakenError` it returns the best poses so far."""
 Silhouettes: TypeAlias = Callable[[int, int], Sequence[ViewSilhouette]]
 """Returns the silhouettes of all views by frame and by index of the person whose masks are used."""
 
@@ -96,6 +98,54 @@ class FirstPoses(NamedTuple):
         """Whether the fits of all are good."""
         return all(p.status == "good" for p in self.poses.values())
 
+    @property
+    def is_credible(self) -> bool:
+        """Whether nobody is lost in them."""
+        return all(p.status != "lost" for p in self.poses.values())
+
+    def has_heights_of(self, other: "FirstPoses") -> bool:
+        """Return whether the heights agree with those on another frame, where the people may come in another order."""
+        ours, theirs = (np.sort([p.model.height_m for p in found.poses.values()]) for found in (self, other))
+        return bool(np.all(np.abs(np.log(ours / theirs)) < _HEIGHTS_AGREE))
+
+
+class TakenError(Exception):
+    """The best poses so far are to be taken; see `Show`."""
+
+
+class Trying(NamedTuple):
+    """How far a search for first poses is."""
+
+    frame: int | None
+    """The frame that is tried; None while frames are compared."""
+    number: int
+    """Which one of the frames this is, from 1."""
+    n_frames: int
+    """Number of frames that this round tries at most."""
+    generators: str
+    """Names of those that propose starts in this round; empty for the usual ones."""
+    n_figures: int | None
+    """Number of people's figures on the frame; None before they are found."""
+    left_s: float | None
+    """Longest time that the search still takes, s, by what trials took so far; None before the first has ended."""
+    best: FirstPoses | None
+    """The best poses so far, of any frame."""
+
+    @property
+    def text(self) -> str:
+        """A phrase on the frame."""
+        if self.frame is None:
+            return "comparing frames"
+        people = "person's figure" if self.n_figures == 1 else "people's figures"
+        seen = "" if self.n_figures is None else f", {self.n_figures} {people} seen"
+        by = f" by {self.generators}" if self.generators else ""
+        return f"trying frame {self.number} of {self.n_frames}{by}{seen}"
+
+    @property
+    def share(self) -> float:
+        """Share of the frames of this round that are tried, 0 to 1."""
+        return max(0, self.number - 1) / self.n_frames
+
 
 def find_first_poses(
     session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int],
@@ -125,31 +175,38 @@ def find_first_poses(
 
 def find_first_poses_anywhere(
     session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int], size_m: float = VOXEL_M,
-    say: Say = lambda text: None, show: Show = lambda frame, found: None, step: Callable[[], None] = lambda: None,
+    say: Say = lambda text: None, show: Show = lambda trying: None,
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever generator and on whatever of some frames tracks best; see `find_first_poses`.
 
-    The cheapest generator is tried until the starts of two frames are good and agree on the heights. Frames that are
-    tried in any case are tried at the same time. Of one person, those on which the silhouettes agree best are tried,
-    and the number of pictures bounds theirs. If no start is good, the other generators are tried on the frame that
-    costs least, until one finds a start. Several people hide one another's limbs: all frames are tried for them, and
-    other generators on several, until a start is good. `show` receives each frame and what was found on it. `step` is
-    called between fits and for each silhouette, from several threads; an exception that it raises ends the search.
+    The cheapest generator is tried until no other frame can win: a start is good, and another frame measures the same
+    heights. No status is better than good, and the same body would start there; costs of two frames differ by what
+    these show. A height is measured before a pose is fitted, so that a doubtful start confirms it as a good one does.
+
+    Of one person, frames on which the silhouettes agree best are tried, and the number of pictures bounds theirs. If no
+    start is good, the other generators are tried on the frame that costs least, until one finds a start. Several people
+    hide one another's limbs: all frames may be tried for them, and other generators on several, until a start is good.
     """
     cheapest, *others = GENERATORS
-    with _Trial(session, observer, people, size_m, say, show, step) as trial:
-        is_one, few = len(people) == 1, max(ENOUGH_FRAMES, _PICTURES // len(session.cameras))
-        left = trial.ranked(frames)[:few] if is_one else list(frames)
-        first = left[0]
-        while left and not trial.is_settled:
-            n_sure = max(1, ENOUGH_FRAMES - sum(f.is_good for f in trial.found))
-            trial.add(left[:n_sure], (cheapest,))
-            del left[:n_sure]
-        best = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or [first]
-        n_before = len(trial.found)
-        for name, frame in product(others, best[: 1 if is_one else few]):
-            if not trial.has_good and (not is_one or len(trial.found) == n_before):
-                trial.add([frame], (name,))
+    with _Trial(session, observer, people, size_m, say, show) as trial:
+        is_one, few = len(people) == 1, max(_AT_ONCE, _PICTURES // len(session.cameras))
+        n_again = 1 if is_one else few
+        try:
+            trial.begin(len(frames), 0)
+            left = trial.ranked(frames)[:few] if is_one else list(frames)
+            first = left[0]
+            trial.begin(len(left), len(others) * n_again)
+            while left and not trial.is_settled:
+                trial.add(left[:_AT_ONCE], (cheapest,))
+                del left[:_AT_ONCE]
+            best = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or [first]
+            n_before = len(trial.found)
+            trial.begin(len(others) * len(best[:n_again]), 0, " and ".join(others))
+            for name, frame in product(others, best[:n_again]):
+                if not trial.has_good and (not is_one or len(trial.found) == n_before):
+                    trial.add([frame], (name,))
+        except TakenError:
+            return trial.best()
         try:
             return trial.best()
         except TrackerError as error:
@@ -168,7 +225,7 @@ class _Trial:
 
     def __init__(
         self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say,
-        show: Show = lambda frame, found: None, step: Callable[[], None] = lambda: None,
+        show: Show = lambda trying: None,
     ) -> None:  # fmt: skip
         if len(session.cameras) < 2:
             raise TrackerError(
@@ -176,28 +233,44 @@ class _Trial:
                 "shows no depth; place the body by hand, or set it from known joints"
             )
         self._show, self._ended = show, threading.Event()
-
-        def go_on() -> None:
-            if self._ended.is_set():
-                raise _EndedError
-            step()
-
-        self._step = go_on
+        self.found, self._errors = list[FirstPoses](), list[TrackerError]()
+        self._pace, self._n_figures = PartPace(), dict[int, int]()
+        self.begin(1, 0)
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
-        self._finder = SilhouetteFinder(session.cameras, observer.recording, step=go_on)
+        self._finder = SilhouetteFinder(session.cameras, observer.recording, step=self._step)
         floor = floor_plane(session.up, session.floor)
 
         def recovered(frame: int, person: int) -> Sequence[ViewSilhouette]:
             return recover_from_shadows(self._finder.silhouettes(frame, person), floor, size_m)
 
         self._sources = [self._source(silhouettes, floor) for silhouettes in (self._finder.silhouettes, recovered)]
-        self.found, self._errors = list[FirstPoses](), list[TrackerError]()
 
     def __enter__(self) -> "_Trial":
         return self
 
     def __exit__(self, *_: object) -> None:
         self._finder.close()
+
+    def begin(self, n_frames: int, n_later: int, generators: str = "") -> None:
+        """Begin a round of trials.
+
+        Args:
+            n_frames: to try at most.
+            n_later: number of trials that follow if no start is good.
+            generators: names of unusual ones.
+        """
+        self._frame: int | None = None
+        self._number, self._n_done, self._n_frames, self._n_later = 0, 0, n_frames, n_later
+        self._generators = generators
+
+    def _step(self) -> None:
+        if self._ended.is_set():
+            raise _EndedError
+        n_left = self._n_frames - self._n_done + (0 if self.has_good else self._n_later)
+        best = self.best() if self.found else None
+        seen = None if self._frame is None else self._n_figures.get(self._frame)
+        left_s, of = self._pace.left_s(n_left), (self._number, self._n_frames, self._generators)
+        self._show(Trying(self._frame, *of, seen, left_s, best))
 
     def _source(self, silhouettes: Silhouettes, floor: GroundPlane) -> "_Source":
         def scenes(frame: int, person: int) -> list[PersonScene]:
@@ -209,20 +282,27 @@ class _Trial:
 
     def add(self, frames: Sequence[int], generators: Sequence[str]) -> None:
         """Try frames, each in a thread of its own. They are shown and said in their order; an exception ends all."""
+        self._pace.begin()
         with ThreadPoolExecutor(len(frames), "trial") as pool:
             tried = [pool.submit(self._poses_on, frame, generators) for frame in frames]
             try:
                 for frame, trial in zip(frames, tried, strict=True):
-                    self._show(frame, None)
+                    self._frame, self._number = frame, self._number + 1
+                    self._step()
                     self._take(frame, generators, trial)
             except BaseException:
                 self._ended.set()
                 raise
+        self._pace.end(len(frames))
+        self._n_done += len(frames)
+        self._step()
 
     def _poses_on(self, frame: int, generators: Sequence[str]) -> FirstPoses:
         own: dict[int, FirstPose] = {}
         for person in self._people:
-            task = _Task(self._session, self._observer, self._sources, person, self._size_m, self._step)
+            task = _Task(
+                self._session, self._observer, self._sources, person, self._size_m, self._step, self._n_figures
+            )
             own[person] = _best_on_frame(task, frame, generators, own)
         return FirstPoses(frame, own)
 
@@ -235,7 +315,6 @@ class _Trial:
             self._say(f"frame {frame}, {' and '.join(generators)}: {error}")
             return
         self.found.append(found)
-        self._show(frame, found)
         statuses = ", ".join(p.status for p in found.poses.values())
         cost = f"cost {found.cost_px:.2f} px over a short track"
         self._say(f"frame {frame}, {' and '.join(generators)}: {statuses}, {cost}")
@@ -254,12 +333,11 @@ class _Trial:
 
     @property
     def is_settled(self) -> bool:
-        """Whether two frames have good starts that agree on the heights of all."""
-        heights = [[p.model.height_m for p in f.poses.values()] for f in self.found if f.is_good]
-        return any(
-            bool(np.all(np.abs(np.log(np.divide(a, b))) < _HEIGHTS_AGREE))
-            for a, b in combinations(heights, ENOUGH_FRAMES)
-        )
+        """Whether the best start is good, and another frame measures the same heights."""
+        if not self.has_good:
+            return False
+        best = self.best()
+        return any(f.frame != best.frame and f.has_heights_of(best) for f in self.found)
 
     def best(self) -> FirstPoses:
         """Return the first poses that cost least; those whose fits are good go before.
@@ -290,6 +368,8 @@ class _Task(NamedTuple):
     person: int
     size_m: float
     step: Callable[[], None]
+    n_figures: dict[int, int]
+    """Receives the number of figures by frame."""
 
 
 class _Tried(NamedTuple):
@@ -331,8 +411,9 @@ def _on_frame(
     task: _Task, frame: int, source: _Source, silhouettes: Sequence[ViewSilhouette],
     generators: Sequence[str], found: Mapping[int, FirstPose],
 ) -> _Tried:  # fmt: skip
-    session, observer, _, person, size_m, step = task
+    session, observer, _, person, size_m, step, n_figures = task
     hull = carve_people(silhouettes, size_m)
+    n_figures[frame] = len(hull.figures)
     known = {i: pose.start.body for i, pose in found.items()}
     others = others_on_frame(session, person, frame, known)
     figure = own_figure(session, person, hull, others)

@@ -1,6 +1,7 @@
 """Find people in the page's program: progress, one entry of the history, stop, and what is refused."""
 
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -13,10 +14,24 @@ from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition
 from tracker.estimation.fitting.hypothesis import Hypothesis
-from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses, TakenError, Trying
 from tracker.pipeline import chain
 
 FRAME = 1
+
+
+def trying(frame, best=None, left_s=None):
+    """How far a search of twelve frames is on its fourth one."""
+    return Trying(frame, 4, 12, "", 3, left_s, best)
+
+
+def poses_on(session, frame, status="good"):
+    """A person 5% larger, found on a frame."""
+    model = session.people[0].model
+    body = model.with_height(1.05 * model.height_m)
+    lines = {"FRONT": np.array([[[10.0, 20.0], [30.0, 40.0]], [[11.0, 20.0], [29.0, 40.0]]])}
+    start = Hypothesis(PosedBody(body, body.neutral()), "axis")
+    return FirstPoses(frame, {0: FirstPose(frame, start, status, 1.0, True, (), lines)})
 
 
 @pytest.fixture
@@ -25,16 +40,10 @@ def found(monkeypatch):
     go = threading.Event()
 
     def find(session, observer, people, frames, settings, report, show):
-        show(FRAME, None)
+        show(trying(FRAME))
         report("finding first poses", 0.25, "frame 1, voxels: good")
         assert go.wait(10)
-        model = session.people[0].model
-        body = model.with_height(1.05 * model.height_m)
-        pose = body.neutral()
-        start = Hypothesis(PosedBody(body, pose), "axis")
-        lines = {"FRONT": np.array([[[10.0, 20.0], [30.0, 40.0]], [[11.0, 20.0], [29.0, 40.0]]])}
-        first = FirstPose(FRAME, start, "good", 1.0, True, (), lines)
-        return FirstPoses(FRAME, dict.fromkeys(people, first))
+        return poses_on(session, FRAME)
 
     monkeypatch.setattr(chain, "find_people", find)
     return go
@@ -181,13 +190,12 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
     go = [threading.Event() for _ in range(3)]
 
     def find(session, observer, people, frames, settings, report, show):
-        model = session.people[0].model.with_height(1.9)
-        start = Hypothesis(PosedBody(model, model.neutral()), "axis")
-        poses = {0: FirstPose(2, start, "good", 1.0, True, ())}
-        for frame, event in zip((2, 3, 5), go, strict=True):
-            show(frame, None)
+        best = None
+        for frame, event, is_better in zip((2, 3, 5), go, (True, True, False), strict=True):
+            show(trying(frame, best))
             assert frame == 2 or controller.state.frame != frame  # what was found stays in sight meanwhile
-            show(frame, FirstPoses(frame, poses))
+            best = poses_on(session, frame) if is_better else best
+            show(trying(frame, best))
             assert event.wait(10)
         raise TrackerError("expected a body that fills the silhouettes, found none")
 
@@ -205,7 +213,7 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
     assert joint_handles.handles(controller.session_of(state), state, view.cameras) == []
     go[0].set()
     wait_for(lambda: controller.state.frame == 3)
-    assert set(controller.state.finding.candidates) == {2, 3}
+    assert set(controller.state.finding.candidates) == {3}  # the best alone
     controller.navigation.seek(1)  # the user looks around
     go[1].set()
     wait_for(lambda: controller.state.finding.tried == 5)
@@ -220,10 +228,52 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
     assert joint_handles.handles(controller.session_of(state), controller.state, view.cameras)  # to be placed by hand
 
 
+@pytest.fixture
+def searching(opened, monkeypatch):
+    """Stands for a search that goes on until it is ended: it has a doubtful start on frame 2 once it is let go."""
+    go = threading.Event()
+
+    def find(session, observer, people, frames, settings, report, show):
+        show(trying(5, left_s=61.2))
+        assert go.wait(10)
+        best = poses_on(session, 2, "doubtful")
+        try:
+            while True:
+                report("finding first poses", 0.25)
+                show(trying(5, best))
+                time.sleep(0.01)
+        except TakenError:
+            return best
+
+    monkeypatch.setattr(chain, "find_people", find)
+    return opened(), go
+
+
+def test_the_best_pose_so_far_is_taken_and_the_chain_goes_on_with_it(searching, tracked):
+    controller, go = searching
+    controller.finding.start()
+    wait_for(lambda: controller.state.finding.trying)
+    finding = controller.state.finding
+    assert (finding.trying, finding.left_s) == ("trying frame 4 of 12, 3 people's figures seen", 62)
+    with pytest.raises(TrackerError, match="a pose that can be taken"):
+        controller.finding.take_best()
+    go.set()
+    wait_for(lambda: controller.state.finding.takable == 2)
+    controller.finding.take_best()
+    wait_for(lambda: not controller.state.finding.running)
+    ((frame, _, edit),) = tracked
+    assert (frame, edit is not None) == (2, True)
+    assert (controller.state.frame, controller.state.people[0].status) == (2, "doubtful")
+    assert (controller.state.finding.takable, controller.state.finding.trying) == (None, "")
+    controller.history.undo()
+    assert controller.state.people[0].source is None
+    assert controller.state.undo is None
+
+
 def test_an_error_is_one_sentence(opened, monkeypatch):
     def fail(session, observer, people, frames, settings, report, show):
         for frame in (2, 4):
-            show(frame, None)
+            show(trying(frame))
             wait_for(lambda: controller.state.frame == frame)  # noqa: B023
         raise TrackerError("expected somebody in the silhouettes, found none", camera=camera)
 
