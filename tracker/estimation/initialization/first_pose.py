@@ -8,7 +8,7 @@ The most likely track is kept. It is doubtful where another start is as likely, 
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import product
+from itertools import combinations, product
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
@@ -39,8 +39,8 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.session.session import Session
 
-_AT_ONCE = 2
-"""Number of frames that are tried at the same time: one start needs another frame whose heights agree."""
+_ENOUGH_FRAMES = 2
+"""Number of frames with good starts whose heights agree that end the trial of `auto`."""
 _PICTURES = 16
 """Pictures in which `auto` looks for voxels of one person, or otherwise for several: some 20 s of processor time on six
 views of 960x540, measured with simulated people."""
@@ -179,17 +179,16 @@ def find_first_poses_anywhere(
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever generator and on whatever of some frames tracks best; see `find_first_poses`.
 
-    The cheapest generator is tried until no other frame can win: a start is good, and another frame measures the same
-    heights. No status is better than good, and the same body would start there; costs of two frames differ by what
-    these show. A height is measured before a pose is fitted, so that a doubtful start confirms it as a good one does.
+    The cheapest generator is tried until the starts of two frames are good and agree on the heights. A single good one
+    is not enough: it may have a limb elsewhere. Frames that are tried in any case are tried at the same time.
 
     Of one person, frames on which the silhouettes agree best are tried, and the number of pictures bounds theirs. If no
     start is good, the other generators are tried on the frame that costs least, until one finds a start. Several people
-    hide one another's limbs: all frames may be tried for them, and other generators on several, until a start is good.
+    hide one another's limbs: all frames are tried for them, and other generators on several, until a start is good.
     """
     cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show) as trial:
-        is_one, few = len(people) == 1, max(_AT_ONCE, _PICTURES // len(session.cameras))
+        is_one, few = len(people) == 1, max(_ENOUGH_FRAMES, _PICTURES // len(session.cameras))
         n_again = 1 if is_one else few
         try:
             trial.begin(len(frames), 0)
@@ -197,8 +196,9 @@ def find_first_poses_anywhere(
             first = left[0]
             trial.begin(len(left), len(others) * n_again)
             while left and not trial.is_settled:
-                trial.add(left[:_AT_ONCE], (cheapest,))
-                del left[:_AT_ONCE]
+                n_sure = max(1, _ENOUGH_FRAMES - sum(f.is_good for f in trial.found))
+                trial.add(left[:n_sure], (cheapest,))
+                del left[:n_sure]
             best = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or [first]
             n_before = len(trial.found)
             trial.begin(len(others) * len(best[:n_again]), 0, " and ".join(others))
@@ -333,11 +333,9 @@ class _Trial:
 
     @property
     def is_settled(self) -> bool:
-        """Whether the best start is good, and another frame measures the same heights."""
-        if not self.has_good:
-            return False
-        best = self.best()
-        return any(f.frame != best.frame and f.has_heights_of(best) for f in self.found)
+        """Whether two frames have good starts that agree on the heights of all, in whatever order people are."""
+        good = [f for f in self.found if f.is_good]
+        return any(a.has_heights_of(b) for a, b in combinations(good, _ENOUGH_FRAMES))
 
     def best(self) -> FirstPoses:
         """Return the first poses that cost least; those whose fits are good go before.
