@@ -30,6 +30,20 @@ class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
     """A message to a page, or the header of a binary one."""
 
 
+class WorkMessage(Message, frozen=True):
+    """Work in the background: its progress, or how the last one ended."""
+
+    running: bool
+    stage: str
+    """The kind of work."""
+    share: float
+    """Share of the present step that is done, 0 to 1."""
+    message: str
+    """How the last one ended, or empty."""
+    failed: bool
+    """Whether it ended with an error."""
+
+
 class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A part of a message to a page."""
 

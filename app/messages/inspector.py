@@ -6,7 +6,7 @@ import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
 from app.drawing.misfit_field import MisfitArrow
-from app.messages.base import Command, Index, Message, Name, Part
+from app.messages.base import Command, Index, Message, Name, Part, WorkMessage
 from app.messages.search import OutlierMode
 from app.state.run_choices import MAX_STRIDE
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
@@ -353,20 +353,11 @@ class SilhouetteAxes(Part, frozen=True):
     """For each person the successive approximations x0, y0, x1, y1, undistorted px; the last is the axis."""
 
 
-class FindingMessage(Message, frozen=True, tag="finding"):
+class FindingMessage(WorkMessage, frozen=True, tag="finding"):
     """The search for people whom nobody has placed: its progress, and who was found."""
 
-    running: bool
-    stage: str
-    """The kind of work, or the frame that is tried."""
-    share: float
-    """Share of the present step that is done, 0 to 1."""
     notes: tuple[str, ...]
     """Sentences on what was tried, then on who was found and how."""
-    message: str
-    """How the last one ended, or empty."""
-    failed: bool
-    """Whether it ended with an error."""
     frame: int | None
     """The frame on which people were found last."""
     axes: tuple[SilhouetteAxes, ...]
@@ -400,18 +391,9 @@ class CameraCheck(Part, frozen=True):
     """Whether it shows the people at all."""
 
 
-class CalibrationMessage(Message, frozen=True, tag="calibration"):
+class CalibrationMessage(WorkMessage, frozen=True, tag="calibration"):
     """The check of the cameras: its progress, or its result."""
 
-    running: bool
-    stage: str
-    """The kind of work."""
-    share: float
-    """Share of the work that is done, 0 to 1."""
-    message: str
-    """How the last check or correction ended, or empty."""
-    failed: bool
-    """Whether it ended with an error."""
     is_checked: bool
     """Whether there is a result."""
     frames: tuple[int, ...]
@@ -477,15 +459,9 @@ class ComparedMoment(Part, frozen=True):
     """Data that it was found by, for display."""
 
 
-class ClocksMessage(Message, frozen=True, tag="clocks"):
+class ClocksMessage(WorkMessage, frozen=True, tag="clocks"):
     """The clocks of all cameras, in their order, and the work on them."""
 
-    running: bool
-    stage: str
-    share: float
-    message: str
-    failed: bool
-    """As `calibration` has them."""
     cameras: tuple[CameraClock, ...]
     way: str
     """Data of the last estimate; empty without one."""

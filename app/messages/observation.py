@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from app.messages.base import Command, Frame, Index, Message, Name, Part
+from app.messages.base import Command, Frame, Index, Message, Name, Part, WorkMessage
 
 # --- from the page --------------------------------------------------------------------------------------------------
 
@@ -95,7 +95,7 @@ class JudgedLimb(Part, frozen=True):
     """Distance of its farthest joint from the tracked one."""
 
 
-class ObservationsMessage(Message, frozen=True, tag="imported"):
+class ObservationsMessage(WorkMessage, frozen=True, tag="imported"):
     """Imported observations, the work on them, and their judgement."""
 
     sets: tuple[ObservedSetInfo, ...]
@@ -103,15 +103,6 @@ class ObservationsMessage(Message, frozen=True, tag="imported"):
     """Name of the set that the views show, or empty."""
     is_previewed: bool
     """Whether the views show files that are not imported yet."""
-    running: bool
-    stage: str
-    """The kind of work."""
-    share: float
-    """Share of this work that is done, 0 to 1."""
-    message: str
-    """How the last work ended, or empty."""
-    failed: bool
-    """Whether it ended with an error."""
     judged: str
     """Name of the set of the judgement, or empty."""
     people: tuple[JudgedPerson, ...]

@@ -196,13 +196,13 @@ def calibration(found: CalibrationState, n_people: int, field: MisfitField) -> w
     """
     check, preview = found.check, found.preview
     rows = () if check is None else tuple(_camera(c, check) for c in check.cameras)
-    return wire.CalibrationMessage(
-        found.running, found.stage, found.share, found.message, found.failed, check is not None,
-        () if check is None else check.frames, rows, () if check is None else tuple(check.sentences),
-        field.arrows, field.factor, found.n_others, found.n_better, found.refused, found.is_previewed,
-        None if preview is None else preview.frame,
-        0.0 if preview is None else round(preview.cost_before - preview.cost_after, 1),
-        found.revision, tuple(_intervals(found.outdated.get(i, ())) for i in range(n_people)),
+    return made_of(
+        wire.CalibrationMessage, found, is_checked=check is not None, cameras=rows,
+        frames=() if check is None else check.frames, sentences=() if check is None else tuple(check.sentences),
+        misfits=field.arrows, misfit_factor=field.factor, others=found.n_others, better=found.n_better,
+        preview_frame=None if preview is None else preview.frame,
+        preview_fall_nats=0.0 if preview is None else round(preview.cost_before - preview.cost_after, 1),
+        outdated=tuple(_intervals(found.outdated.get(i, ())) for i in range(n_people)),
     )  # fmt: skip
 
 
@@ -219,10 +219,11 @@ def observations(found: ObservationsState, people: Sequence[str]) -> observed.Ob
     )
     doubts = [(people.index(j.person), d) for j in found.judgements for d in j.worst if d.verdict.is_doubted]
     doubts.sort(key=lambda own: (-round(own[1].verdict.probability_off, 2), -own[1].verdict.distance_m))
-    return observed.ObservationsMessage(
-        sets, found.shown.name if found.shown is not None else "", found.plan is not None, found.running, found.stage,
-        found.share, found.message, found.failed, found.judged, judged,
-        tuple(_judged_limb(person, doubt) for person, doubt in doubts[:_MAX_LISTED]), len(doubts),
+    worst = tuple(_judged_limb(person, doubt) for person, doubt in doubts[:_MAX_LISTED])
+    shown, is_previewed = found.shown.name if found.shown is not None else "", found.plan is not None
+    return made_of(
+        observed.ObservationsMessage, found, sets=sets, shown=shown, is_previewed=is_previewed, people=judged,
+        worst=worst, off=len(doubts),
     )  # fmt: skip
 
 
