@@ -17,7 +17,7 @@ import * as timelineRoom from "./timeline/index.js";
 const context = model.mount();
 const panes = panesRoom.mount(context);
 const posing = posingRoom.mount(context, panes);
-const timeline = timelineRoom.mount(context, panes);
+const timeline = timelineRoom.mount(context, panes, posing);
 const search = searchRoom.mount(context, timeline);
 const scene = sceneRoom.mount(context, panes);
 const sessions = sessionsRoom.mount(context);

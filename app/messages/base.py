@@ -17,6 +17,7 @@ Frame: TypeAlias = Annotated[int, Meta(ge=0, le=MAX_INT)]
 Index: TypeAlias = Annotated[int, Meta(ge=0, le=MAX_INT)]
 Number: TypeAlias = Annotated[float, Meta(ge=-_MAX_NUMBER, le=_MAX_NUMBER)]
 Name: TypeAlias = Annotated[str, Meta(max_length=200)]
+Dofs: TypeAlias = Annotated[list[Index], Meta(min_length=1, max_length=1000)]
 
 GesturePhase: TypeAlias = Literal["start", "move", "end", "cancel"]
 Status: TypeAlias = Literal["", "good", "doubtful", "lost"]

@@ -96,6 +96,8 @@ class Plot(Part, frozen=True):
     unit: Literal["deg", "cm", "px"]
     labels: tuple[str, ...]
     """Names of the curves."""
+    dofs: tuple[int, ...]
+    """Degree of freedom of each curve; empty for costs."""
 
 
 class CurvesHeader(Message, frozen=True, tag="curves"):

@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from app.drawing.curves import CurveGroup
 from app.messages.annotation import AskNextClick, DecideTask, PlanTasks, ResolveComment, WriteComment
-from app.messages.base import Command, Frame, Index, Name, Number
+from app.messages.base import Command, Dofs, Frame, Index, Name, Number
 from app.messages.inspector import (
     AcquireSizes,
     ApplySizes,
@@ -178,6 +178,19 @@ class EditRange(Command, frozen=True, tag="range"):
     """Null for everybody. Tracking always moves everybody who is placed."""
 
 
+class EditCurves(Command, frozen=True, tag="range"):
+    """Smooth degrees of freedom of a person over a range, all but keyframes, or shift them, keyframes too."""
+
+    action: Literal["smooth", "shift"]
+    first: Frame
+    last: Frame
+    """Included."""
+    person: Index
+    dofs: Dofs
+    amount: Number
+    """Cutoff in hertz, or the shift in degrees or centimetres."""
+
+
 class CompareRange(Command, frozen=True, tag="compare_range"):
     """Compare the poses of a range with those that they replaced; null ends the comparison."""
 
@@ -257,7 +270,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     Drag, PoseEdit, DragPin, RemovePins, FitPose, TakeLimbBack,
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
     TakeCandidate, ShowLandscape, SetLandscapeDof, ShowCostMap, SetCostMapPlace, AskReason,
-    StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
+    StartTracking, ControlTracking, EditRange, EditCurves, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
     FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
     DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseClocks, UseObservations, WatchProvenance, UseCopy,

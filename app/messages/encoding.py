@@ -230,7 +230,7 @@ def curves(
     """
     model, cameras = session.people[person].model, [c.camera.name for c in session.cameras]
     plots = plots_of(model, cameras, group)
-    drawn = tuple(msgspec.convert({"title": p.title, "unit": p.unit, "labels": p.labels}, Plot) for p in plots)
+    drawn = tuple(msgspec.convert(p._asdict(), Plot) for p in plots)
     header = CurvesHeader(group, person, replace, len(frames), drawn)
     values = samples(model, plots, frames, rows)
     return encode_binary(header, np.asarray(frames, dtype="<u4").tobytes() + values.astype("<f4").tobytes())

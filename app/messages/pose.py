@@ -1,10 +1,8 @@
 """Messages from the page that change poses, as `base` explains."""
 
-from typing import Annotated, Literal, TypeAlias, Union
+from typing import Literal, TypeAlias, Union
 
-from msgspec import Meta
-
-from app.messages.base import Command, Frame, GesturePhase, Index, Name, Number
+from app.messages.base import Command, Dofs, Frame, GesturePhase, Index, Name, Number
 
 DragMode: TypeAlias = Literal["move", "turn", "push", "bend"]
 
@@ -49,13 +47,15 @@ class SetDof(_PoseEdit, frozen=True, tag="pose"):
     """Degrees or centimetres."""
 
 
-class TurnDof(_PoseEdit, frozen=True, tag="pose"):
-    """Step a degree of freedom."""
+class TurnDofs(_PoseEdit, frozen=True, tag="pose"):
+    """Step degrees of freedom, each clamped to its limits."""
 
     action: Literal["turn"]
-    dof: Index
-    by: Number
-    """Degrees or centimetres."""
+    dofs: Dofs
+    by: Number | None
+    """Degrees or centimetres, for each; null takes the drag back."""
+    drag: Index | None = None
+    """Number of the drag of curves, from whose start the step counts; null for a step from the shown pose."""
 
 
 class Nudge(_PoseEdit, frozen=True, tag="pose"):
@@ -116,7 +116,7 @@ class LockDofs(_PoseEdit, frozen=True, tag="pose"):
     """Lock or unlock degrees of freedom. Locks are stored with the session and are no entry of the history."""
 
     action: Literal["lock"]
-    dofs: Annotated[list[Index], Meta(max_length=1000)]
+    dofs: Dofs
     locked: bool
 
 
@@ -133,7 +133,7 @@ class HoldPoint(_PoseEdit, frozen=True, tag="pose"):
 
 
 PoseEdit: TypeAlias = Union[  # noqa: UP007
-    SetDof, TurnDof, Nudge, Mirror, CopyFrame, CopyPerson, TakeAlternative, ResetLimb, LockDofs, HoldPoint
+    SetDof, TurnDofs, Nudge, Mirror, CopyFrame, CopyPerson, TakeAlternative, ResetLimb, LockDofs, HoldPoint
 ]
 
 

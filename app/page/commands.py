@@ -3,13 +3,15 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from app.control.controller import Controller
 from app.messages import client as wire
 from app.messages import pose as pose_wire
 from app.messages.base import Command
 from app.messages.parsing import MessageError
 from app.page.inspector_commands import INSPECTOR_COMMANDS
-from app.page.pose_commands import POSE_COMMANDS, check_point
+from app.page.pose_commands import POSE_COMMANDS, check_point, display_factor
 from app.page.search_commands import SEARCH_COMMANDS
 
 
@@ -117,6 +119,12 @@ def _range(controller: Controller, _: int, message: wire.EditRange) -> None:
             ranges.mark(first, last, mark, people)
 
 
+def _curves(controller: Controller, _: int, message: wire.EditCurves) -> None:
+    factors = np.array([display_factor(controller, message.person, dof) for dof in message.dofs])
+    amount = message.amount / (1.0 if message.action == "smooth" else factors)
+    controller.ranges.edit_curves(message.first, message.last, message.person, message.dofs, message.action, amount)
+
+
 def _compare_range(controller: Controller, _: int, message: wire.CompareRange) -> None:
     if message.first is None or message.last is None:
         controller.comparing_runs.leave()
@@ -159,6 +167,7 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.StartTracking: lambda controller, _, m: controller.tracking.start(m.action == "backward", m.until),
     wire.ControlTracking: _control_tracking,
     wire.EditRange: _range,
+    wire.EditCurves: _curves,
     wire.CompareRange: _compare_range,
     wire.StopRange: lambda controller, _, __: controller.ranges.stop(),
     wire.ToggleMark: _mark,

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from app.control.controller import Controller
 from app.drawing import dof_labels
 from app.messages import pose as wire
@@ -11,13 +13,17 @@ from app.messages.parsing import MessageError
 
 
 def _set(controller: Controller, _: int, message: wire.SetDof) -> None:
-    value = message.value / _display_factor(controller, message.person, message.dof)
+    value = message.value / display_factor(controller, message.person, message.dof)
     controller.pose_edits.set_dof(message.person, message.dof, value, message.frame)
 
 
-def _turn(controller: Controller, _: int, message: wire.TurnDof) -> None:
-    by = message.by / _display_factor(controller, message.person, message.dof)
-    controller.pose_edits.turn(message.person, message.dof, by, message.frame)
+def _turn(controller: Controller, _: int, message: wire.TurnDofs) -> None:
+    factors = [display_factor(controller, message.person, dof) for dof in message.dofs]
+    if message.by is not None:
+        steps = message.by / np.array(factors)
+        controller.pose_edits.turn(message.person, message.dofs, steps, message.frame, message.drag)
+    elif message.drag is not None:
+        controller.pose_edits.cancel_drag(message.dofs, message.drag)
 
 
 def _nudge(controller: Controller, _: int, message: wire.Nudge) -> None:
@@ -39,7 +45,7 @@ def _reset(controller: Controller, _: int, message: wire.ResetLimb) -> None:
 
 def _lock(controller: Controller, _: int, message: wire.LockDofs) -> None:
     for dof in message.dofs:
-        _display_factor(controller, message.person, dof)
+        display_factor(controller, message.person, dof)
     controller.dof_locks.set(message.person, message.dofs, message.locked)
 
 
@@ -50,7 +56,7 @@ def _hold(controller: Controller, _: int, message: wire.HoldPoint) -> None:
 
 POSE_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetDof: _set,
-    wire.TurnDof: _turn,
+    wire.TurnDofs: _turn,
     wire.Nudge: _nudge,
     wire.Mirror: lambda controller, _, m: controller.pose_edits.mirror(m.person, m.frame),
     wire.CopyFrame: lambda controller, _, m: controller.pose_edits.copy_from(m.person, m.source, m.frame),
@@ -62,7 +68,7 @@ POSE_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
 }
 
 
-def _display_factor(controller: Controller, person: int, dof: int) -> float:
+def display_factor(controller: Controller, person: int, dof: int) -> float:
     """Return the factor from radians or metres to degrees or centimetres."""
     model = controller.models[person]
     if dof >= model.n_dofs:

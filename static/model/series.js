@@ -4,7 +4,7 @@
 
 /**
  * @typedef {import("./protocol.js").CurvesHeader} CurvesHeader
- * @typedef {{plot: number, label: string, values: Float32Array}} Series
+ * @typedef {{plot: number, label: string, dof: number | null, values: Float32Array}} Series dof: null for costs
  * @typedef {{group: import("./protocol.js").CurveGroup, person: number, plots: import("./protocol.js").Plot[],
  *   series: Series[], raw: Float32Array[]}} Curves `values` are drawn; `raw` has angles within one turn, as received
  */
@@ -19,7 +19,7 @@
  * @returns {Curves}
  */
 export function mergeCurves(previous, { group, person, replace, count, plots }, payload, frameCount) {
-  const labels = plots.flatMap(({ labels, unit }, plot) => labels.map((label) => ({ plot, label, unit })));
+  const labels = plots.flatMap(({ labels, unit, dofs }, plot) => labels.map((label, i) => ({ plot, label, unit, dof: dofs[i] ?? null })));
   const frames = new Uint32Array(payload, 0, count);
   const goesOn = !replace && previous?.group === group && previous.person === person && previous.raw.length === labels.length;
   const raw = goesOn ? previous.raw : labels.map(() => new Float32Array(frameCount).fill(NaN));
@@ -27,11 +27,7 @@ export function mergeCurves(previous, { group, person, replace, count, plots }, 
     const news = new Float32Array(payload, 4 * count * (index + 1), count);
     for (let i = 0; i < count; i += 1) values[frames[i]] = news[i];
   });
-  const series = labels.map(({ plot, label, unit }, index) => ({
-    plot,
-    label,
-    values: unit === "deg" ? unwrapped(raw[index]) : raw[index],
-  }));
+  const series = labels.map(({ unit, ...curve }, index) => ({ ...curve, values: unit === "deg" ? unwrapped(raw[index]) : raw[index] }));
   return { group, person, plots, series, raw };
 }
 

@@ -5,6 +5,7 @@
  */
 
 import { byId } from "../widgets/elements.js";
+import { CurveEdits } from "./curve_edits.js";
 import { EpipolarCheck } from "./epipolar_check.js";
 import { mountFrameCard } from "./frame_card.js";
 import { JointBar } from "./joint_bar.js";
@@ -31,5 +32,6 @@ export function mount({ store, send, say, reasons }, { grid }) {
   mountFrameCard(store, posing);
   mountPinBar(store, pinning);
   const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...epipolarBindings(epipolar, reasons.away), ...depthBindings(store, grid, reasons.away)];
-  return { posing, pinning, epipolar, bindings };
+  const curveEdits = new CurveEdits(store, posing, send);
+  return { posing, curveEdits, pinning, epipolar, bindings };
 }

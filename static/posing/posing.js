@@ -135,7 +135,20 @@ export class Posing {
     const { dof } = this.#store.facts;
     const info = dof === null ? undefined : this.person?.dofs[dof];
     if (dof === null || !info) return;
-    this.#gather(`turn ${dof}`, { ...this.#head(), action: "turn", dof, by: factor * this.#steps[info.unit] });
+    this.turnDofs([dof], factor * this.#steps[info.unit]);
+  }
+
+  /**
+   * Step degrees of freedom by a number of degrees or centimetres.
+   *
+   * @param {number[]} dofs
+   * @param {number | null} by null takes the drag back
+   * @param {{drag: number, frame: number} | null} drag its number and frame, from whose start the step counts
+   */
+  turnDofs(dofs, by, drag = null) {
+    const step = { ...this.#head(), ...drag, action: /** @type {const} */ ("turn"), dofs, by };
+    if (by === null) this.#edit(step);
+    else this.#gather(`turn ${dofs} ${drag?.drag}`, step);
   }
 
   /**
@@ -268,7 +281,7 @@ export class Posing {
       waits.right += step.right;
       waits.up += step.up;
     } else if (waits?.action === "turn" && step.action === "turn") {
-      waits.by += step.by;
+      waits.by = (step.drag == null ? (waits.by ?? 0) : 0) + (step.by ?? 0);
     } else if (waits?.action === "set" && step.action === "set") {
       waits.value = step.value;
     } else {

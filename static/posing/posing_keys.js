@@ -1,6 +1,7 @@
 /** Keys that edit poses and pins. */
 
 import { inArea } from "../widgets/key_matching.js";
+import { factorOf } from "../widgets/number_field.js";
 
 /** @type {[string, string, import("./posing.js").Way][]} */
 const WAYS = [
@@ -26,7 +27,7 @@ export function posingBindings(posing, jointBar, why) {
       label: `Move the joint or body one step ${name} in the active view (Shift: ×10, Ctrl: ×0.1)`,
       matches: (/** @type {KeyboardEvent} */ event) =>
         event.key === `Arrow${name[0].toUpperCase()}${name.slice(1)}` && !event.altKey && !event.metaKey,
-      run: (/** @type {KeyboardEvent} */ event) => posing.nudge(way, event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1),
+      run: (/** @type {KeyboardEvent} */ event) => posing.nudge(way, factorOf(event)),
     })),
     { keys: ["U"], label: "Next degree of freedom", run: () => posing.nextDof() },
     { keys: ["+"], label: "Increase the selected degree of freedom by one step", matches: sign(["+", "="]), run: () => posing.turn(1) },

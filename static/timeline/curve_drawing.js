@@ -2,6 +2,7 @@
 
 import { drawWithin, setText } from "../widgets/canvas.js";
 import { roundUp } from "../widgets/frame_axis.js";
+import { SOURCES, keyframesOf } from "../model/cells.js";
 import { extent, trace } from "../model/series.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
 import { drawDiamond } from "./cell_marks.js";
@@ -16,43 +17,119 @@ import { markPositions } from "./timeline_drawing.js";
 const TICKS_HEIGHT = 16;
 const PLOT_GAP = 6;
 const TICK_GAP = 22;
+/** Distance of the pointer within which it takes a point. */
+const REACH = 8;
+/** Least distance of frames whose poses are dots. */
+const DOT_GAP = 6;
+/** Opacity of interpolated stretches. */
+const FAINT = 0.45;
+const INTERPOLATED = SOURCES.indexOf("interpolated");
 /** Minimum range of a plot, so that small changes do not look large. */
 const MIN_SPAN = { deg: 20, cm: 10, px: 1 };
 const UNITS = { deg: "degrees", cm: "cm", px: "px" };
 
 /**
+ * Draw all plots. Keyframes are diamonds on the curves, other poses dots where there is room; stretches that are interpolated
+ * are faint, and chosen curves thick.
+ *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
+ * @param {{curves: Curves, labels: string[], scales: Scale[], cells: import("../model/cells.js").Cells, chosen: number[]}} look
+ *   labels: names of curves in the order of their colours; chosen: degrees of freedom
  * @param {number} height
- * @param {Curves} curves
- * @param {string[]} labels all names of curves, in the order of their colours
- * @param {Set<string>} hidden names of the curves that are switched off
- * @param {Iterable<number>} keyframes
  * @param {CSSStyleDeclaration} style
  */
-export function drawCurves(context, axis, height, curves, labels, hidden, keyframes, style) {
-  const each = (height - TICKS_HEIGHT - PLOT_GAP * (curves.plots.length - 1)) / curves.plots.length;
-  const keys = markPositions(keyframes, axis);
+export function drawCurves(context, axis, { curves, labels, scales, cells, chosen }, height, style) {
+  const keys = markPositions(keyframesOf(cells), axis);
+  const isPosed = (/** @type {number} */ frame) => cells.sources[frame] !== INTERPOLATED;
   curves.plots.forEach((plot, index) => {
-    const series = curves.series.filter((one) => one.plot === index && !hidden.has(one.label));
-    const top = index * (each + PLOT_GAP);
-    const scale = scaleOf(plot.unit, series.map(({ values }) => values), top, top + each);
+    const scale = scales[index];
     drawFrame(context, axis, scale, style);
     drawKeyframes(context, keys, scale, style);
     drawWithin(context, { ...scale, left: axis.left, right: axis.right }, () => {
-      context.lineWidth = 1.4;
       context.lineJoin = "round";
-      for (const { label, values } of series) {
-        const path = new Path2D();
-        trace(path, values, axis, (value) => toY(scale, value));
-        context.strokeStyle = style.getPropertyValue(colorName(labels.indexOf(label)));
-        context.setLineDash(dashOf(labels.indexOf(label)));
-        context.stroke(path);
+      for (const { label, values, dof } of curves.series.filter((one) => one.plot === index)) {
+        const y = (/** @type {number} */ value) => toY(scale, value);
+        const color = labels.indexOf(label);
+        context.strokeStyle = context.fillStyle = style.getPropertyValue(colorName(color));
+        context.setLineDash(dashOf(color));
+        context.lineWidth = dof !== null && chosen.includes(dof) ? 2.6 : 1.4;
+        context.globalAlpha = FAINT;
+        strokeCurve(context, values.map((value, frame) => ([-1, 0, 1].every((step) => isPosed(frame + step)) ? NaN : value)), axis, y);
+        context.globalAlpha = 1;
+        strokeCurve(context, values.map((value, frame) => (isPosed(frame) ? value : NaN)), axis, y);
+        context.setLineDash([]);
+        for (let frame = axis.first; axis.pitch >= DOT_GAP && frame <= axis.last; frame += 1) {
+          if (isPosed(frame)) context.fillRect(axis.middle(frame) - 1.5, y(values[frame]) - 1.5, 3, 3);
+        }
+        for (const x of keys) drawDiamond(context, x, y(values[axis.frameAt(x)]), 4);
       }
     });
-    drawTitle(context, axis, top, `${plot.title}, ${UNITS[plot.unit]}`, style);
+    drawTitle(context, axis, scale.top, `${plot.title}, ${UNITS[plot.unit]}`, style);
   });
   drawFrameNumbers(context, axis, height, style);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Float32Array} values
+ * @param {FrameAxis} axis
+ * @param {(value: number) => number} y
+ */
+function strokeCurve(context, values, axis, y) {
+  const path = new Path2D();
+  trace(path, values, axis, y);
+  context.stroke(path);
+}
+
+/**
+ * Scales of the plots, which lie below one another.
+ *
+ * @param {Curves} curves
+ * @param {number} height
+ */
+export function scalesOf({ plots, series }, height) {
+  const each = (height - TICKS_HEIGHT - PLOT_GAP * (plots.length - 1)) / plots.length;
+  return plots.map(({ unit }, plot) => {
+    const top = plot * (each + PLOT_GAP);
+    return scaleOf(unit, series.filter((one) => one.plot === plot).map(({ values }) => values), top, top + each);
+  });
+}
+
+/**
+ * The curve whose value on a frame is nearest to a place, within the reach of the pointer; those chosen come first.
+ *
+ * @param {{curves: Curves, scales: Scale[], chosen: number[]}} look
+ * @param {FrameAxis} axis
+ * @param {{x: number, y: number}} at
+ */
+export function pointAt({ curves, scales, chosen }, axis, { x, y }) {
+  const frame = axis.frameAt(x);
+  let found = null;
+  if (!axis.shows(frame) || Math.abs(axis.middle(frame) - x) > Math.max(REACH, axis.pitch / 4)) return null;
+  for (const { dof, plot, values } of curves.series) {
+    const at = toY(scales[plot], values[frame]);
+    const distance = Math.abs(at - y) - (dof !== null && chosen.includes(dof) ? REACH / 2 : 0);
+    if (dof !== null && distance <= (found?.distance ?? REACH)) found = { dof, frame, plot, y: at, distance };
+  }
+  return found;
+}
+
+/**
+ * Draw rings around points.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {{x: number, y: number}[]} points
+ * @param {string} color
+ */
+export function drawRings(context, points, color) {
+  context.strokeStyle = color;
+  context.lineWidth = 2;
+  for (const { x, y } of points) {
+    context.beginPath();
+    context.arc(x, y, 6, 0, 2 * Math.PI);
+    context.stroke();
+  }
 }
 
 /**
@@ -78,7 +155,7 @@ function scaleOf(unit, curves, top, bottom) {
  * @param {Scale} scale
  * @param {number} value
  */
-function toY({ top, bottom, min, max }, value) {
+export function toY({ top, bottom, min, max }, value) {
   return bottom - ((bottom - top) * (value - min)) / (max - min);
 }
 
@@ -135,7 +212,6 @@ function drawKeyframes(context, xs, { top, bottom }, style) {
   context.globalAlpha = 0.35;
   for (const x of xs) context.fillRect(x - 0.5, top, 1, bottom - top);
   context.globalAlpha = 1;
-  for (const x of xs) drawDiamond(context, x, bottom - 4, 3.5);
 }
 
 /**

@@ -1,11 +1,11 @@
 /**
  * Timeline: navigation through the recording, ranges of frames, tracking, and the drawer with its curves.
  *
- * The room imports `widgets`, `model` and `panes`.
+ * The room imports `widgets`, `model`, `panes` and `posing`.
  */
 
 import { byId } from "../widgets/elements.js";
-import { mountCurves } from "./curves.js";
+import { mountCurveTools, mountCurves } from "./curves.js";
 import { mountDoubtList } from "./doubt_list.js";
 import { DoubtQueue } from "./doubt_queue.js";
 import { Drawer } from "./drawer.js";
@@ -15,7 +15,7 @@ import { Jumps } from "./jumps.js";
 import { Playback } from "./playback.js";
 import { mountRangeBar } from "./range_bar.js";
 import { mountTimeline } from "./timeline.js";
-import { drawerBindings, frameBindings, queueBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
+import { curveBindings, drawerBindings, frameBindings, queueBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
 import { mountTrackBar } from "./track_bar.js";
 import { mountTransport } from "./transport.js";
 
@@ -26,8 +26,9 @@ import { mountTransport } from "./transport.js";
  *
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
+ * @param {import("../posing/index.js").PosingRoom} posing
  */
-export function mount({ store, actions, navigation, reasons }, { grid }) {
+export function mount({ store, actions, navigation, reasons, say }, { grid }, { curveEdits }) {
   const playback = new Playback(store, navigation);
   const queue = new DoubtQueue(store, navigation, actions, grid);
   const jumps = new Jumps(store, navigation, (frame) => queue.arriveAt(frame));
@@ -38,13 +39,15 @@ export function mount({ store, actions, navigation, reasons }, { grid }) {
   mountRangeBar(store, actions, () => drawer.open("runs"));
   mountJumpMenu(store, jumps, () => drawer.open("doubts"));
   mountDoubtList(store, queue);
-  mountCurves(store, navigation, actions, frameWindow);
+  mountCurves(store, navigation, actions, frameWindow, curveEdits);
+  mountCurveTools(store, curveEdits, say);
   mountTimeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWindow });
   const bindings = [
     ...frameBindings(navigation, playback),
     ...trackBindings(store, actions, reasons),
     ...timelineBindings({ store, actions, playback, jumps, frameWindow, reasons }),
     ...drawerBindings(drawer),
+    ...curveBindings(curveEdits),
     ...queueBindings(queue, reasons.away),
   ];
   return { bindings, drawer, jumps, queue };

@@ -56,6 +56,18 @@ export function drawerBindings(drawer) {
   ]);
 }
 
+/** @param {import("../posing/curve_edits.js").CurveEdits} edits */
+export function curveBindings(edits) {
+  const { why } = edits;
+  const whyNone = () => (edits.choices.length > 0 ? null : "No curve can be edited here. Press C, and choose Arms, Torso or Legs.");
+  return inArea("Posing", [
+    { keys: [], label: "Curves: choose the next curve (U in the curves)", why: whyNone, run: () => edits.next(false) },
+    { keys: [], label: "Curves: choose one more curve (Shift+U in the curves)", why: whyNone, run: () => edits.next(true) },
+    { keys: [], label: "Curves: raise the chosen values by one step (↑ in the curves)", why, run: () => edits.step(1) },
+    { keys: [], label: "Curves: lower the chosen values by one step (↓ in the curves)", why, run: () => edits.step(-1) },
+  ]);
+}
+
 /**
  * @param {import("./doubt_queue.js").DoubtQueue} queue
  * @param {() => string | null} away

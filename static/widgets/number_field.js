@@ -8,6 +8,11 @@ import { make } from "./elements.js";
  * @property {(text: string) => void} show set the text to display while the user is not typing
  */
 
+/** Multiple of a step that a key with Shift or Ctrl takes. @param {KeyboardEvent} event */
+export function factorOf(event) {
+  return event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1;
+}
+
 /**
  * @param {object} options
  * @param {string} options.name for screen readers
@@ -54,7 +59,7 @@ export function numberField({ name, take, refuse, step }) {
       element.blur();
     } else if (step && (event.key === "ArrowUp" || event.key === "ArrowDown")) {
       event.preventDefault();
-      if (apply()) step((event.key === "ArrowUp" ? 1 : -1) * (event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1));
+      if (apply()) step((event.key === "ArrowUp" ? 1 : -1) * factorOf(event));
     }
   });
   return {

@@ -71,10 +71,10 @@ DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None
 ]
 ANGLES = ("abduction", "elevation", "twist", "extension")
 PLOTS = {
-    "arms": [("Left arm", "deg", ANGLES), ("Right arm", "deg", ANGLES)],
-    "legs": [("Left leg", "deg", ANGLES), ("Right leg", "deg", ANGLES)],
-    "torso": [("Angles", "deg", ANGLES[:3]), ("Position", "cm", ("x", "y", "z"))],
-    "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
+    "arms": [("Left arm", "deg", ANGLES, (4, 5, 6, 3)), ("Right arm", "deg", ANGLES, (7, 8, 9, 10))],
+    "legs": [("Left leg", "deg", ANGLES, (11, 12, 13, 14)), ("Right leg", "deg", ANGLES, (15, 16, 17, 18))],
+    "torso": [("Angles", "deg", ANGLES[:3], (4, 5, 6)), ("Position", "cm", ("x", "y", "z"), (0, 1, 2))],
+    "cost": [("Cost", "px", ("mean", *CAMERA_NAMES), ())],
 }
 TRACK = {"method": "chamfer", "stride": 1, "cameras": [], "options": {}}
 SEARCH = {
@@ -422,7 +422,7 @@ class FakeEndpoint:
         )
         header = {
             "type": "curves", "group": self.curves_group, "person": 0, "replace": replace, "count": len(frames),
-            "plots": [{"title": title, "unit": unit, "labels": labels} for title, unit, labels in plots],
+            "plots": [dict(zip(("title", "unit", "labels", "dofs"), plot, strict=True)) for plot in plots],
         }  # fmt: skip
         await self.send_binary(header, frames.astype("<u4").tobytes() + values.astype("<f4").tobytes())
 

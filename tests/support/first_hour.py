@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import numpy as np
-from page_driver import state_of
+from page_driver import frame_place, state_of
 from scripted_user import TRUNK, ScriptedUser
 
 from tracker.errors import FormatError
@@ -25,8 +25,6 @@ OFF_PX = 8
 """A joint that looks further off than this on the screen is corrected, CSS px."""
 CORRECTED = 4
 """At most so many joints of a frame are corrected, each in two views."""
-GUTTER_PX, PADDING_PX = 52, 8
-"""What of the timeline is left and right of its frames."""
 DONE = (
     "!quadrille.state.state.job.running && !quadrille.state.state.track.running "
     "&& !quadrille.state.state.range.running && quadrille.state.state.saved"
@@ -152,15 +150,12 @@ class Hour:
 
     async def mark(self, first, last):
         """Mark a range on the timeline."""
-        box = await self.page.locator("#timeline").bounding_box()
-        left, width = box["x"] + GUTTER_PX, box["width"] - GUTTER_PX - PADDING_PX
-        x = [round(left + width * (frame + 0.5) / self.session.n_frames) for frame in (first, last)]
-        y = box["y"] + box["height"] / 3
+        start, end = [await frame_place(self.page, frame, 1 / 3, is_whole=True) for frame in (first, last)]
         self.stranger.stages[-1].mouse += 1
         await self.page.keyboard.down("Shift")
-        await self.page.mouse.move(x[0], y)
+        await self.page.mouse.move(*start)
         await self.page.mouse.down()
-        await self.page.mouse.move(x[1], y, steps=4)
+        await self.page.mouse.move(*end, steps=4)
         await self.page.mouse.up()
         await self.page.keyboard.up("Shift")
         await self.stranger.until(f"quadrille.state.range?.first === {first} && quadrille.state.range.last === {last}")

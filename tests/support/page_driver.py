@@ -4,6 +4,9 @@ import asyncio
 import json
 from contextlib import asynccontextmanager
 
+GUTTER_PX, PADDING_PX = 52, 8
+"""Left of the frames on timeline and curves, and right of them."""
+
 OPENED = "window.quadrille?.state.overlay && quadrille.state.overlay.frame === quadrille.state.shown?.frame"
 """That a page shows its first frame, for `shows`."""
 
@@ -92,6 +95,33 @@ def drags_of(page):
 
 async def state_of(page):
     return await page.evaluate("quadrille.state")
+
+
+async def frame_place(page, frame, share=0.5, chart="#timeline", is_whole=False):
+    """Place of a frame at a share of the height of a chart, window pixels; `is_whole`: of the overview."""
+    box, state = await page.locator(chart).bounding_box(), await state_of(page)
+    span = (not is_whole and state["visible"]) or {"start": 0, "end": state["session"]["n_frames"]}
+    at = (frame + 0.5 - span["start"]) / (span["end"] - span["start"])
+    return box["x"] + GUTTER_PX + at * (box["width"] - GUTTER_PX - PADDING_PX), box["y"] + share * box["height"]
+
+
+async def point_of_curve(page, index, frame):
+    """Place of a point of the upper plot of curves, as the pointer finds it with all other curves hidden."""
+    for other in {0, 1, 2, 3} - {index}:
+        await page.locator(".legend-switch").nth(other).click()
+    for percent in range(1, 50, 2):
+        x, y = await frame_place(page, frame, percent / 100, "#curves")
+        await page.mouse.move(x, y)
+        if await page.evaluate("document.querySelector('#curves').classList.contains('is-grab')"):
+            return x, y + 5
+    raise AssertionError(f"no point of curve {index} on frame {frame} can be dragged")
+
+
+async def drag_up(page, at, by_px):
+    """Drag from a place upwards, and hold the button."""
+    await page.mouse.move(*at)
+    await page.mouse.down()
+    await page.mouse.move(at[0], at[1] - by_px, steps=3)
 
 
 @asynccontextmanager

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
-from tracker.errors import SessionError
+from tracker.errors import SessionError, TrackerError
 from tracker.session.session import Person
 from tracker.validation import check
 
@@ -39,3 +40,13 @@ def locks_setting(people: Sequence[Person], locks: Sequence[Collection[int]]) ->
 def active_dofs(model: BodyModel, locked: Collection[int]) -> NDArray[np.bool_]:
     """Return which degrees of freedom of a body are not locked, (n_dofs,)."""
     return ~np.isin(np.arange(model.n_dofs), list(locked))
+
+
+def require_unlocked(model: BodyModel, locked: Collection[int], dofs: Collection[int]) -> None:
+    """Check that no degree of freedom of an edit is locked.
+
+    Raises:
+        TrackerError: one is.
+    """
+    for dof in sorted({*locked} & {*dofs}):
+        raise TrackerError(f"{display_name(model.dof_names[dof])} is locked; unlock it to change it")

@@ -13,10 +13,12 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.posing import grab as grabbing
-from tracker.estimation.posing.drag import drag
+from tracker.estimation.posing.dof_series import move_dofs
+from tracker.estimation.posing.drag import drag as drag_to
 from tracker.estimation.posing.edits import copy_dofs, copy_joint_angles, limb_of, mirror_pose, poses_along
 from tracker.estimation.posing.orient import orient
 from tracker.geometry.arrays import Array
+from tracker.session.locked_dofs import require_unlocked
 
 _SAME_GESTURE_S = 1.0
 """Maximum time between changes of one slider, or steps of one joint, that make one entry of the history."""
@@ -36,6 +38,7 @@ class PoseEdits:
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
+        self._dragged: tuple[object, Array] = None, np.empty(0)  # the last drag of `turn`, and the pose at its start
 
     def set_dof(self, person: int, dof: int, value: float, frame: int | None = None) -> None:
         """Set one degree of freedom, clipped to its limits.
@@ -52,9 +55,9 @@ class PoseEdits:
             TrackerError: it is locked.
         """
         with self._on(person, frame) as model:
-            dof_values = self._dof_values(person)
-            dof_values[dof] = value
-            self._set_dof_values(person, dof, dof_values, f"set {display_name(model.dof_names[dof])}")
+            before = self._session_state.state.poses[person]
+            by = value - model.difference(before, model.neutral())[dof]
+            self._move(person, [dof], by, before, f"set {display_name(model.dof_names[dof])}", ("dof", dof))
 
     def set_along(self, person: int, dofs: Sequence[int], values: Sequence[float]) -> None:
         """Set degrees of freedom to a place in a landscape or map of the cost, rad or metres, see `poses_along`.
@@ -66,8 +69,7 @@ class PoseEdits:
         is_known = 0 <= person < len(models) and all(0 <= dof < models[person].n_dofs for dof in dofs)
         if not is_known or not np.isfinite(values).all():
             raise TrackerError("expected finite values of the body's degrees of freedom, found others; reload the page")
-        if locked := [models[person].dof_names[d] for d in dofs if d in self._session_state.state.locked[person]]:
-            raise TrackerError(f"expected degrees of freedom that may move, found {locked[0]} locked; unlock it first")
+        require_unlocked(models[person], self._session_state.state.locked[person], dofs)
         with self._on(person, None) as model:
             (moved,) = poses_along(model, self._session_state.state.poses[person], dofs, np.array([values]))
             names = " and ".join(display_name(model.dof_names[d]) for d in dofs)
@@ -88,12 +90,36 @@ class PoseEdits:
             before = self._session_state.state.poses[person]
             self._apply(person, copy_dofs(model, before, model.clip(values), free), "set pose")
 
-    def turn(self, person: int, dof: int, by: float, frame: int | None = None) -> None:
-        """Change one degree of freedom by a step, rad or metres; see `set_dof`."""
+    def turn(
+        self, person: int, dofs: Sequence[int], by: Array | float, frame: int | None = None, drag: int | None = None
+    ) -> None:
+        """Change degrees of freedom by steps, each clipped to its limits; see `set_dof`.
+
+        Args:
+            person: index of the person.
+            dofs: indices of the degrees of freedom.
+            by: their steps, rad or metres, one for all or one for each.
+            frame: as for `set_dof`.
+            drag: number of the drag that the steps belong to. They count from the pose at its start, and its changes
+                make one entry of the history however long it lasts; None for steps from the shown pose.
+
+        Raises:
+            TrackerError: one of them is locked.
+        """
         with self._on(person, frame) as model:
-            dof_values = self._dof_values(person)
-            dof_values[dof] += by
-            self._set_dof_values(person, dof, dof_values, f"nudge {display_name(model.dof_names[dof])}")
+            state = self._session_state.state
+            if self._dragged[0] != (drag, person, state.frame) or drag is None:
+                self._dragged = (drag, person, state.frame), state.poses[person]
+            name = display_name(model.dof_names[dofs[0]]) if len(dofs) == 1 else f"{len(dofs)} curves"
+            label, gesture = f"{'nudge' if drag is None else 'drag'} {name}", ("dof", *dofs, drag)
+            self._move(person, dofs, by, self._dragged[1], label, gesture, lasting=drag is not None)
+
+    def cancel_drag(self, dofs: Sequence[int], drag: int) -> None:
+        """Take a drag of degrees of freedom back, unless something else has been edited since; see `turn`."""
+        with self._session_state.lock:
+            owner = self._session_state.open_edit_owner
+            if isinstance(owner, tuple) and owner[-1] == ("dof", *dofs, drag):
+                self._session_state.revert(owner)
 
     def nudge(
         self, person: int, point: str | None, camera: int, right_m: float, up_m: float, frame: int | None = None
@@ -124,7 +150,7 @@ class PoseEdits:
                 )
             hand = grabbing.grab(model, values, view, name, start, self._session_state.drag_constraints(person))
             label = f"nudge {display_name(name)}"
-            self._apply(person, drag(hand, end, values), label, ("nudge", name, camera))
+            self._apply(person, drag_to(hand, end, values), label, ("nudge", name, camera))
 
     def place_part(self, person: int, part: int, R_world: Array, position_world: Array | None, gesture: object) -> None:
         """Turn a part to an orientation, as far as its joint allows; the root also moves to a position.
@@ -207,17 +233,15 @@ class PoseEdits:
             self._session_state.go_to(frame)
             yield self._session_state.models[person]
 
-    def _dof_values(self, person: int) -> Array:
-        """Return the pose as one value for each degree of freedom, (n_dofs,), rad or metres."""
+    def _move(
+        self, person: int, dofs: Sequence[int], by: Array | float, before: Array, label: str, gesture: object,
+        lasting: bool = False,
+    ) -> None:  # fmt: skip
+        """Move degrees of freedom of a pose, (n_values,), and show and save it; see `_apply`."""
         model = self._session_state.models[person]
-        return model.difference(self._session_state.state.poses[person], model.neutral())
-
-    def _set_dof_values(self, person: int, dof: int, dof_values: Array, label: str) -> None:
-        model, before = self._session_state.models[person], self._session_state.state.poses[person]
-        if dof in self._session_state.state.locked[person]:
-            raise TrackerError(f"{display_name(model.dof_names[dof])} is locked; unlock it to change it")
-        changed = model.clip(model.retract(model.neutral(), dof_values))
-        self._apply(person, copy_dofs(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
+        require_unlocked(model, self._session_state.state.locked[person], dofs)
+        moved = move_dofs(model, before[None], dofs, by)[0]
+        self._apply(person, moved, label, gesture, lasting)
 
     def _apply(self, person: int, values: Array, label: str, gesture: object = None, lasting: bool = False) -> None:
         """Show and save a pose.

@@ -3,36 +3,20 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Literal
-
-import numpy as np
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
 from app.control.tracking.comparing_runs import nothing_replaced
+from app.control.tracking.range_changes import AT_ONCE, Mark, edited, interpolated, marked
 from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.progress import RangeState
-from tracker.body.motion.interpolation import interpolate_pose
 from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array
 from tracker.pipeline.audit import AuditPlan, PoseAudit
-from tracker.session.store.records import (
-    BETWEEN,
-    AssessmentChange,
-    Change,
-    FrameRow,
-    MarkChange,
-    PoseChange,
-    PoseRecord,
-)
-
-Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]
-"""`unreviewed` leaves keyframes unchanged; `none` removes the mark of keyframes too."""
-
-_AT_ONCE = 500
-"""Frames written at once; shorter work is done before the call returns."""
+from tracker.session.store.records import AssessmentChange, Change, FrameRow, PoseChange, PoseRecord
 
 Step = Sequence[Change] | float
 """Changes to write, or the share of the work before them that is done, 0 to 1."""
@@ -97,8 +81,9 @@ class Ranges:
                     "set a pose at each end first"
                 )
             poses = [(i, frame) for i, start, end in gaps for frame in range(start + 1, end)]
+            changes = _pieces(change for gap in gaps for change in interpolated(self._session_state, *gap))
             run = _Run(self._label(f"interpolate frames {first} to {last}", people), "interpolated", by_program=True)
-            self._begin(run, "interpolating", poses, _pieces(c for gap in gaps for c in self._filled(*gap)))
+            self._begin(run, "interpolating", poses, changes)
 
     def clear(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
         """Remove the poses of a range, except keyframes.
@@ -129,11 +114,31 @@ class Ranges:
             rows = self._rows(first, last, people)
             if not rows:
                 raise TrackerError(f"expected poses in frames {first} to {last} to mark, found none; set or track some")
-            marked = {(i, row.frame): c for i, row in rows if (c := _marked(self._name(i), row, mark)) is not None}
+            changes = {(i, row.frame): c for i, row in rows if (c := marked(self._name(i), row, mark)) is not None}
             where = f"frame {first}" if first == last else f"frames {first} to {last}"
             how = {"keyframe": "as keyframe", "none": "as no keyframe"}.get(mark, f"as {mark}")
             run = _Run(self._label(f"mark {where} {how}", people), "marked", by_program=False)
-            self._begin(run, "marking", list(marked), _pieces(marked.values()))
+            self._begin(run, "marking", list(changes), _pieces(changes.values()))
+
+    def edit_curves(
+        self, first: int, last: int, person: int, dofs: Sequence[int], verb: str, amount: Array | float
+    ) -> None:
+        """Smooth or shift degrees of freedom of a person over a range; see `range_changes.edited`.
+
+        Raises:
+            TrackerError: nothing can change.
+        """
+        first, last = self._within(first, last)
+        with self._activities.editing():
+            changes = edited(self._session_state, person, range(first, last + 1), dofs, verb, amount)
+            if not changes:
+                raise TrackerError(
+                    f"expected poses in frames {first} to {last} that can be {verb}ed, found none; "
+                    "remove the marks of keyframes, or mark another range"
+                )
+            label = self._label(f"{verb} curves of frames {first} to {last}", [person])
+            run = _Run(label, f"{verb}ed", by_program=False)
+            self._begin(run, f"{verb}ing", [(person, c.frame) for c in changes], _pieces(changes))
 
     def estimate(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
         """Estimate the poses of a range again from all its frames together; keyframes stay, nothing is tracked.
@@ -258,7 +263,7 @@ class Ranges:
             lambda: steps, lambda step, _: self._take(run, step), lambda error: self._ended(run, error), lambda: None
         )
         self._run = run
-        if len(poses) <= _AT_ONCE and not run.before:
+        if len(poses) <= AT_ONCE and not run.before:
             try:
                 for step in steps:
                     self._take(run, step)
@@ -348,29 +353,6 @@ class Ranges:
         stay = [row.frame for row in rows if row.keyframe or row.frame in (first, last)]
         return ((a, b) for a, b in pairwise(stay) if b - a > 1)
 
-    def _filled(self, person: int, start: int, end: int) -> Iterator[PoseChange]:
-        """Yield interpolated poses for the frames between two frames."""
-        saver, name, model = self._session_state.saver, self._name(person), self._session_state.present[person]
-        ends = [saver.pose_now(person, frame) for frame in (start, end)]
-        if ends[0] is None or ends[1] is None:  # the body has other values
-            return
-        revision, sources = saver.revisions.current(person), ("interpolated",) * len(ends[0])
-        frames = range(start + 1, end)
-        for at in range(0, len(frames), _AT_ONCE):
-            piece = frames[at : at + _AT_ONCE]
-            shares = (np.array(piece) - start) / (end - start)
-            for frame, values in zip(piece, interpolate_pose(model, ends[0], ends[1], shares), strict=True):
-                settings = {"method": "interpolate", BETWEEN: [start, end]}
-                yield PoseChange(name, frame, PoseRecord(values, sources, revision, settings=settings))
-
-
-def _marked(name: str, row: FrameRow, mark: Mark) -> MarkChange | None:
-    """Return the change that gives a frame a mark; None if it has the mark."""
-    keyframe = mark == "keyframe" or (mark != "none" and row.keyframe)
-    reviewed = keyframe or mark == "reviewed"
-    same = keyframe == row.keyframe and reviewed == row.reviewed
-    return None if same else MarkChange(name, row.frame, keyframe, reviewed)
-
 
 def _count(run: _Run) -> int:
     """Return how many poses are written."""
@@ -388,7 +370,7 @@ def _pieces(changes: Iterable[Change]) -> Iterator[Step]:
     piece: list[Change] = []
     for change in changes:
         piece.append(change)
-        if len(piece) == _AT_ONCE:
+        if len(piece) == AT_ONCE:
             yield piece
             piece = []
     if piece:

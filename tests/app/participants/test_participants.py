@@ -56,7 +56,7 @@ def test_a_pose_is_edited_in_turn(anna, ben):
     with pytest.raises(TurnError, match="anna drags on frame 0"):
         ben.dragging.begin(2, FRONT, 0, "torso", start)
     with pytest.raises(TurnError, match="anna drags"):
-        ben.pose_edits.turn(0, 0, 0.1, 0)
+        ben.pose_edits.turn(0, [0], 0.1, 0)
     assert ben.state.saved
     ben.navigation.seek(1)
     drag(ben, "torso", (5.0, 0.0))  # another frame is free

@@ -95,7 +95,7 @@ def test_work_on_a_range_has_its_turn(people, monkeypatch, anna, ben):
     for frame in (2, 8):
         anna.navigation.seek(frame)
         drag(anna, "torso", (4.0, 0.0))
-    monkeypatch.setattr(ranges, "_AT_ONCE", 2)  # in the background, two frames at a time
+    monkeypatch.setattr(ranges, "AT_ONCE", 2)  # in the background, two frames at a time
     is_held, may_go_on = threading.Event(), threading.Event()
 
     def held(changes, pieces=ranges._pieces):

@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import go_to, handle_of, shows, state_of
+from page_driver import frame_place, go_to, handle_of, shows, state_of
 from program import ROOT, visited
 
 from tracker.formats.model_toml import format_model
@@ -83,8 +83,7 @@ async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
     timeline = (await state_of(live))["timeline"]
     assert {timeline[str(f)]["source"] for f in range(START + 1, at + 1)} == {"tracked"}
     assert timeline[str(START)]["keyframe"]
-    box = await live.locator("#curves").bounding_box()
-    await live.mouse.click(box["x"] + 52 + (START + 2.5) * (box["width"] - 60) / 50, box["y"] + 60)
+    await live.mouse.click(*await frame_place(live, START + 2, 0.01, "#curves"))
     await shows(live, FOLLOWED.format(START + 2), 60)
 
     # Beside the socket, the program draws any of the poses.

@@ -6,7 +6,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import dragging, go_to, shows, state_of
+from page_driver import dragging, frame_place, go_to, shows
 from program import ROOT, started, visited
 from run_with_doubt import store_run
 
@@ -29,7 +29,7 @@ async def test_a_range_is_interpolated_reviewed_cleared_and_given_back(live):
     async with dragging(page, 0, "left_wrist", (10, -20), (30, -60)):
         pass
     await shows(page, "quadrille.state.timeline[10]?.keyframe", 30)
-    await page.mouse.dblclick(*await place_of(page, 5))
+    await page.mouse.dblclick(*await frame_place(page, 5))
     await shows(page, "quadrille.state.range?.first === 0 && quadrille.state.range.last === 10")
     await page.keyboard.press("Shift+I")
     await shows(page, "document.querySelector('#range-work').textContent === 'interpolated 9 frames'", 30)
@@ -71,8 +71,3 @@ async def test_the_poses_around_a_correction_are_estimated_again_and_given_back(
 def poses_of(folder):
     with closing(AnnotationStore(folder / "annotations.sqlite", read_only=True)) as store:
         return {frame: record.values for frame, record in store.poses("person", range(50)).items()}
-
-
-async def place_of(page, frame):
-    box, state = await page.locator("#timeline").bounding_box(), await state_of(page)
-    return box["x"] + 52 + (frame + 0.5) * (box["width"] - 60) / state["session"]["n_frames"], box["y"] + 40

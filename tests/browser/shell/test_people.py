@@ -3,7 +3,7 @@
 import pytest
 import pytest_asyncio
 from fake_endpoint import COLORS
-from page_driver import handle_of, shows, state_of, to_client, until
+from page_driver import frame_place, handle_of, shows, state_of, to_client, until
 
 pytestmark = pytest.mark.endpoint(n_people=2)
 
@@ -96,8 +96,8 @@ async def test_a_lane_has_the_colour_of_its_person_and_the_pattern_of_the_status
         assert min(doubtful[1], lost[1]) > 0.1
         assert color not in lost[0]
     assert (await couple.evaluate(LANE, [0, 110]))[0] == (await couple.evaluate(LANE, [1, 110]))[0]  # no pose
-    box = await couple.locator("#timeline").bounding_box()
-    await couple.mouse.move(box["x"] + 52 + 50.5 * (box["width"] - 60) / 120, box["y"] + 44 + 18 + 7)
+    x, y = await frame_place(couple, 50, 0.0)
+    await couple.mouse.move(x, y + 44 + 18 + 7)
     await shows(couple, "!document.querySelector('#cell-tip').hidden")
     lines = (await couple.locator("#cell-tip").inner_text()).split("\n")
     assert [line.split(":")[0] for line in lines] == ["Frame 50", "person 1", "left arm"]

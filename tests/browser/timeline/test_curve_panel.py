@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from fake_endpoint import curve
-from page_driver import shows, state_of, until
-
-GUTTER, PADDING = 52, 8
+from page_driver import drag_up, frame_place, point_of_curve, shows, state_of, until
+from playwright.async_api import expect
 
 DRAWN = """([first, last, index]) => {
   const canvas = document.querySelector("#curves canvas");
@@ -30,13 +29,6 @@ async def curves(page):
     await page.locator("#show-curves").click()
     await shows(page, "quadrille.state.curves !== null")
     return page
-
-
-async def place_of(page, frame, height=0.5):
-    box = await page.locator("#curves").bounding_box()
-    n_frames = (await state_of(page))["session"]["n_frames"]
-    x = box["x"] + GUTTER + (frame + 0.5) * (box["width"] - GUTTER - PADDING) / n_frames
-    return x, box["y"] + height * box["height"]
 
 
 @pytest.mark.slow
@@ -66,16 +58,15 @@ async def test_open_sections_are_remembered(curves, endpoint):
 async def test_a_click_goes_to_the_frame_whichever_curve_is_there(curves, endpoint):
     for frame, height in ((77, 0.2), (55, 0.7)):
         endpoint.received.clear()
-        await curves.mouse.click(*await place_of(curves, frame, height))
+        await curves.mouse.click(*await frame_place(curves, frame, height, "#curves"))
         await shows(curves, f"quadrille.state.shown.frame === {frame}")
         assert endpoint.heard("seek") == [{"type": "seek", "frame": frame}]
 
 
 @pytest.mark.slow
 async def test_curves_and_timeline_share_their_axis(curves, endpoint):
-    x, _ = await place_of(curves, 93)
-    box = await curves.locator("#timeline").bounding_box()
-    await curves.mouse.click(x, box["y"] + 20)
+    x, _ = await frame_place(curves, 93, chart="#curves")
+    await curves.mouse.click(x, (await frame_place(curves, 93))[1])
     await shows(curves, "quadrille.state.shown.frame === 93")
 
 
@@ -96,7 +87,7 @@ async def test_the_legend_reads_values_and_switches_curves(curves, endpoint):
     left, right = float(curve(0, 12)), float(curve(4, 12))
     values = await switches.nth(0).locator("output").text_content()
     assert values == f"L {left:.1f}°  R {right:.1f}°"
-    await curves.mouse.move(*await place_of(curves, 40))
+    await curves.mouse.move(*await frame_place(curves, 40, chart="#curves"))
     await shows(curves, f"document.querySelector('.legend-switch output').textContent.startsWith("
                         f"'L {float(curve(0, 40)):.1f}°')")  # fmt: skip
     await switches.nth(1).click()
@@ -144,6 +135,83 @@ async def test_they_fit_a_small_screen(curves):
     await shows(curves, "quadrille.state.views[0].scale > 0.3")
 
 
+def turns_of(endpoint):
+    return [m for m in endpoint.heard("pose") if m["action"] == "turn"]
+
+
+@pytest.mark.slow
+async def test_a_point_is_dragged_and_taken_back(curves, endpoint):
+    at = await point_of_curve(curves, 3, 40)
+    await drag_up(curves, at, 20)
+    await until(lambda: turns_of(endpoint)[-1]["by"] > 10)
+    await curves.mouse.up()
+    moved = turns_of(endpoint)
+    assert {(m["frame"], m["drag"], *m["dofs"]) for m in moved} == {(40, moved[0]["drag"], 3)}
+    assert endpoint.heard("seek") == [{"type": "seek", "frame": 40}]
+    await drag_up(curves, at, -10)
+    await until(lambda: turns_of(endpoint)[-1]["drag"] != moved[0]["drag"])
+    await curves.keyboard.press("Escape")
+    await until(lambda: turns_of(endpoint)[-1]["by"] is None)
+    assert turns_of(endpoint)[-1]["drag"] == turns_of(endpoint)[-2]["drag"] != moved[0]["drag"]
+
+
+@pytest.mark.slow
+async def test_several_curves_are_stepped_by_keys(curves, endpoint):
+    at = await point_of_curve(curves, 3, 40)
+    await curves.mouse.click(*at)
+    await curves.keyboard.press("u")  # the next visible one, of the right arm
+    await curves.keyboard.press("Shift+u")
+    await expect(curves.locator("#curves-chosen")).to_have_text("2 curves")
+    await curves.keyboard.press("ArrowUp")
+    await curves.keyboard.press("Shift+ArrowDown")
+    await until(lambda: sum(m["by"] for m in turns_of(endpoint)) == -45)
+    assert {tuple(m["dofs"]) for m in turns_of(endpoint)} == {(10, 3)}
+    await curves.keyboard.press("ArrowRight")
+    await shows(curves, "quadrille.state.shown.frame === 41")
+    assert not endpoint.heard("drag")
+
+
+@pytest.mark.slow
+async def test_a_range_is_marked_shifted_and_smoothed(curves, endpoint):
+    at = await point_of_curve(curves, 3, 40)
+    x, y = await frame_place(curves, 45, 0.02, "#curves")
+    await curves.mouse.click(*at)
+    await curves.locator("#smooth-curves").click()
+    await expect(curves.get_by_text("No range is marked").first).to_be_visible()
+    await curves.keyboard.down("Shift")
+    await curves.mouse.move(at[0] - 40, y)
+    await curves.mouse.down()
+    await curves.mouse.move(x, y, steps=2)
+    await curves.mouse.up()
+    span = (await state_of(curves))["range"]
+    assert (span["first"] < 40, span["last"]) == (True, 45)
+    await drag_up(curves, at, 15)
+    assert not endpoint.heard("range"), "the poses change on release"
+    await curves.mouse.up()
+    await curves.keyboard.up("Shift")
+    await until(lambda: endpoint.heard("range")[-1]["amount"] > 10)
+    await curves.locator("#curve-tools .number-field").first.fill("4")
+    await curves.locator("#smooth-curves").click()
+    await until(lambda: endpoint.heard("range")[-1]["action"] == "smooth")
+    assert endpoint.heard("range")[-1] == {
+        "type": "range", "action": "smooth", **span, "person": 0, "dofs": [3], "amount": 4
+    }  # fmt: skip
+    assert not turns_of(endpoint)
+
+
+@pytest.mark.slow
+@pytest.mark.endpoint(role="review")
+async def test_a_page_that_may_not_edit_is_offered_no_point(curves, endpoint):
+    with pytest.raises(AssertionError, match="no point"):
+        await point_of_curve(curves, 3, 40)
+    x, y = await frame_place(curves, 40, chart="#curves")
+    await drag_up(curves, (x, y), 20)
+    await curves.mouse.up()
+    await curves.keyboard.press("ArrowUp")
+    await expect(curves.get_by_text("This link is to review").first).to_be_visible()
+    assert not turns_of(endpoint)
+
+
 @pytest.mark.endpoint(n_frames=100_000)
 class TestLong:
     @pytest.mark.slow
@@ -163,7 +231,7 @@ class TestLong:
               return points;
             }"""
         )
-        assert 1_000 < points < 50_000
+        assert 1_000 < points < 90_000  # interpolated stretches are strokes of their own
 
 
 @pytest.mark.slow

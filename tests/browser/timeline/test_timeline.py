@@ -3,11 +3,10 @@
 from itertools import pairwise
 
 import pytest
-from page_driver import shows, state_of, until
+from page_driver import frame_place, shows, state_of, until
 
 from tracker.session.store.records import SOURCES
 
-GUTTER, PADDING = 52, 8
 INSIDE_THE_MENU = """(() => {
   const menu = document.querySelector("#jump-menu").getBoundingClientRect();
   return [...document.querySelectorAll("#jump-menu button")].every((button) => {
@@ -18,24 +17,11 @@ INSIDE_THE_MENU = """(() => {
 """JavaScript: whether all buttons of the menu lie in it."""
 
 
-async def box_of(page):
-    return await page.locator("#timeline").bounding_box()
-
-
-async def place_of(page, frame, overview=False):
-    """Where a frame lies on the timeline, or on the strip of the whole recording; window pixels."""
-    box, state = await box_of(page), await state_of(page)
-    n = state["session"]["n_frames"]
-    span = (not overview and state["visible"]) or {"start": 0, "end": n}
-    share = (frame + 0.5 - span["start"]) / (span["end"] - span["start"])
-    return box["x"] + GUTTER + share * (box["width"] - GUTTER - PADDING), box["y"] + (67 if overview else 40)
-
-
 async def mark(page, first, last):
     await page.keyboard.down("Shift")
-    await page.mouse.move(*await place_of(page, first))
+    await page.mouse.move(*await frame_place(page, first))
     await page.mouse.down()
-    await page.mouse.move(*await place_of(page, last), steps=4)
+    await page.mouse.move(*await frame_place(page, last), steps=4)
     await page.mouse.up()
     await page.keyboard.up("Shift")
     assert (await state_of(page))["range"] == {"first": first, "last": last}
@@ -141,19 +127,19 @@ async def test_a_hand_that_goes_elsewhere_while_it_plays_is_followed(page, endpo
 
 @pytest.mark.slow
 async def test_the_wheel_zooms_where_the_pointer_is(page):
-    x, y = await place_of(page, 70)
+    x, y = await frame_place(page, 70)
     await page.mouse.move(x, y)
     await page.keyboard.down("Control")
     await page.mouse.wheel(0, -500)
     await page.keyboard.up("Control")
     await shows(page, "quadrille.state.visible?.end - quadrille.state.visible?.start < 60")
-    assert (await place_of(page, 70))[0] == pytest.approx(x, abs=3.0)
+    assert (await frame_place(page, 70))[0] == pytest.approx(x, abs=3.0)
     before = (await state_of(page))["visible"]
     await page.mouse.wheel(0, 60)
     await shows(page, f"quadrille.state.visible.start > {before['start']} + 1")
     after = (await state_of(page))["visible"]
     assert after["end"] - after["start"] == pytest.approx(before["end"] - before["start"])
-    await page.mouse.click(*await place_of(page, 75))
+    await page.mouse.click(*await frame_place(page, 75))
     await shows(page, "quadrille.state.shown.frame === 75")
     await page.keyboard.down("Control")
     await page.mouse.wheel(0, 3000)
@@ -165,13 +151,13 @@ async def test_a_zoomed_view_is_moved_by_button_and_overview(page):
     for _ in range(4):
         await page.keyboard.press("z")
     await shows(page, "quadrille.state.visible?.end - quadrille.state.visible?.start < 20")
-    x, y = await place_of(page, 14)
+    x, y = await frame_place(page, 14)
     await page.mouse.move(x, y)
     await page.mouse.down(button="middle")
     await page.mouse.move(x - 300, y, steps=3)
     await page.mouse.up(button="middle")
-    assert (await place_of(page, 14))[0] == pytest.approx(x - 300, abs=1.0)
-    await page.mouse.click(*await place_of(page, 90, overview=True))
+    assert (await frame_place(page, 14))[0] == pytest.approx(x - 300, abs=1.0)
+    await page.mouse.click(*await frame_place(page, 90, 0.95, is_whole=True))
     await shows(page, "quadrille.state.visible.start < 90 && quadrille.state.visible.end > 90")
     assert (await state_of(page))["shown"]["frame"] == 12  # to look around is not to go there
     await page.keyboard.press("Period")
@@ -186,14 +172,14 @@ async def test_timeline_and_curves_share_the_zoom(page):
     await page.keyboard.press("c")
     await shows(page, "quadrille.state.curves")
     stage = await page.locator("#curves").bounding_box()
-    x, _ = await place_of(page, 30)
+    x, _ = await frame_place(page, 30)
     await page.mouse.move(x, stage["y"] + 40)
     await page.keyboard.down("Control")
     await page.mouse.wheel(0, -400)
     await page.keyboard.up("Control")
     await shows(page, "quadrille.state.visible !== null")
-    assert (await place_of(page, 30))[0] == pytest.approx(x, abs=3.0)
-    await page.mouse.click((await place_of(page, 33))[0], stage["y"] + 40)
+    assert (await frame_place(page, 30))[0] == pytest.approx(x, abs=3.0)
+    await page.mouse.click((await frame_place(page, 33))[0], stage["y"] + 40)
     await shows(page, "quadrille.state.shown.frame === 33")
     await page.keyboard.press("c")
 
@@ -231,9 +217,9 @@ async def test_jumps_by_keys(page):
 
 
 async def test_a_double_click_marks_the_stretch_between_keyframes(page):
-    await page.mouse.dblclick(*await place_of(page, 33))
+    await page.mouse.dblclick(*await frame_place(page, 33))
     await shows(page, "quadrille.state.range?.first === 20 && quadrille.state.range.last === 40")
-    await page.mouse.dblclick(*await place_of(page, 110))
+    await page.mouse.dblclick(*await frame_place(page, 110))
     await shows(page, "quadrille.state.range?.first === 80 && quadrille.state.range.last === 119")
 
 
@@ -308,7 +294,7 @@ async def test_the_bar_stays_within_the_window(page):
         bar = await page.locator("#range-bar").bounding_box()
         assert bar["x"] >= 0
         assert bar["x"] + bar["width"] <= 1280
-        assert bar["y"] + bar["height"] <= (await box_of(page))["y"]
+        assert bar["y"] + bar["height"] <= (await page.locator("#timeline").bounding_box())["y"]
 
 
 async def test_marks_of_the_shown_frame(page, endpoint):

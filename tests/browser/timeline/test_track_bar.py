@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 from fake_endpoint import REMARK
-from page_driver import dragging, shows, state_of, until
+from page_driver import dragging, frame_place, shows, state_of, until
 
 STRIP = """(frame) => {
   const canvas = document.querySelector("#timeline canvas");
@@ -24,13 +24,6 @@ STRIP = """(frame) => {
   return [null, 0];
 }"""
 """JavaScript: which status the strip shows at a frame, and how high its bar stands."""
-
-
-async def place_of(page, frame):
-    """Where a frame lies on the timeline, window pixels."""
-    box = await page.locator("#timeline").bounding_box()
-    n_frames = (await state_of(page))["session"]["n_frames"]
-    return box["x"] + 52 + (frame + 0.5) * (box["width"] - 60) / n_frames, box["y"] + box["height"] - 14
 
 
 @pytest.mark.slow
@@ -68,7 +61,7 @@ async def test_looking_elsewhere_unticks_follow_and_the_tick_leads_back(page, en
     endpoint.frame_s = 0.3  # the run must outlast what a busy machine takes for a click
     await page.keyboard.press("t")
     await shows(page, "quadrille.state.shown.frame > 13")
-    await page.mouse.click(*await place_of(page, 5))
+    await page.mouse.click(*await frame_place(page, 5))
     await shows(page, "quadrille.state.shown.frame === 5 && !quadrille.state.state.follow")
     assert not await page.locator("#follow").is_checked()
     at = (await state_of(page))["state"]["track"]["at"]
@@ -80,7 +73,7 @@ async def test_looking_elsewhere_unticks_follow_and_the_tick_leads_back(page, en
 
 
 async def test_a_marked_range_ends_a_run(page, endpoint):
-    (x0, y), (x1, _) = await place_of(page, 8), await place_of(page, 40)
+    (x0, y), (x1, _) = await frame_place(page, 8), await frame_place(page, 40)
     await page.keyboard.down("Shift")
     await page.mouse.move(x0, y)
     await page.mouse.down()
@@ -128,18 +121,18 @@ async def test_statuses_differ_by_colour_and_by_height(page, scheme):
 @pytest.mark.slow
 async def test_a_tooltip_says_what_the_tracker_thinks_of_each_limb(page):
     tip = page.locator("#cell-tip")
-    await page.mouse.move(*await place_of(page, 31))
+    await page.mouse.move(*await frame_place(page, 31))
     await shows(page, "document.querySelector('#cell-tip').innerText.startsWith('Frame 31: tracked, doubtful, ')")
     assert (await tip.inner_text()).split("\n")[1:] == [
         "right arm: doubtful (31 % chance that it is lost); others tracked",
         REMARK,
     ]
-    await page.mouse.move(*await place_of(page, 50))
+    await page.mouse.move(*await frame_place(page, 50))
     await shows(page, "document.querySelector('#cell-tip').innerText.startsWith('Frame 50')")
     assert (await tip.inner_text()).split("\n")[1:] == [
         "left arm: lost (97 % chance that it is lost); right arm: doubtful (4 %); others tracked"
     ]
-    await page.mouse.move(*await place_of(page, 110))
+    await page.mouse.move(*await frame_place(page, 110))
     await shows(page, "document.querySelector('#cell-tip').innerText === 'Frame 110: no pose'")
     await page.mouse.move(400, 300)
     await tip.wait_for(state="hidden")

@@ -7,6 +7,7 @@ Imports `estimation.fitting` and `estimation.chamfer` of its wing. Callers use `
 __all__ = [
     "character",
     "default_pose",
+    "dof_series",
     "drag",
     "edits",
     "grab",

@@ -48,16 +48,34 @@ def test_nudges_in_quick_succession_are_one_entry(monkeypatch, controller):
 def test_a_degree_of_freedom_turns_by_steps_to_its_limit(controller):
     model = controller.models[0]
     dof = model.dof_names.index("left_elbow.extension")
-    controller.pose_edits.turn(0, dof, 0.1)
-    controller.pose_edits.turn(0, dof, 0.1)
+    controller.pose_edits.turn(0, [dof], 0.1)
+    controller.pose_edits.turn(0, [dof], 0.1)
     assert controller.state.poses[0][dof] == pytest.approx(0.2)
-    controller.pose_edits.turn(0, dof, 10.0)
+    controller.pose_edits.turn(0, [dof], 10.0)
     assert controller.state.poses[0][dof] == pytest.approx(model.limits[dof, 1])
     assert controller.state.undo == "nudge left elbow extension, frame 0"
 
 
+def test_a_drag_of_curves_counts_from_its_start_and_is_one_entry(monkeypatch, controller):
+    monkeypatch.setattr("app.control.posing.pose_edits._SAME_GESTURE_S", 0.0)
+    model = controller.models[0]
+    dofs = [model.dof_names.index(name) for name in ("left_elbow.extension", "torso.twist")]
+    for by in (0.1, 10.0, 0.3):  # beyond the limit and back
+        controller.pose_edits.turn(0, dofs, by, 4, drag=7)
+    np.testing.assert_allclose(controller.state.poses[0][dofs], model.neutral()[dofs] + 0.3)
+    assert controller.stored_poses.timeline()[4]["keyframe"]
+    assert controller.state.undo == "drag 2 curves, frame 4"
+    controller.pose_edits.turn(0, dofs[:1], 0.2, 4, drag=8)
+    assert controller.state.undo == "drag left elbow extension, frame 4"
+    controller.pose_edits.cancel_drag(dofs[:1], 8)
+    controller.pose_edits.cancel_drag(dofs, 7)  # saved by now
+    np.testing.assert_allclose(controller.state.poses[0][dofs], model.neutral()[dofs] + 0.3)
+    controller.history.undo()
+    assert controller.state.undo is None
+
+
 def test_the_hand_means_the_frame_that_it_saw(controller):
-    controller.pose_edits.turn(0, 3, 0.1, frame=4)
+    controller.pose_edits.turn(0, [3], 0.1, frame=4)
     assert controller.state.frame == 4
     assert controller.state.undo == "nudge torso abduction, frame 4"
 
@@ -114,7 +132,7 @@ def test_nudging_what_is_locked_says_so(controller):
     with pytest.raises(TrackerError, match="locked"):
         controller.pose_edits.nudge(0, LEFT_WRIST, FRONT, 0.01, 0.0)
     with pytest.raises(TrackerError, match="left elbow extension is locked"):
-        controller.pose_edits.turn(0, model.dof_names.index("left_elbow.extension"), 0.1)
+        controller.pose_edits.turn(0, [model.dof_names.index("left_elbow.extension")], 0.1)
 
 
 def test_numbers_can_be_typed_where_the_joint_is_seen(controller):

@@ -76,7 +76,7 @@ def test_a_value_is_set_as_an_edit(controller):
     controller.history.undo()
     assert controller.state.poses[0][dof] == before
     controller.dof_locks.set(0, [dof], True)
-    with pytest.raises(TrackerError, match="unlock it first"):
+    with pytest.raises(TrackerError, match="unlock it to change it"):
         controller.pose_edits.set_along(0, [dof], [0.4])
     with pytest.raises(TrackerError, match="found others"):
         controller.pose_edits.set_along(0, [0], [float("nan")])

@@ -117,7 +117,7 @@ def ranges(controller):
 EDITS = {
     "drag": lambda c: drag(c, "left_wrist", (10.0, 0.0)), "cancelled drag": cancel, "drag back and forth":
     back_and_forth, "pin": pin, "remove pin": lambda c: (pin(c), c.pinning.remove(2, 0)), "fit": fit, "set": lambda c:
-    c.pose_edits.set_dof(0, 8, 0.3), "turn": lambda c: c.pose_edits.turn(0, 8, 0.1), "nudge": lambda c:
+    c.pose_edits.set_dof(0, 8, 0.3), "turn": lambda c: c.pose_edits.turn(0, [8], 0.1), "nudge": lambda c:
     c.pose_edits.nudge(0, "left_wrist", FRONT, 0.02, 0.0), "place": lambda c: c.pose_edits.place_part(0, 0, np.eye(3),
     np.array([0.0, 0.1, 1.0]), "gizmo"), "mirror": lambda c: bent(c).mirror(0), "reset": lambda c: bent(c).reset(0,
     None), "copy": lambda c: (c.navigation.seek(9), c.pose_edits.copy_from(0, 2)), "search": search, "resize": resize,

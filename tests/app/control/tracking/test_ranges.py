@@ -156,7 +156,7 @@ def test_a_verified_frame_stays_when_a_program_comes_by(placed, tracker):
 
 
 def test_long_work_is_watched_and_stopped_as_one_entry(two_keys, monkeypatch):
-    monkeypatch.setattr(ranges, "_AT_ONCE", 2)
+    monkeypatch.setattr(ranges, "AT_ONCE", 2)
     seen = []
     two_keys.subscribe(lambda state: seen.append(state.ranges))
     two_keys.ranges.interpolate(2, 12)

@@ -117,7 +117,7 @@ def test_a_fit_is_of_those_who_have_been_placed_or_of_one(couple):
 def test_a_pose_is_bent_as_the_others_and_stays_in_its_place(couple):
     model = couple.models[ANN]
     drag(couple, "left_wrist", (30.0, -40.0))
-    couple.pose_edits.turn(ANN, model.dof_names.index("torso.twist"), 0.5)
+    couple.pose_edits.turn(ANN, [model.dof_names.index("torso.twist")], 0.5)
     ann, bob = couple.state.poses
     couple.pose_edits.copy_person(BOB, ANN)
     bent = couple.state.poses[BOB]
