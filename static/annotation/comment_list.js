@@ -41,9 +41,8 @@ export function commentList({ store, send }, review, visits) {
     const row = frameRow(comment.frame, false, `Go to frame ${comment.frame}`, () => visits.go(comment), words);
     row.classList.toggle("is-resolved", comment.resolved);
     const done = textButton(comment.resolved ? "Reopen" : "Resolve", comment.resolved ? "Open this comment again" : "This comment is done", () =>
-      send({ type: "annotation", action: comment.resolved ? "reopen" : "resolve", uid: comment.uid }),
+      send({ type: "annotation", action: comment.resolved ? "reopen" : "resolve", uid: comment.uid }), { "data-no-command": "" }
     );
-    done.dataset.noCommand = "";
     row.append(done);
     return row;
   };

@@ -1,6 +1,7 @@
 /** The form that plans frames: which, of whom, and for whom. */
 
 import { make } from "../widgets/elements.js";
+import { labelled } from "../inspector/parts.js";
 import { fold } from "./parts.js";
 
 /** @type {[string, string][]} */
@@ -67,10 +68,8 @@ export function planForm({ store, send, say }) {
  * @param {[string, string][]} options
  */
 function select(text, options) {
-  const label = make("label", "plan-field");
   const input = make("select", { "aria-label": text }, ...options.map(([value, words]) => new Option(words, value)));
-  label.append(make("span", "", text), input);
-  return { label, input };
+  return { label: labelled("plan-field", text, "", input), input };
 }
 
 /**
@@ -79,8 +78,6 @@ function select(text, options) {
  * @param {string} title
  */
 function field(text, placeholder, title) {
-  const label = make("label", { className: "plan-field", title });
   const input = make("input", { className: "query-field", type: "text", placeholder, autocomplete: "off", spellcheck: false });
-  label.append(make("span", "", text), input);
-  return { label, input };
+  return { label: labelled("plan-field", text, title, input), input };
 }

@@ -21,8 +21,7 @@ export function annotationSection(context, review, visits) {
   const next = textButton("Next task", "Go to the next listed task (Alt+T)", () => review.step(1));
   const accept = textButton("Accept", "Verify the pose of the active person here (Alt+K)", () => review.accept());
   const refuse = textButton("Reject …", "Reject the pose here, and say what is to be corrected (Alt+R)", () => askReason());
-  const leave = textButton("Withdraw", "Take this frame out of the plan", () => review.withdraw());
-  leave.id = "plan-withdraw";
+  const leave = textButton("Withdraw", "Take this frame out of the plan", () => review.withdraw(), { id: "plan-withdraw" });
   const buttons = make("div", "plan-buttons", next, accept, refuse, leave);
   const here = make("p", "section-note");
   const reason = lineForm("What is to be corrected", "Reject", (text) => {
@@ -47,9 +46,8 @@ export function annotationSection(context, review, visits) {
   const speed = speedTable(store);
   const plan = planForm(context);
   plan.element.id = "plan-frames";
-  const body = make("div", "acquisition plan");
-  body.append(
-    none, ...tasks.head, buttons, here, reason.form, tasks.filter, ...tasks.body,
+  const body = make(
+    "div", "acquisition plan", none, ...tasks.head, buttons, here, reason.form, tasks.filter, ...tasks.body,
     make("h4", "click-card", "Next best click"), ...click.elements,
     make("h4", "", "Comments"), ...comments.elements, speed.element, plan.element,
   ); // prettier-ignore

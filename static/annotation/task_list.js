@@ -54,9 +54,8 @@ export function taskList(store, review, visits) {
     strip.setAttribute("aria-label", TASK_STATES.map((state) => `${counts[state]} ${state}`).join(", "));
     strip.replaceChildren(
       ...[...TASK_STATES].reverse().filter((state) => counts[state]).map((state) => {
-        const part = make("span", `is-${state}`);
+        const part = make("span", { className: `is-${state}`, title: `${capital(state)}: ${count(counts[state])}` });
         part.style.flexGrow = String(counts[state]);
-        part.title = `${capital(state)}: ${count(counts[state])}`;
         return part;
       }),
     );

@@ -1,6 +1,6 @@
 /** Sizes from the footage: start and stop an acquisition, its progress, and the body before and after. */
 
-import { make, makeSvg, textButton } from "../widgets/elements.js";
+import { make, makeSvg, tableRow, textButton } from "../widgets/elements.js";
 import { capital } from "../widgets/text.js";
 import { workRow } from "./parts.js";
 import { choiceRow } from "./rows.js";
@@ -69,10 +69,7 @@ function describe(result) {
   const { frames, cost_before_px: before, cost_after_px: after } = result;
   const summary = make("p", { className: "section-note", title: "Frames that the sizes were fitted to, and their mean cost with the body before and after" }, `Frames ${frames.join(", ")}: ${before.toFixed(2)} → ${after.toFixed(2)} px`);
   const pictures = make("div", "acquisition-pictures", picture(result, result.front, "Front"), picture(result, result.side, "Side"));
-  const legend = make("p", "section-note acquisition-legend");
-  for (const kind of ["before", "after"]) {
-    legend.append(make("span", `is-${kind}`, kind));
-  }
+  const legend = make("p", "section-note acquisition-legend", ...["before", "after"].map((kind) => make("span", `is-${kind}`, kind)));
   return [summary, pictures, legend, table(result)];
 }
 
@@ -91,17 +88,12 @@ function picture({ size_px: [width, height] }, { before, after }, name) {
 
 /** @param {Result} result */
 function table({ sizes }) {
-  const element = make("table", "acquisition-sizes number-table");
-  const head = element.createTHead().insertRow();
-  for (const text of ["Changed most, cm", "before", "after", "±"]) {
-    head.append(make("th", { scope: "col" }, text));
-  }
-  const body = element.createTBody();
-  for (const { name, before_m, after_m, sigma_m } of sizes.slice(0, LISTED)) {
-    const row = body.insertRow();
-    row.append(make("th", { scope: "row", title: capital(name) }, capital(name)));
-    for (const metres of [before_m, after_m, sigma_m]) row.insertCell().textContent = (100 * metres).toFixed(1);
+  const head = ["Changed most, cm", "before", "after", "±"].map((text) => make("th", { scope: "col" }, text));
+  const rows = sizes.slice(0, LISTED).map(({ name, before_m, after_m, sigma_m }) => {
+    const row = tableRow(capital(name), [before_m, after_m, sigma_m].map((metres) => (100 * metres).toFixed(1)));
+    row.cells[0].title = capital(name);
     row.cells[3].title = "Standard deviation of the size after the acquisition";
-  }
-  return element;
+    return row;
+  });
+  return make("table", "acquisition-sizes number-table", make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows));
 }

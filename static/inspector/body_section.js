@@ -85,9 +85,8 @@ export class BodySection {
       change: () => {},
     });
     this.#apply = textButton("Apply", "Make these the sizes of the body; undo restores the present ones", () =>
-      this.#edit({ action: "apply", refit: this.#keyframes.select.value === "refit" }),
+      this.#edit({ action: "apply", refit: this.#keyframes.select.value === "refit" }), { className: "is-primary" }
     );
-    this.#apply.className = "is-primary";
     this.#discard = textButton("Discard", "Return to the present sizes", () => this.#edit({ action: "discard" }));
     this.#former = textButton("Previous", "Enter the sizes before the present ones; Apply sets them", () =>
       this.#edit({ action: "previous" }),

@@ -3,7 +3,7 @@
 import { make, textButton } from "../widgets/elements.js";
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
-import { command, frameRow, group, longList } from "./parts.js";
+import { command, frameRow, group, labelled, longList } from "./parts.js";
 import { numberRow, sectionNote } from "./rows.js";
 
 /**
@@ -28,14 +28,12 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
   };
   const leaveCopy = () => send({ type: "other_copy", action: "leave", person: 0, frame: 0 });
   const form = make("form", "copy-form");
-  const label = make("label", { className: "import-field", title: "Folder of another annotator's copy of this session, on the machine of the program" });
-  const input = make("input", { type: "text", className: "query-field", name: "copy", id: "copy-folder" });
-  label.append(make("span", {}, "Folder"), make("span", "path-field", input));
+  const input = make("input", { type: "text", className: "query-field", name: "copy", id: "copy-folder", "data-takes": "folder" });
+  const title = "Folder of another annotator's copy of this session, on the machine of the program";
+  const label = labelled("import-field", "Folder", title, make("span", "path-field", input));
   const open = make("button", { type: "submit", title: "Read the poses of this copy, and show where both differ; nothing is changed" }, "Compare");
-  const answer = sectionNote();
-  answer.setAttribute("role", "status");
+  const answer = make("p", { className: "section-note", role: "status" });
   form.append(label, open);
-  input.dataset.takes = "folder";
   paths.completes(input);
 
   const summary = sectionNote();

@@ -1,6 +1,7 @@
 /** Picture of the cost over two degrees of freedom around the shown pose. A click or Enter takes the pose there. */
 
 import { make, textButton } from "../widgets/elements.js";
+import { nearest } from "../widgets/plot.js";
 import { prepare } from "../panes/drawing.js";
 import { displayName } from "../widgets/text.js";
 
@@ -251,14 +252,6 @@ function currentPlace({ across, up, current }) {
 function moved({ across, up }, { column, row }, [right, above]) {
   const within = (/** @type {number} */ at, /** @type {number} */ count) => Math.max(0, Math.min(count - 1, at));
   return { column: within(column + right, across.length), row: within(row + above, up.length) };
-}
-
-/**
- * @param {number[]} values ascending
- * @param {number} value
- */
-function nearest(values, value) {
-  return values.reduce((best, one, index) => (Math.abs(one - value) < Math.abs(values[best] - value) ? index : best), 0);
 }
 
 /**

@@ -2,6 +2,7 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { capital, count } from "../widgets/text.js";
+import { labelled } from "./parts.js";
 
 /**
  * @typedef {{completes: (input: HTMLInputElement) => void}} PathFields gives fields of paths completion and a picker
@@ -41,15 +42,12 @@ export function importForm(store, paths, discard) {
   const skeleton = field("names_of_points", "Names of points", "A known skeleton by whose names, or in whose order, the points are, such as BODY_25B; guessed if empty");
   const axes = field("axes", "Axes", "Joints in space: axes of the file that are the session's x, y and z, such as x,-z,y; x,y,z if empty");
   const units = field("units", "Units", "Joints in space: unit of a file that states none: m, cm, mm, in or ft");
-  const unusual = make("label", { className: "import-field", title: "Keep points also where they fit no person of the recording, or fit one better in another way" });
   const keep = make("input", { type: "checkbox", name: "unusual" });
-  unusual.append(span("Keep unusual points"), keep);
-  const people = make("label", { className: "import-field", title: "Person of whom they are" });
+  const unusual = labelled("import-field", "Keep unusual points", "Keep points also where they fit no person of the recording, or fit one better in another way", keep);
   const person = make("select", { name: "person" });
-  people.append(span("Person"), person);
+  const people = labelled("import-field", "Person", "Person of whom they are", person);
   const check = make("button", { type: "submit", title: "Read and check the files, and show their points over the pictures; nothing is stored" }, "Check");
-  const take = textButton("Import", "Store these files with the session", () => void store_());
-  take.className = "is-primary";
+  const take = textButton("Import", "Store these files with the session", () => void store_(), { className: "is-primary" });
   const cancel = textButton("Cancel", "Forget these files", () => reset());
   const result = make("div", { className: "import-result", role: "status" });
   const further = make("details", {}, make("summary", { title: "First frame, offsets, size of the pictures, confidence, names, axes and unit" }, "Where the files do not tell"), first.label, late.label, size.label, confidence.label, skeleton.label, axes.label, units.label, unusual);
@@ -189,23 +187,14 @@ function describe(plan) {
  * @param {string} title
  */
 function field(name, text, title) {
-  const label = make("label", { className: "import-field", title });
   const input = make("input", { type: "text", className: "query-field", name, autocomplete: "off", spellcheck: false, id: `import-${name}` });
-  label.append(span(text), make("span", "path-field", input));
-  return { label, input };
+  return { label: labelled("import-field", text, title, make("span", "path-field", input)), input };
 }
 
 /**
  * @param {string} text
  * @param {string} [more] class
  */
-function line(text, more) {
-  const element = make("p", "section-note", text);
-  if (more) element.classList.add(more);
-  return element;
-}
-
-/** @param {string} text */
-function span(text) {
-  return make("span", {}, text);
+function line(text, more = "") {
+  return make("p", `section-note ${more}`, text);
 }

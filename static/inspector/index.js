@@ -13,6 +13,7 @@ import { findSection } from "./find_section.js";
 import { BodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
 import { jointSection } from "./joint_section.js";
+import { command } from "./parts.js";
 import { observationsSection } from "./observations_section.js";
 import { provenanceSection } from "./provenance_section.js";
 import { reasonSection } from "./reason_section.js";
@@ -83,33 +84,17 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
       words: "reason explain evidence colours outside silhouette contour nats parts views",
       run: () => inspector.reveal("reason"),
     },
-    {
-      keys: [],
-      label: "Cost over two angles of the joint",
-      words: "landscape map nats inspector",
-      run: () => {
-        inspector.reveal("joint");
-        joint.openMap();
-      },
-    },
-    { keys: [], label: "Find people", words: "start automatically initialize bootstrap first pose acquire track nobody placed", run: findPeople },
+    command("Cost over two angles of the joint", "landscape map nats inspector", () => (inspector.reveal("joint"), joint.openMap())),
+    command("Find people", "start automatically initialize bootstrap first pose acquire track nobody placed", findPeople),
     ...calibration.bindings(() => inspector.reveal("calibration")),
     ...clocks.bindings(() => inspector.reveal("clocks")),
     ...observations.bindings(() => inspector.reveal("observations")),
     ...provenance.bindings(() => inspector.reveal("provenance")),
     ...copy.bindings(() => inspector.reveal("copy")),
-    ...sections.filter(({ id }) => !["find", "reason", "observations"].includes(id)).map(({ id, title, hint }) => ({
-      keys: [],
-      label: id === "view" ? "View settings: theme, 3-D view" : title,
-      words: `${hint} inspector settings`,
-      run: () => inspector.reveal(id),
-    })),
-    ...THEMES.map(({ choice, label }) => ({
-      keys: [],
-      label,
-      words: "colour scheme mode appearance",
-      run: () => context.themes.choose(choice),
-    })),
+    ...sections.filter(({ id }) => !["find", "reason", "observations"].includes(id)).map(({ id, title, hint }) =>
+      command(id === "view" ? "View settings: theme, 3-D view" : title, `${hint} inspector settings`, () => inspector.reveal(id)),
+    ),
+    ...THEMES.map(({ choice, label }) => command(label, "colour scheme mode appearance", () => context.themes.choose(choice))),
   ]);
   return { inspector, findPeople, detect, bindings };
 }

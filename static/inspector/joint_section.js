@@ -49,11 +49,10 @@ export function jointSection(context, { posing }) {
       refuse,
     });
     element.append(head, field.element, make("span", "row-unit", unit));
-    const slider = info.unit === "deg" ? make("input") : null;
+    const range = info.low === null || info.high === null ? FULL_TURN : { low: info.low, high: info.high };
+    const properties = { type: "range", min: String(range.low), max: String(range.high), step: "0.5", "aria-label": `${displayName(info.joint)} ${info.name}` };
+    const slider = info.unit === "deg" ? make("input", properties) : null;
     if (slider) {
-      const range = info.low === null || info.high === null ? FULL_TURN : { low: info.low, high: info.high };
-      Object.assign(slider, { type: "range", min: String(range.low), max: String(range.high), step: "0.5" });
-      slider.setAttribute("aria-label", `${displayName(info.joint)} ${info.name}`);
       slider.addEventListener("input", () => posing.slide(dof, Number(slider.value)));
       element.append(slider);
     }

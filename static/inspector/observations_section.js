@@ -36,8 +36,7 @@ export function observationsSection({ store, send, say, navigation, actions, lay
 
   const list = make("ul", "observed-sets");
   const none = sectionNote("Key points and joints of other programs: import them, see where they are wrong, and mend that.");
-  const judge = textButton("Judge", "Track the people from these observations in the background, and say where the footage contradicts them", () => act("judge", current()));
-  judge.className = "is-primary";
+  const judge = textButton("Judge", "Track the people from these observations in the background, and say where the footage contradicts them", () => act("judge", current()), { className: "is-primary" });
   const take = textButton("Take as poses", "Store them as poses that can be corrected; keyframes stay, and undo takes them back", () => act("take", current()));
   const report = textButton("Write report", "Save the judgement as one HTML file with pictures of the worst frames", () => void writeReport());
   const detect = textButton("Detect people", "Let a network find the key points of people on all frames, where no background shows them; docs/observations.md says how to get it", () => {
@@ -114,16 +113,13 @@ export function observationsSection({ store, send, say, navigation, actions, lay
     none.hidden = sets.length > 0;
     list.replaceChildren(
       ...sets.map((set) => {
-        const row = make("li");
         const what = set.problem || `${set.format}, ${set.is_in_space ? "joints" : "key points"} of ${set.people.join(", ")}, ${count(set.frames)} frames`;
         const text = make("span", {}, make("b", {}, set.name), sectionNote(what));
         text.lastElementChild?.classList.toggle("is-failed", !!set.problem);
-        const toggle = textButton("Show", `Draw the points of ${set.name} over the pictures (toggle)`, () => show(set.name));
-        toggle.setAttribute("aria-pressed", String(set.name === shown));
-        toggle.setAttribute("aria-label", `Show ${set.name}`);
-        toggle.disabled = !!set.problem;
-        row.append(text, toggle);
-        return row;
+        const toggle = textButton("Show", `Draw the points of ${set.name} over the pictures (toggle)`, () => show(set.name), {
+          "aria-pressed": String(set.name === shown), "aria-label": `Show ${set.name}`, disabled: !!set.problem,
+        }); // prettier-ignore
+        return make("li", {}, text, toggle);
       }),
     );
   };

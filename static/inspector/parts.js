@@ -91,6 +91,18 @@ export function longList(list, few, title, row) {
 }
 
 /**
+ * Make a field of a form with its name before it.
+ *
+ * @param {string} kind class
+ * @param {string} text
+ * @param {string} title
+ * @param {HTMLElement} field
+ */
+export function labelled(kind, text, title, field) {
+  return make("label", { className: kind, title }, make("span", {}, text), field);
+}
+
+/**
  * Make a command that only the palette has.
  *
  * @param {string} label

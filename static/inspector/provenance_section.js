@@ -135,15 +135,12 @@ function grouped(pose) {
  * @param {(point: string) => void} select
  */
 function originRow(text, points, selected, select) {
-  const row = make("li");
   const names = points.map((point) => {
-    const name = textButton(displayName(point), `Select the ${displayName(point)}`, () => select(point));
-    name.dataset.noCommand = "";
+    const name = textButton(displayName(point), `Select the ${displayName(point)}`, () => select(point), { "data-no-command": "" });
     if (point === selected) name.setAttribute("aria-current", "true");
     return name;
   });
-  row.append(make("span", {}, capital(text)), make("span", "provenance-points", ...names));
-  return row;
+  return make("li", {}, make("span", {}, capital(text)), make("span", "provenance-points", ...names));
 }
 
 /** @param {Filter | null} filter */

@@ -1,6 +1,6 @@
 /** Reason for a doubt: what each view shows of each part of the shown pose, as a table whose cells zoom to the part. */
 
-import { make, textButton } from "../widgets/elements.js";
+import { checkbox, make, textButton } from "../widgets/elements.js";
 import { alternativesOf } from "../model/selectors.js";
 import { capital } from "../widgets/text.js";
 import { MEASURES, reasonTable } from "./reason_table.js";
@@ -105,12 +105,10 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
  * @param {() => void} take
  */
 function alternativeRow({ nats, limbs }, rank, take) {
-  const row = make("li");
   const where = limbs.length ? `${limbs.join(", ")} elsewhere` : "body elsewhere";
   const cost = `${Math.abs(nats).toFixed(Math.abs(nats) < 10 ? 1 : 0)} nats ${nats < 0 ? "better" : "worse"}`;
   const title = `Take this pose, drawn blue with the number ${rank + 1} (Alt+${rank + 1}). Can be undone`;
-  row.append(textButton(`Take ${rank + 1}`, title, take), make("span", {}, `${where}: ${cost}`));
-  return row;
+  return make("li", {}, textButton(`Take ${rank + 1}`, title, take), make("span", {}, `${where}: ${cost}`));
 }
 
 /** @param {string} status */
@@ -124,12 +122,9 @@ function noContradiction(status) {
  * @param {(measure: Measure) => void} change
  */
 function measureChoice(chosen, change) {
-  const element = make("fieldset", { className: "segmented", "aria-label": "Measure" });
-  for (const measure of MEASURES) {
-    const label = make("label", { title: measure.title });
-    const input = make("input", { type: "radio", name: "reason-measure", checked: measure === chosen, onchange: () => change(measure) });
-    label.append(input, make("span", {}, measure.label));
-    element.append(label);
-  }
-  return element;
+  const choices = MEASURES.map((measure) => {
+    const { label, title } = measure;
+    return checkbox(label, title, { type: "radio", name: "reason-measure", checked: measure === chosen, onchange: () => change(measure) }).element;
+  });
+  return make("fieldset", { className: "segmented", "aria-label": "Measure" }, ...choices);
 }

@@ -1,6 +1,6 @@
 /** Table of parts by views. Arrow keys move among its cells, Enter or a click zooms the view to the part. */
 
-import { make } from "../widgets/elements.js";
+import { make, tableRow } from "../widgets/elements.js";
 import { displayName } from "../widgets/text.js";
 
 /**
@@ -112,10 +112,11 @@ export function reasonTable({ point, zoom }) {
     show({ reason, measure, person, cameras }) {
       const focused = cellAt(document.activeElement);
       [rows, meant] = [[], []];
-      const head = line("th", "", cameras.map(({ name }) => name));
+      const head = tableRow("", cameras.map(({ name }) => name), "th");
       head.classList.add("reason-views");
+      for (const cell of head.cells) cell.title = cell.textContent ?? ""; // long names are cut off
       const lines = reason.limbs.flatMap((limb) => {
-        const heading = line("th", limb.name, []);
+        const heading = tableRow(limb.name, []);
         heading.classList.add("reason-limb");
         const isNamed = limb.parts.length > 1;
         return [...(isNamed ? [heading] : []), ...limb.parts.map((part) => partRow({ reason, measure, name: person.parts[part], part, cameras }))];
@@ -138,7 +139,7 @@ export function reasonTable({ point, zoom }) {
   function partRow({ reason, measure, name, part, cameras }) {
     const found = reason.parts[part];
     // The line above names the side.
-    const row = line("td", displayName(name).replace(/^(left|right) /, ""), cameras.map((_, view) => measure.text(found, view) || "·"));
+    const row = tableRow(displayName(name).replace(/^(left|right) /, ""), cameras.map((_, view) => measure.text(found, view) || "·"));
     const cells = /** @type {HTMLTableCellElement[]} */ ([...row.children].slice(1));
     cells.forEach((cell, view) => {
       const isShown = measure.text(found, view) !== "";
@@ -161,15 +162,6 @@ const STEPS = new Map([
   ["ArrowLeft", { row: 0, view: -1 }],
   ["ArrowRight", { row: 0, view: 1 }],
 ]);
-
-/**
- * @param {"th" | "td"} kind of the cells after the first
- * @param {string} name
- * @param {string[]} texts
- */
-function line(kind, name, texts) {
-  return make("tr", {}, make("th", { scope: "row" }, name), ...texts.map((text) => make(kind, { title: text }, text)));
-}
 
 /**
  * All three measures of a cell in words.

@@ -1,8 +1,8 @@
 /** Theme of the page, error ellipses, and what the 3-D view shows: layers, the camera to look through, the floor and trails. */
 
-import { make, textButton } from "../widgets/elements.js";
+import { checkbox, make, textButton } from "../widgets/elements.js";
 import { displayName } from "../widgets/text.js";
-import { checkRow, choiceRow, sliderRow } from "./rows.js";
+import { checkRow, choiceRow, sectionNote, sliderRow } from "./rows.js";
 
 const FREE = "free";
 const MAX_TRAIL_FRAMES = 250;
@@ -53,8 +53,7 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
       "Draw around each joint of the selected person the ellipse that holds 90% of its error in the camera view. Errors come from tracking; a pose changed by hand has none",
     change: (on) => paneLayers.toggle(["errors"], on),
   });
-  const noErrors = note();
-  noErrors.textContent = "The errors of this pose are not known: they come from tracking over the whole run.";
+  const noErrors = sectionNote("The errors of this pose are not known: they come from tracking over the whole run.");
   const camera = choiceRow({
     label: "Look through",
     title: "Look through a camera, its image behind the bodies (Y: the camera under the pointer). Turning the view leaves the camera",
@@ -89,8 +88,8 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
     options: [[NO_CHARACTER, "None"]],
     change: (value) => set({ character: value }),
   });
-  const prediction = note();
-  const floorText = note();
+  const prediction = sectionNote();
+  const floorText = sectionNote();
   const setFloor = textButton("Set floor…", "Click three points of the floor in the views (Shift+Y)", () => floor.toggle());
   const fromFeet = textButton("From feet", "Set the floor to the plane under the feet in all poses", () => floor.setFromFeet());
   const formerFloor = textButton("Previous floor", "Restore the floor before the last change", () => floor.revert());
@@ -105,12 +104,11 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
   });
   const points = make("div", { className: "trail-points", role: "group", "aria-label": "Points with a trail" });
   const noTrails = textButton("No trails", "Remove all trails", () => set({ trail_points: [] }));
-  const body = make("div");
   const [bodies, ...others] = layers.map(({ row }) => row.element);
-  body.append(
-    theme.element, link.element, ellipses.element, noErrors, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction, character.element,
-    heading("Floor"), floorText, buttons(setFloor, fromFeet, formerFloor),
-    heading("Trails"), trails.element, points, buttons(noTrails),
+  const body = make(
+    "div", {}, theme.element, link.element, ellipses.element, noErrors, make("h4", {}, "3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction, character.element,
+    make("h4", {}, "Floor"), floorText, buttons(setFloor, fromFeet, formerFloor),
+    make("h4", {}, "Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
   let built = "";
   let listed = "";
@@ -146,7 +144,7 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
     noTrails.disabled = view.trail_points.length === 0;
     if (built !== view3d.trail_points.join()) {
       built = view3d.trail_points.join();
-      points.replaceChildren(...view3d.trail_points.map((name) => pointChoice(name, (on) => choose(name, on))));
+      points.replaceChildren(...view3d.trail_points.map((name) => pointChoice(name, choose)));
     }
     for (const box of points.querySelectorAll("input")) box.checked = view.trail_points.includes(box.value);
   };
@@ -165,29 +163,18 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
 
 /**
  * @param {string} name
- * @param {(on: boolean) => void} change
+ * @param {(name: string, on: boolean) => void} choose
  */
-function pointChoice(name, change) {
-  const label = make("label", { title: `Trail of the ${displayName(name)}` });
-  const input = make("input", { type: "checkbox", value: name });
-  input.addEventListener("change", () => change(input.checked));
-  label.append(input, make("span", {}, displayName(name)));
-  return label;
+function pointChoice(name, choose) {
+  const { element, input } = checkbox(displayName(name), `Trail of the ${displayName(name)}`, { value: name });
+  input.addEventListener("change", () => choose(name, input.checked));
+  return element;
 }
 
 /** @param {import("../model/protocol.js").FloorInfo} floor */
 function describe({ up, tilt_deg, height_m, origin }) {
   if (tilt_deg === null || height_m === null) return `From the calibration, ${up} is up`;
   return `Set${origin && ` from ${origin}`}: ${tilt_deg.toFixed(1)}° off ${up}, at ${(100 * height_m).toFixed(1)} cm`;
-}
-
-/** @param {string} text */
-function heading(text) {
-  return make("h4", {}, text);
-}
-
-function note() {
-  return make("p", "section-note");
 }
 
 /** @param {HTMLElement[]} all */

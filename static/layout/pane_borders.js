@@ -10,6 +10,7 @@ import { makeSeparator, onDrag, showPosition } from "../widgets/separator.js";
 
 /** Width of the area that takes the pointer. */
 const REACH_PX = 8;
+const HOW = "Drag to resize, double-click to reset";
 const CORNER_PX = 14;
 /** Borders of neighbouring tracks that are this close move together at their corner. */
 const ALIGNED_PX = 6;
@@ -65,14 +66,10 @@ export class PaneBorders {
       this.#grid.append(...(known.bar.isConnected ? [] : [known.bar]));
       return known.bar;
     }
-    const bar = make("div");
+    const orientation = border.isVertical ? "vertical" : "horizontal";
+    const bar = make("div", { className: "pane-border", role: "separator", tabIndex: 0, title: HOW, "aria-orientation": orientation });
     const shown = { bar, border };
     this.#shown.set(keyOf(border), shown);
-    bar.className = "pane-border";
-    bar.setAttribute("role", "separator");
-    bar.tabIndex = 0;
-    bar.title = "Drag to resize, double-click to reset";
-    bar.setAttribute("aria-orientation", border.isVertical ? "vertical" : "horizontal");
     makeSeparator(bar, {
       position: () => shown.border.sizes[shown.border.index],
       moveTo: (size) => this.#move(shown.border, size),
@@ -96,7 +93,7 @@ export class PaneBorders {
 
   /** By keys, each border is moved by itself. */
   #newCorner() {
-    const element = make("div", { className: "pane-corner", title: "Drag to resize, double-click to reset", "aria-hidden": "true" });
+    const element = make("div", { className: "pane-corner", title: HOW, "aria-hidden": "true" });
     const corner = { element, borders: /** @type {Border[]} */ ([]) };
     onDrag(element, () => {
       const moved = corner.borders;

@@ -15,12 +15,11 @@ const HINTS = {
 };
 
 export class DragHint {
-  #element = make("div", { className: "drag-hint", "aria-hidden": "true" });
+  #element = make("div", { className: "drag-hint", "aria-hidden": "true", hidden: true });
   /** @type {import("../model/protocol.js").DragMode | null} the mode of the text that is shown */
   #mode = null;
 
   constructor() {
-    this.#element.hidden = true;
     document.body.append(this.#element);
   }
 

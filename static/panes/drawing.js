@@ -1,6 +1,6 @@
 /** Draw a pane: pictures, and vectors over them. All sizes on the screen are CSS pixels. */
 
-import { setText } from "../widgets/canvas.js";
+import { addLine, diamondPath, setText } from "../widgets/canvas.js";
 import { OFF_DASH, imageColor } from "../widgets/image_colors.js";
 
 /**
@@ -133,10 +133,9 @@ export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
     const isFaint = style.ofPerson && isDimmed(path.person);
     const layer = style.switch ?? style.layer;
     context.globalAlpha = (layer ? layers.opacity[layer] : 1) * (isFaint ? DIMMED : 1);
-    context.setLineDash(path.kind === "model" && path.side === "right" ? RIGHT_DASH : style.dash);
-    stroke(context, line, path.color, style.width, style.hasOutline && !isFaint);
+    const dash = path.kind === "model" && path.side === "right" ? RIGHT_DASH : style.dash;
+    stroke(context, line, path.color, style.width, style.hasOutline && !isFaint, dash);
   }
-  context.setLineDash([]);
   context.globalAlpha = 1;
 }
 
@@ -196,9 +195,11 @@ function tracePath(view, segments, first, count) {
  * @param {string} color
  * @param {number} width
  * @param {boolean} hasOutline
+ * @param {number[]} dash
  */
-export function stroke(context, line, color, width, hasOutline = true) {
+export function stroke(context, line, color, width, hasOutline = true, dash = []) {
   context.lineJoin = context.lineCap = "round";
+  context.setLineDash(dash);
   if (hasOutline) {
     context.strokeStyle = imageColor("outline");
     context.lineWidth = width + 2;
@@ -207,6 +208,7 @@ export function stroke(context, line, color, width, hasOutline = true) {
   context.strokeStyle = color;
   context.lineWidth = width;
   context.stroke(line);
+  context.setLineDash([]);
 }
 
 /**
@@ -240,15 +242,11 @@ export function drawSkeleton(context, placed, people, opacity) {
     for (const [from, to] of person.bones) {
       const [a, b] = [joints.get(from), joints.get(to)];
       if (!a || !b) continue;
-      const line = b.handle.side === "right" ? dashed : solid;
-      line.moveTo(a.x, a.y);
-      line.lineTo(b.x, b.y);
+      addLine(b.handle.side === "right" ? dashed : solid, a, b);
     }
     context.globalAlpha = opacity;
     stroke(context, solid, imageColor("neutral"), 1.25);
-    context.setLineDash(RIGHT_DASH);
-    stroke(context, dashed, imageColor("neutral"), 1.25);
-    context.setLineDash([]);
+    stroke(context, dashed, imageColor("neutral"), 1.25, true, RIGHT_DASH);
     context.globalAlpha = 1;
   });
 }
@@ -297,10 +295,7 @@ function handleOutline({ point, side }, x, y, grown) {
     const half = TORSO_HALF_SIDE + grown;
     outline.roundRect(x - half, y - half, 2 * half, 2 * half, 2);
   } else if (side === "right") {
-    const radius = DIAMOND_RADIUS + grown;
-    outline.moveTo(x, y - radius);
-    for (const [dx, dy] of [[radius, 0], [0, radius], [-radius, 0]]) outline.lineTo(x + dx, y + dy);
-    outline.closePath();
+    outline.addPath(diamondPath(x, y, DIAMOND_RADIUS + grown));
   } else {
     outline.arc(x, y, JOINT_RADIUS + grown, 0, 2 * Math.PI);
   }
@@ -320,12 +315,7 @@ function handleOutline({ point, side }, x, y, grown) {
 export function drawOutOfReach(context, view, outOfReach, handle, color, paneWidth) {
   const wanted = view.toScreen(outOfReach.u, outOfReach.v);
   const reached = view.toScreen(outOfReach.point_u, outOfReach.point_v);
-  const line = new Path2D();
-  line.moveTo(wanted.x, wanted.y);
-  line.lineTo(reached.x, reached.y);
-  context.setLineDash(OFF_DASH);
-  stroke(context, line, imageColor("off"), 1.75);
-  context.setLineDash([]);
+  stroke(context, addLine(new Path2D(), wanted, reached), imageColor("off"), 1.75, true, OFF_DASH);
   const outline = handleOutline(handle ?? { point: "", side: "" }, wanted.x, wanted.y, 1.5);
   stroke(context, outline, color, 2.25);
   drawLabel(context, [`out of reach by ${Math.round(100 * outOfReach.distance_m)} cm`], { x: wanted.x, y: Math.max(wanted.y, CORNERS_PX) }, paneWidth);

@@ -16,7 +16,6 @@ export class ImageToneMenu {
   #title = make("h3");
   #camera = 0;
   #closedAt = -Infinity;
-  #reset = make("button", {}, "Reset");
   /** @type {(() => void)[]} */
   #show = [];
 
@@ -86,14 +85,10 @@ export class ImageToneMenu {
   }
 
   #buildFoot() {
-    const foot = make("div", "popover-foot");
     const all = make("button", { type: "button", title: "Apply these settings to all cameras", onclick: () => this.#imageTones.setAll(this.#tone) }, "All cameras");
-    this.#reset.type = "button";
-    this.#reset.title = "Show the original image";
-    this.#reset.addEventListener("click", () => this.#imageTones.set(this.#camera, PLAIN));
-    this.#show.push(() => (this.#reset.disabled = isPlain(this.#tone)));
-    foot.append(all, this.#reset);
-    this.#panel.append(foot);
+    const reset = make("button", { type: "button", title: "Show the original image", onclick: () => this.#imageTones.set(this.#camera, PLAIN) }, "Reset");
+    this.#show.push(() => (reset.disabled = isPlain(this.#tone)));
+    this.#panel.append(make("div", "popover-foot", all, reset));
   }
 }
 

@@ -1,6 +1,6 @@
 /** Popover of all layers, and switches of the most important ones in the top bar. */
 
-import { byId, make, onChange } from "../widgets/elements.js";
+import { byId, checkbox, make, onChange } from "../widgets/elements.js";
 import { BY_KEY, LAYERS } from "../model/layers.js";
 import { opensPopover, slider, togglePopover } from "../widgets/popovers.js";
 
@@ -73,10 +73,8 @@ export class LayersMenu {
     element.className = "popover-check";
     input.dataset.layer = id;
     input.addEventListener("change", () => this.#layers.toggle([id], input.checked));
-    const key = make("kbd");
     const number = BY_KEY.indexOf(id) + 1;
-    key.textContent = number ? `⇧${number}` : "";
-    key.title = number ? `Shift+${number}` : "";
+    const key = make("kbd", { title: number ? `Shift+${number}` : "" }, number ? `⇧${number}` : "");
     const opacity = slider({
       label: `Opacity of ${label.toLowerCase()}`,
       title: `Opacity of ${label.toLowerCase()}`,
@@ -103,8 +101,7 @@ export class LayersMenu {
       ["person", "by person", "Colour contours by person"],
       ["part", "by part", "Colour contours by body part"],
     ])) {
-      const { element, input } = checkbox(label, title);
-      Object.assign(input, { type: "radio", name: "contour-colors", value });
+      const { element, input } = checkbox(label, title, { type: "radio", name: "contour-colors", value });
       input.addEventListener("change", () => this.#layers.setColors(value));
       this.#show.push(() => (input.checked = this.#store.facts.layers.colors === value));
       choice.append(element);
@@ -113,22 +110,7 @@ export class LayersMenu {
   }
 
   #buildFoot() {
-    const foot = make("div", "popover-foot");
     const reset = make("button", { type: "button", id: "reset-layers", title: "Restore the default layers and opacities", onclick: () => this.#layers.reset() }, "Reset layers");
-    foot.append(make("span", {}, "Saved in this browser for this session"), reset);
-    this.#panel.append(foot);
+    this.#panel.append(make("div", "popover-foot", make("span", {}, "Saved in this browser for this session"), reset));
   }
-}
-
-/**
- * @param {string} label
- * @param {string} title
- */
-function checkbox(label, title) {
-  const element = make("label");
-  const input = make("input", { type: "checkbox" });
-  const text = make("span", {}, label);
-  element.title = title;
-  element.append(input, text);
-  return { element, input };
 }

@@ -1,6 +1,7 @@
 /** Lines that are measured in the pictures, and are no part of a pose: axes of silhouettes, epipolar lines, misfits. */
 
 import { shownMisfits } from "../model/selectors.js";
+import { addLine } from "../widgets/canvas.js";
 import { imageColor } from "../widgets/image_colors.js";
 import { LINE_STYLES, stroke } from "./drawing.js";
 
@@ -25,10 +26,7 @@ export function drawAxes(context, view, { finding, layers, state }, camera) {
   context.save();
   for (const lines of people) {
     lines.forEach(([u0, v0, u1, v1], round) => {
-      const [from, to] = [view.toScreen(u0, v0), view.toScreen(u1, v1)];
-      const path = new Path2D();
-      path.moveTo(from.x, from.y);
-      path.lineTo(to.x, to.y);
+      const path = addLine(new Path2D(), view.toScreen(u0, v0), view.toScreen(u1, v1));
       const isLast = round === lines.length - 1;
       context.globalAlpha = layers.opacity.axes * (isLast ? 1 : FIRST + ((1 - FIRST) * round) / lines.length);
       stroke(context, path, imageColor("mark"), isLast ? 2 : 1.25, isLast);
@@ -50,17 +48,12 @@ export function drawEpipolar(context, view, { epipolar, epipolarLines }, camera)
   const path = new Path2D();
   for (const line of epipolarLines?.lines ?? []) {
     if (line.camera !== camera) continue;
-    const [from, to] = [view.toScreen(line.x0, line.y0), view.toScreen(line.x1, line.y1)];
-    path.moveTo(from.x, from.y);
-    path.lineTo(to.x, to.y);
+    addLine(path, view.toScreen(line.x0, line.y0), view.toScreen(line.x1, line.y1));
   }
   for (const point of epipolar.kept) {
     if (point.camera !== camera) continue;
     const { x, y } = view.toScreen(point.u, point.v);
-    for (const [dx, dy] of [[CROSS_PX, CROSS_PX], [CROSS_PX, -CROSS_PX]]) {
-      path.moveTo(x - dx, y - dy);
-      path.lineTo(x + dx, y + dy);
-    }
+    for (const dy of [CROSS_PX, -CROSS_PX]) addLine(path, { x: x - CROSS_PX, y: y - dy }, { x: x + CROSS_PX, y: y + dy });
   }
   stroke(context, path, imageColor("mark"), LINE_STYLES.epipolar.width, true);
 }
@@ -79,13 +72,11 @@ export function drawMisfits(context, view, facts, camera) {
   for (const { camera: of, u, v, du, dv } of shownMisfits(facts)) {
     if (of !== camera) continue;
     const [from, to] = [view.toScreen(u, v), view.toScreen(u + factor * du, v + factor * dv)];
-    lines.moveTo(from.x, from.y);
-    lines.lineTo(to.x, to.y);
+    addLine(lines, from, to);
     const [way, length] = [Math.atan2(to.y - from.y, to.x - from.x), Math.hypot(to.x - from.x, to.y - from.y)];
     for (const side of [HEAD_RAD, -HEAD_RAD]) {
       const head = Math.min(HEAD_PX, length);
-      lines.moveTo(to.x, to.y);
-      lines.lineTo(to.x - head * Math.cos(way + side), to.y - head * Math.sin(way + side));
+      addLine(lines, to, { x: to.x - head * Math.cos(way + side), y: to.y - head * Math.sin(way + side) });
     }
   }
   stroke(context, lines, imageColor("mark"), 1.75, true);

@@ -1,6 +1,6 @@
 /** Labels in the corners of a pane: camera, visibility of the selected joint, cost, scale and tools. */
 
-import { make } from "../widgets/elements.js";
+import { make, textButton } from "../widgets/elements.js";
 import { displayName, px } from "../widgets/text.js";
 
 const SCALE_FROM_PX = 230;
@@ -36,21 +36,14 @@ export class PaneCorner {
    * @param {{reset: () => void, openToneMenu: (button: HTMLElement) => void}} run
    */
   constructor(camera, name, { reset, openToneMenu }) {
-    const number = make("kbd", {}, String(camera + 1));
-    const title = make("span", "pane-name", name);
     this.#joint.append(this.#mark, this.#word);
-    this.#label.append(number, title, this.#joint);
+    this.#label.append(make("kbd", {}, String(camera + 1)), make("span", "pane-name", name), this.#joint);
     this.#label.title = `Camera ${camera + 1}, ${name}: press ${keysOf(camera)} or double-click to fill the grid`;
 
     this.#scale.append("0", make("i"), this.#limit);
-    this.#fit = toolButton("Whole", "Show the whole image (0)", `Show the whole image of ${name}`);
-    this.#fit.classList.add("pane-reset");
-    this.#fit.addEventListener("click", () => {
-      this.#fit.blur();
-      reset();
-    });
-    this.#tone = toolButton("◐", "Brightness and contrast (I)", `Brightness and contrast of ${name}`);
-    this.#tone.classList.add("pane-tone");
+    this.#fit = textButton("Whole", "Show the whole image (0)", reset, { className: "pane-reset", "aria-label": `Show the whole image of ${name}` });
+    const adjust = "Brightness and contrast";
+    this.#tone = make("button", { type: "button", className: "pane-tone", title: `${adjust} (I)`, "aria-label": `${adjust} of ${name}` }, "◐");
     this.#tone.addEventListener("click", () => openToneMenu(this.#tone));
     this.#tools.append(this.#scale, this.#tone, this.#fit);
   }
@@ -72,8 +65,7 @@ export class PaneCorner {
   showPlaceholder(placeholder) {
     this.#placeholder.hidden = placeholder === null || placeholder.frame === placeholder.target;
     if (!placeholder) return;
-    const word = make("span"); // hidden in a narrow pane
-    word.textContent = "frame ";
+    const word = make("span", {}, "frame "); // hidden in a narrow pane
     this.#placeholder.replaceChildren(word, `${placeholder.frame}, while ${placeholder.target} loads`);
   }
 
@@ -115,13 +107,4 @@ export class PaneCorner {
 /** @param {number} camera */
 function keysOf(camera) {
   return camera < 9 ? `${camera + 1}` : `${[...String(camera + 1)].join(" ")}`;
-}
-
-/**
- * @param {string} text
- * @param {string} title
- * @param {string} name for screen readers
- */
-function toolButton(text, title, name) {
-  return make("button", { type: "button", title, "aria-label": name }, text);
 }

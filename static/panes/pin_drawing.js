@@ -1,5 +1,6 @@
 /** Draw the pins of a view, their distance to the model, and their triangulated point. All sizes are CSS pixels. */
 
+import { addLine, diamondPath } from "../widgets/canvas.js";
 import { drawLabel, stroke } from "./drawing.js";
 import { displayName } from "../widgets/text.js";
 import { OFF_DASH, imageColor } from "../widgets/image_colors.js";
@@ -97,12 +98,7 @@ function drawError(context, view, { pin, x, y }) {
   if (pin.model_u === null || pin.model_v === null) return;
   const model = view.toScreen(pin.model_u, pin.model_v);
   if (Math.hypot(model.x - x, model.y - y) < MIN_ERROR_PX) return;
-  const line = new Path2D();
-  line.moveTo(x, y);
-  line.lineTo(model.x, model.y);
-  context.setLineDash(OFF_DASH);
-  stroke(context, line, imageColor("off"), 1.5);
-  context.setLineDash([]);
+  stroke(context, addLine(new Path2D(), { x, y }, model), imageColor("off"), 1.5, true, OFF_DASH);
 }
 
 /**
@@ -113,10 +109,7 @@ function drawError(context, view, { pin, x, y }) {
  */
 function drawPin(context, { x, y, headX, headY }, color, isGrown) {
   const radius = HEAD_RADIUS + (isGrown ? 1.5 : 0);
-  const stem = new Path2D();
-  stem.moveTo(x, y);
-  stem.lineTo(headX, headY);
-  stroke(context, stem, "#fff", 1.5);
+  stroke(context, addLine(new Path2D(), { x, y }, { x: headX, y: headY }), "#fff", 1.5);
   const head = new Path2D();
   head.arc(headX, headY, radius, 0, 2 * Math.PI);
   context.strokeStyle = imageColor("outline");
@@ -142,12 +135,6 @@ function drawMeeting(context, view, overlay, camera, paneWidth) {
   const mark = overlay?.triangulation?.marks.find((one) => one.camera === camera);
   if (!mark) return;
   const { x, y } = view.toScreen(mark.u, mark.v);
-  const diamond = new Path2D();
-  diamond.moveTo(x, y - MEETING_RADIUS);
-  diamond.lineTo(x + MEETING_RADIUS, y);
-  diamond.lineTo(x, y + MEETING_RADIUS);
-  diamond.lineTo(x - MEETING_RADIUS, y);
-  diamond.closePath();
-  stroke(context, diamond, imageColor("mark"), 1.5);
+  stroke(context, diamondPath(x, y, MEETING_RADIUS), imageColor("mark"), 1.5);
   if (mark.error_px !== null) drawLabel(context, [`${mark.error_px.toFixed(1)} px`], { x, y: y + 16 }, paneWidth);
 }

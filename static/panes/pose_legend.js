@@ -64,10 +64,7 @@ export function mountPoseLegend(store) {
  * @param {{kind: Kind, color: string}} [line] of which a sample is drawn
  */
 function entry(text, line) {
-  const item = make("span");
-  if (line) item.append(sampleOf(line.kind, line.color));
-  item.append(text);
-  return item;
+  return make("span", {}, ...(line ? [sampleOf(line.kind, line.color)] : []), text);
 }
 
 /**

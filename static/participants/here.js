@@ -60,14 +60,11 @@ export class Here {
    * @param {number} index
    */
   #row(person, index) {
-    const row = make("li");
     const name = make("span", "participant-name is-clipped", nameOf(person) + (person.is_self ? " (you)" : ""));
     const role = make("span", "quiet", ROLES[person.role]);
-    const work = capital(person.doing);
     const at = make("button", { type: "button", title: `Go to frame ${person.frame}`, disabled: person.is_self }, `Frame ${person.frame}`); // prettier-ignore
     at.addEventListener("click", () => this.#context.navigation.goTo(person.frame));
-    row.append(chipOf(person, index), name, role, at, make("span", "participant-work", work));
-    return row;
+    return make("li", {}, chipOf(person, index), name, role, at, make("span", "participant-work", capital(person.doing)));
   }
 }
 
@@ -76,8 +73,6 @@ export class Here {
  * @param {number} index
  */
 function chipOf(person, index) {
-  const chip = make("span", { className: "participant-chip", "--participant": colorOf(index) }, initialsOf(person));
-  chip.classList.toggle("is-at-work", person.doing !== "");
-  chip.setAttribute("aria-hidden", "true");
-  return chip;
+  const className = `participant-chip${person.doing ? " is-at-work" : ""}`;
+  return make("span", { className, "--participant": colorOf(index), "aria-hidden": "true" }, initialsOf(person));
 }

@@ -12,9 +12,8 @@ export function joinForm({ store, joinAs }, place) {
   const form = make("form", "join-form");
   const input = make("input", { type: "text", id: `join-name-${place}`, name: "name", maxLength: 60, required: true, autocomplete: "name", className: "query-field" }); // prettier-ignore
   const label = make("label", { htmlFor: input.id });
-  const join = make("button", { type: "submit" }, "Join");
+  const join = make("button", { type: "submit", title: "Work under this name, on a frame of your own (Enter)" }, "Join");
   const refusal = make("output", "join-refusal");
-  join.title = "Work under this name, on a frame of your own (Enter)";
   form.append(label, input, join, refusal);
   form.addEventListener("submit", (event) => {
     event.preventDefault();

@@ -14,8 +14,7 @@ const [STEP_PX, MAX_STEPS] = [13, 2];
  * @param {import("../model/store.js").Store} store
  */
 export function mountPlaceMarks(timeline, store) {
-  const layer = make("div", "place-marks");
-  layer.setAttribute("aria-hidden", "true"); // the list of people says the same
+  const layer = make("div", { className: "place-marks", "aria-hidden": "true" }); // the list of people says the same
   timeline.append(layer);
   new ResizeObserver(() => show()).observe(timeline);
   store.on(["presence", "session", "visible"], show);
@@ -27,10 +26,10 @@ export function mountPlaceMarks(timeline, store) {
     const shown = others.filter(({ person }) => axis.shows(person.frame));
     const marks = shown.map(({ person, index }, at) => {
       const before = shown.slice(0, at).filter((one) => Math.abs(axis.middle(one.person.frame) - axis.middle(person.frame)) < WIDTH_PX);
-      const mark = make("span", { className: "place-mark", title: `${nameOf(person)} is on frame ${person.frame}` }, initialsOf(person));
+      const properties = { className: "place-mark", title: `${nameOf(person)} is on frame ${person.frame}`, "--participant": colorOf(index) };
+      const mark = make("span", properties, initialsOf(person));
       mark.style.left = `${axis.middle(person.frame)}px`;
       mark.style.top = `${2 + STEP_PX * Math.min(before.length, MAX_STEPS)}px`;
-      mark.style.setProperty("--participant", colorOf(index));
       return mark;
     }); // prettier-ignore
     layer.replaceChildren(...marks);

@@ -2,7 +2,7 @@
 
 import { mountCopyMenu } from "./copy_menu.js";
 import { meaning, shortName } from "./dof_names.js";
-import { button, byId, icon, make, onChange } from "../widgets/elements.js";
+import { button, byId, icon, make, onChange, textButton } from "../widgets/elements.js";
 import { numberField } from "../widgets/number_field.js";
 import { makeScrubber } from "../widgets/scrubber.js";
 import { displayName } from "../widgets/text.js";
@@ -125,11 +125,10 @@ export class JointBar {
    */
   #field(info, dof, point) {
     const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
-    const row = make("div", "dof");
     const hint = "Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.";
     const effect = meaning(info);
-    row.title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}, ${range(info)}. ${hint}`;
-    const label = make("span", "dof-name is-clipped", span("is-whole", name), span("is-brief", shortName(info.name)));
+    const title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}, ${range(info)}. ${hint}`;
+    const label = make("span", "dof-name is-clipped", make("span", "is-whole", name), make("span", "is-brief", shortName(info.name)));
     makeScrubber(label, {
       begin: () => (this.#posing.isLocked([dof]) ? null : (this.#store.facts.state?.dofs[dof] ?? null)),
       perPixel: PER_PIXEL[info.unit],
@@ -143,13 +142,9 @@ export class JointBar {
     });
     entry.element.addEventListener("focus", () => this.#posing.selectDof(dof));
     const unit = make("span", "dof-unit", UNITS[info.unit]);
-    const lock = make("button", { type: "button", className: "is-lock" });
-    lock.addEventListener("click", (event) => {
-      if (event.detail > 0) lock.blur();
-      this.#posing.toggleLock([dof]);
-    });
+    const lock = textButton("", "", () => this.#posing.toggleLock([dof]), { className: "is-lock" });
+    const row = make("div", { className: "dof", title }, label, entry.element, unit, lock);
     row.addEventListener("pointerdown", () => this.#posing.selectDof(dof));
-    row.append(label, entry.element, unit, lock);
     return { dof, row, entry, lock };
   }
 
@@ -187,14 +182,6 @@ export class JointBar {
     }
     showLock(lock, isLocked, `${displayName(info.joint)} ${info.name}`);
   }
-}
-
-/**
- * @param {string} className
- * @param {string} text
- */
-function span(className, text) {
-  return make("span", className, text);
 }
 
 /**

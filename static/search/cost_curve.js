@@ -2,7 +2,7 @@
  * Plot of best and tested costs by number of poses evaluated, with stages and other runs. A click replays that step.
  */
 
-import { setText } from "../widgets/canvas.js";
+import { fillRect, setText } from "../widgets/canvas.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
 import { byId, make } from "../widgets/elements.js";
@@ -146,12 +146,9 @@ export class CostCurve {
   #drawMarks(context, plot, run, steps, style) {
     const replay = this.#store.facts.searchRuns?.replay ?? null;
     const replayed = replay?.run === run.number ? Math.min(replay.step, steps.count - 1) : null;
-    context.fillStyle = style.getPropertyValue("--text");
     for (const [step, alpha] of /** @type {[number | null, number][]} */ ([[replayed, 1], [this.#hovered, 0.5]])) {
       if (step === null || step < 0 || step >= steps.count) continue;
-      context.globalAlpha = alpha;
-      context.fillRect(plot.x(steps.evaluations[step]) - 0.5, plot.top, 1, plot.bottom - plot.top);
-      context.globalAlpha = 1;
+      fillRect(context, style.getPropertyValue("--text"), plot.x(steps.evaluations[step]) - 0.5, plot.top, 1, plot.bottom - plot.top, alpha);
     }
     const at = this.#hovered ?? replayed ?? steps.count - 1;
     if (at < 0 || at >= steps.count) {
@@ -205,10 +202,7 @@ function drawStages(context, plot, run, steps, style) {
   for (let i = 0; i < steps.count; i += 1) {
     if (i > 0 && steps.stages[i] === steps.stages[i - 1]) continue;
     const x = plot.x(i > 0 ? steps.evaluations[i - 1] : 0);
-    context.fillStyle = style.getPropertyValue("--faint");
-    context.globalAlpha = 0.6;
-    context.fillRect(x, plot.top, 1, plot.bottom - plot.top);
-    context.globalAlpha = 1;
+    fillRect(context, style.getPropertyValue("--faint"), x, plot.top, 1, plot.bottom - plot.top, 0.6);
     const stage = run.stages[steps.stages[i]];
     if (!stage || x < free) continue;
     const name = `${stage.name} ×${stage.factor}`;

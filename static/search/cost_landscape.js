@@ -1,9 +1,10 @@
 /** Plot of the cost over the range of one degree of freedom. Hovering reads values, a click sets the value. */
 
+import { fillRect } from "../widgets/canvas.js";
 import { colorName, dashOf, lineSwatch } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
 import { byId, make, onChange, textButton } from "../widgets/elements.js";
-import { Plot } from "../widgets/plot.js";
+import { Plot, nearest } from "../widgets/plot.js";
 import { displayName } from "../widgets/text.js";
 
 /** @typedef {import("../model/search_runs.js").Landscape} Landscape */
@@ -169,9 +170,7 @@ export function mountCostLandscape(store, send) {
     context.lineWidth = 2;
     context.stroke();
     if (hovered !== null) {
-      context.globalAlpha = 0.5;
-      context.fillRect(plot.x(found.values[hovered] * factor) - 0.5, plot.top, 1, height);
-      context.globalAlpha = 1;
+      fillRect(context, style.getPropertyValue("--text"), plot.x(found.values[hovered] * factor) - 0.5, plot.top, 1, height, 0.5);
     }
   }
 
@@ -200,26 +199,12 @@ export function mountCostLandscape(store, send) {
  * @param {number} index of the curve
  */
 function legendEntry(label, index) {
-  const entry = make("span");
-  if (label) {
-    entry.append(lineSwatch(index), label);
-    entry.title = index === 0 ? "Mean of all views, px" : `Cost in ${label}, px`;
-  } else {
-    entry.title = "Value under the pointer, or of the current pose";
-  }
-  entry.append(make("output"));
-  return entry;
+  const ofCurve = index === 0 ? "Mean of all views, px" : `Cost in ${label}, px`;
+  const title = label ? ofCurve : "Value under the pointer, or of the current pose";
+  return make("span", { title }, ...(label ? [lineSwatch(index), label] : []), make("output"));
 }
 
 /** @param {Float32Array} costs */
 function indexOfMin(costs) {
   return costs.reduce((best, cost, index) => (cost < costs[best] ? index : best), 0);
-}
-
-/**
- * @param {Float32Array} values ascending
- * @param {number} value
- */
-function nearest(values, value) {
-  return values.reduce((best, one, index) => (Math.abs(one - value) < Math.abs(values[best] - value) ? index : best), 0);
 }

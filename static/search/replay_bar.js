@@ -8,7 +8,7 @@ const STEPS_PER_S = 12;
 export class ReplayBar {
   #store;
   #send;
-  #slider = make("input");
+  #slider;
   #text = make("output", "replay-text is-clipped");
   #buttons;
   #leave;
@@ -34,11 +34,9 @@ export class ReplayBar {
       iconButton("m6 3.5 5 4.5-5 4.5", "One step forward", go(1)),
       iconButton("M12 3.5v9M3.5 3.5l6 4.5-6 4.5z", "Last step of the search", () => this.#goTo(Infinity)),
     ];
-    const slider = this.#slider;
-    slider.type = "range";
-    slider.min = "-1";
-    slider.setAttribute("aria-label", "Step of the search");
-    slider.title = "Drag to replay the search; arrow keys move by one step";
+    const title = "Drag to replay the search; arrow keys move by one step";
+    const slider = make("input", { type: "range", min: "-1", title, "aria-label": "Step of the search" });
+    this.#slider = slider;
     slider.addEventListener("input", () => this.#goTo(Number(slider.value)));
     this.#leave = textButton("Exit", "Exit the replay and show the current pose (Esc)", () => {
       this.#pause();

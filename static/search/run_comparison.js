@@ -103,7 +103,6 @@ export function mountRunComparison(store, navigation, actions, open) {
    */
   function stretch(stretch, isBusy) {
     const { first, last, person, verdict, frames } = stretch;
-    const item = make("li", `is-${verdict}`);
     const named = first === last ? `frame ${first}` : `frames ${first}–${last}`;
     const go = small(capital(named), `Go to frame ${first}`, () => navigation.goTo(first));
     const text = make("span", {}, `${verdict} on ${count(frames)}`);
@@ -115,8 +114,7 @@ export function mountRunComparison(store, navigation, actions, open) {
       actions.takeReplaced({ person, first, last }),
     );
     back.disabled = isBusy;
-    item.append(go, text, keep, back);
-    return item;
+    return make("li", `is-${verdict}`, go, text, keep, back);
   }
 
   /**
@@ -127,18 +125,9 @@ export function mountRunComparison(store, navigation, actions, open) {
     const row = make("tr", { "data-frame": String(pose.frame), onclick: () => navigation.goTo(pose.frame) });
     const head = make("th", { scope: "row" }, make("button", { type: "button", title: `Go to frame ${pose.frame}` }, String(pose.frame)));
     const [now, other] = [pose.cost_px, pose.other_cost_px];
-    const apart = cell(pose.apart_mm.toFixed(1));
-    apart.className = "run-comparison-apart";
-    apart.style.setProperty("--share", String(pose.apart_mm / largest));
-    row.append(
-      head,
-      cost(now, other),
-      status(pose.status),
-      cost(other, now),
-      status(pose.other_status),
-      apart,
-      cell(`${pose.farthest_mm.toFixed(1)}, ${pose.farthest}`),
-    );
+    const apart = make("td", { className: "run-comparison-apart", "--share": String(pose.apart_mm / largest) }, pose.apart_mm.toFixed(1));
+    const farthest = make("td", {}, `${pose.farthest_mm.toFixed(1)}, ${pose.farthest}`);
+    row.append(head, cost(now, other), status(pose.status), cost(other, now), status(pose.other_status), apart, farthest);
     return row;
   }
 
@@ -199,24 +188,17 @@ function methods(all) {
   return [...new Set(all)].map(displayName).join(", ");
 }
 
-/** @param {string} text */
-function cell(text) {
-  return make("td", {}, text);
-}
-
 /**
  * @param {number | null} own
  * @param {number | null} other
  */
 function cost(own, other) {
-  const element = cell(own === null ? "–" : own.toFixed(2));
+  const element = make("td", {}, own === null ? "–" : own.toFixed(2));
   element.classList.toggle("is-better", own !== null && other !== null && own < other - LEAST_PX);
   return element;
 }
 
 /** @param {string} text */
 function status(text) {
-  const element = cell(text || "–");
-  element.dataset.status = text;
-  return element;
+  return make("td", { "data-status": text }, text || "–");
 }

@@ -45,11 +45,9 @@ export class RunList {
    * @returns {Row}
    */
   #makeRow(number) {
-    const element = make("div", "run-row");
     const look = textButton(`Run ${number}`, `Show costs, stages and candidates of run ${number}`, () => {
       this.#store.set({ searchRun: number });
-    });
-    look.className = "run-name";
+    }, { className: "run-name" }); // prettier-ignore
     look.prepend(lineSwatch(number - 1));
     const figures = make("div", "run-figures");
     const differs = make("div", "run-differs is-clipped");
@@ -60,7 +58,7 @@ export class RunList {
     const take = textButton("Apply", `Use the pose found by run ${number}. Can be undone`, () =>
       this.#send({ type: "take", run: number, candidate: null }),
     );
-    element.append(look, figures, compare, take, differs);
+    const element = make("div", "run-row", look, figures, compare, take, differs);
     return { element, figures, differs, compare, take };
   }
 

@@ -24,8 +24,8 @@ const MEASURED = "The cost uses the edges near the start pose; the final cost in
 export function mountSearchPanel(store, actions, send) {
   const panel = byId("search-panel", HTMLElement);
   const controls = byId("search-controls", HTMLElement);
-  const speedField = make("select");
-  const figures = make("output");
+  const speedField = make("select", { "aria-label": "Expansions per second" }, ...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
+  const figures = make("output", { className: "search-figures", "aria-label": "Progress of the search" });
   let isShown = false;
   const buttons = makeButtons();
   const theta = makeNumber({
@@ -46,9 +46,7 @@ export function mountSearchPanel(store, actions, send) {
     if (changed.has("drawer")) open();
     if (!isShown) return;
     if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "search" });
-    if (["state", "connected", "settings", "searchSetup", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
-      show();
-    }
+    if (["state", "connected", "settings", "searchSetup", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"state"} */ (f)))) show();
     for (const view of views) view.update(changed);
   });
   open();
@@ -83,12 +81,8 @@ export function mountSearchPanel(store, actions, send) {
   function build() {
     const group = make("div", { className: "group", role: "group", "aria-label": "Search" }, ...Object.values(buttons));
     const speed = make("label", { className: "search-field", title: "Search speed in expansions per second. Changes take effect immediately" });
-    speedField.append(...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
-    speedField.setAttribute("aria-label", "Expansions per second");
     onChange(speedField, () => send({ type: "search_speed", per_second: Number(speedField.value) || null }));
     speed.append("Speed", speedField);
-    figures.className = "search-figures";
-    figures.setAttribute("aria-label", "Progress of the search");
     controls.append(group, speed, theta.element, figures);
   }
 
@@ -121,9 +115,7 @@ export function mountSearchPanel(store, actions, send) {
     stop.disabled = !isReady || !(hasSearch(state) || hasTrack(state));
     stop.title = hasTrack(state) ? "Stop tracking and keep the results (Esc)" : stopTitle(isRunning);
     if (settings) theta.show(settings.search.theta_px);
-    if (searchSetup) {
-      if (document.activeElement !== speedField) speedField.value = String(searchSetup.speed ?? 0);
-    }
+    if (searchSetup && document.activeElement !== speedField) speedField.value = String(searchSetup.speed ?? 0);
     const rate = run && run.seconds > 0 ? ` · ${count(run.evaluations / run.seconds)}/s` : "";
     figures.textContent = run ? `${count(run.evaluations)} poses${rate} · best ${px(run.best_px)}` : "No search";
     figures.title = run ? `Run ${run.number}: poses evaluated, poses per second, lowest cost. ${MEASURED}` : "";

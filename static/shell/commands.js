@@ -94,8 +94,8 @@ export function contextCommands({ store, navigation, grid, posing, layers, actio
   const { session, state, filled } = store.facts;
   /** @type {Command[]} */
   const commands = [];
-  const add = (/** @type {string} */ area, /** @type {string} */ label, /** @type {() => void} */ run, words = "") =>
-    commands.push({ id: `${area} ${label}`, area, label, keys: [], words, why: away, run });
+  const add = (/** @type {string} */ area, /** @type {string} */ label, /** @type {() => void} */ run, words = "", id = `${area} ${label}`) =>
+    commands.push({ id, area, label, keys: [], words, why: away, run });
   const frame = /^(?:go to\s+)?(?:frame\s*)?(\d+)$/i.exec(query.trim());
   const last = (session?.n_frames ?? 1) - 1;
   if (frame) {
@@ -105,27 +105,23 @@ export function contextCommands({ store, navigation, grid, posing, layers, actio
   }
   for (const { id, label, title } of LAYERS) {
     const isShown = store.facts.layers.shown[id];
-    add("Layer", `${isShown ? "Hide" : "Show"} ${label.toLowerCase()}`, () => layers.toggle([id]), `layer show hide ${title}`);
-    commands[commands.length - 1].id = `layer ${id}`;
+    add("Layer", `${isShown ? "Hide" : "Show"} ${label.toLowerCase()}`, () => layers.toggle([id]), `layer show hide ${title}`, `layer ${id}`);
   }
   session?.cameras.forEach(({ name }, index) => {
     const label = filled === index ? "Show all cameras" : `Fill the grid with ${name}`;
-    add("Camera", label, () => grid.toggleFill(index), `camera view ${index + 1} ${name}`);
-    commands[commands.length - 1].id = `camera ${name}`;
+    add("Camera", label, () => grid.toggleFill(index), `camera view ${index + 1} ${name}`, `camera ${name}`);
   });
   if ((session?.people.length ?? 0) > 1) {
     session?.people.forEach(({ name }, index) => {
       const isShown = state?.people[index]?.shown ?? true;
       add("Person", `Select ${name}`, () => actions.selectPerson(index), "person");
-      add("Person", `${isShown ? "Hide" : "Show"} ${name}`, () => actions.showPerson(index, !isShown), "person show hide");
-      commands[commands.length - 1].id = `shown ${name}`;
+      add("Person", `${isShown ? "Hide" : "Show"} ${name}`, () => actions.showPerson(index, !isShown), "person show hide", `shown ${name}`);
       if (index !== state?.person) add("Person", `Copy the pose of ${name}`, () => posing.copyPerson(index), "person joint angles");
     });
   }
   alternativesOf(store.facts).forEach(({ limbs }, rank) => {
     const where = limbs.length ? limbs.join(", ") : "body";
-    add("Posing", `Take alternative ${rank + 1}: ${where} elsewhere`, () => posing.takeAlternative(rank), "another pose ghost number");
-    commands[commands.length - 1].id = `alternative ${rank + 1}`;
+    add("Posing", `Take alternative ${rank + 1}: ${where} elsewhere`, () => posing.takeAlternative(rank), "another pose ghost number", `alternative ${rank + 1}`);
   });
   const points = session?.people[state?.person ?? 0]?.points ?? [];
   for (const point of points) add("Joint", `Select ${displayName(point)}`, () => posing.selectPoint(point), "joint");

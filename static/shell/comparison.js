@@ -1,6 +1,6 @@
 /** Before and after of the last fit or search: costs in the top bar and for each view, and a switch between the poses. */
 
-import { button, byId, make } from "../widgets/elements.js";
+import { button, byId, tableRow } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { px } from "../widgets/text.js";
 
@@ -76,16 +76,11 @@ function costs(before, after) {
  * @param {number | null} after
  */
 function row(name, before, after) {
-  const line = make("tr");
-  const head = make("th", { scope: "row" }, name);
   const change = before === null || after === null ? null : after - before;
   const isRise = change !== null && change > LEAST_PX;
   const sign = change === null ? "" : isRise ? "▲ +" : change < -LEAST_PX ? "▼ −" : "";
   const cells = [before?.toFixed(2) ?? "–", after?.toFixed(2) ?? "–", change === null ? "" : `${sign}${Math.abs(change).toFixed(2)}`];
-  line.append(
-    head,
-    ...cells.map((text) => make("td", {}, text)),
-  );
+  const line = tableRow(name, cells);
   line.classList.toggle("is-rise", isRise);
   return line;
 }

@@ -41,7 +41,9 @@ export class ExportPanel {
     this.#format.addEventListener("change", () => this.#show());
     this.#frames.addEventListener("keydown", (event) => event.key === "Enter" && void this.#run());
     this.#frames.addEventListener("input", () => this.#showNumbering());
-    for (const select of this.#panel.querySelectorAll("select")) this.#select(select);
+    for (const select of this.#panel.querySelectorAll("select")) { // whose keys must not reach the page
+      select.addEventListener("keydown", (event) => event.key !== "Escape" && event.stopPropagation());
+    }
   }
 
   /** Cancel the export in progress. */
@@ -59,11 +61,6 @@ export class ExportPanel {
       }
     }
     togglePopover(this.#panel, this.#open);
-  }
-
-  /** @param {HTMLSelectElement} select whose keys must not reach the page */
-  #select(select) {
-    select.addEventListener("keydown", (event) => event.key !== "Escape" && event.stopPropagation());
   }
 
   /** Fill the choices of the session, and the marked range. */

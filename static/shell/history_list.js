@@ -59,12 +59,9 @@ export class HistoryList {
     this.#list.replaceChildren(...rows);
     const again = had === undefined ? null : this.#list.querySelector(`[data-edit="${had}"]`);
     if (again instanceof HTMLElement) again.focus();
-    else if (wasEmpty || this.#panel.matches(":focus-within")) this.#currentRow?.focus();
-  }
-
-  get #currentRow() {
-    const row = this.#list.querySelector("[aria-current]");
-    return row instanceof HTMLElement ? row : null;
+    else if (wasEmpty || this.#panel.matches(":focus-within")) {
+      /** @type {HTMLElement | null} */ (this.#list.querySelector("[aria-current]"))?.focus();
+    }
   }
 
   /**
@@ -105,15 +102,10 @@ export class HistoryList {
 
   /** @param {string} text */
   #more(text) {
-    const item = make("li");
-    const row = make("button", { type: "button", className: "is-more" });
     const isLast = this.#limit >= MOST;
-    row.textContent = isLast ? `Only ${MOST.toLocaleString("en")} entries are listed. Undo and redo also reach the others` : text;
-    row.title = row.textContent;
-    row.disabled = isLast;
-    row.addEventListener("click", () => this.#ask(Math.min(MOST, 4 * this.#limit)));
-    item.append(row);
-    return item;
+    const title = isLast ? `Only ${MOST.toLocaleString("en")} entries are listed. Undo and redo also reach the others` : text;
+    const ask = () => this.#ask(Math.min(MOST, 4 * this.#limit));
+    return make("li", {}, make("button", { type: "button", className: "is-more", title, disabled: isLast, onclick: ask }, title));
   }
 
   /** @param {KeyboardEvent} event */

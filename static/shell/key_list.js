@@ -25,17 +25,11 @@ export class KeyList {
     for (const { keys, label, labels, area } of merged(table.filter((binding) => binding.keys.length > 0))) {
       let section = areas.get(area);
       if (!section) {
-        section = make("section");
-        section.append(make("h3", {}, area), make("dl"));
+        section = make("section", {}, make("h3", {}, area), make("dl"));
         areas.set(area, section);
       }
-      const row = make("div");
-      const [term, description] = [make("dt"), make("dd")];
-      term.append(keyCaps(keys));
-      description.textContent = label;
-      description.dataset.labels = JSON.stringify(labels);
-      row.append(term, description);
-      section.querySelector("dl")?.append(row);
+      const description = make("dd", { "data-labels": JSON.stringify(labels) }, label);
+      section.querySelector("dl")?.append(make("div", {}, make("dt", {}, keyCaps(keys)), description));
     }
     this.#list.replaceChildren(...areas.values());
   }

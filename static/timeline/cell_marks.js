@@ -2,6 +2,7 @@
  * Marks of the timeline: sources, statuses and keyframes. Besides its colour, each has its own shape. Sizes are CSS pixels.
  */
 
+import { diamondPath, fillRect } from "../widgets/canvas.js";
 import { make } from "../widgets/elements.js";
 
 /** @typedef {{color: string, bands: [number, number][]}} SourceMark */
@@ -57,12 +58,11 @@ export function fillBands(context, bands, x, width, { top, bottom }) {
  * @param {string} source
  */
 export function sourceSwatch(source) {
-  const mark = make("i");
   const { color, bands } = SOURCE_MARKS[source];
   const stops = bands.flatMap(([from, to]) => [
     `transparent ${100 * from}%`, `var(${color}) ${100 * from}% ${100 * to}%`, `transparent ${100 * to}%`,
   ]); // prettier-ignore
-  mark.className = "source-mark";
+  const mark = make("i", "source-mark");
   mark.style.backgroundImage = `linear-gradient(${stops.join(", ")})`;
   return mark;
 }
@@ -73,9 +73,7 @@ export function sourceSwatch(source) {
  * @param {string} status
  */
 export function statusSwatch(status) {
-  const mark = make("i");
-  mark.className = `status-mark is-${status}`;
-  return mark;
+  return make("i", `status-mark is-${status}`);
 }
 
 /** Sample of a pose of an earlier calibration for the legend. */
@@ -103,8 +101,7 @@ export const TASK_COLORS = { draft: "--muted", annotated: "--accent", verified: 
 export function drawTask(context, state, x, { top, bottom }, style) {
   const size = bottom - top;
   const left = Math.round(x - size / 2);
-  context.fillStyle = style.getPropertyValue("--chrome");
-  context.fillRect(left, top, size, size);
+  fillRect(context, style.getPropertyValue("--chrome"), left, top, size, size);
   context.fillStyle = context.strokeStyle = style.getPropertyValue(TASK_COLORS[state]);
   context.lineWidth = state === "rejected" ? 2 : 1;
   if (state === "rejected") {
@@ -127,9 +124,7 @@ export function drawTask(context, state, x, { top, bottom }, style) {
  * @param {string} state
  */
 export function taskSwatch(state) {
-  const mark = make("i");
-  mark.className = `task-mark is-${state}`;
-  return mark;
+  return make("i", `task-mark is-${state}`);
 }
 
 /**
@@ -169,17 +164,10 @@ export function hatch(context, color, stripes, isCrossed) {
  * @param {string} fill
  */
 export function drawDiamond(context, x, y, radius, fill = "#fff") {
-  context.beginPath();
-  context.moveTo(x, y - radius);
-  context.lineTo(x + radius, y);
-  context.lineTo(x, y + radius);
-  context.lineTo(x - radius, y);
-  context.closePath();
-  context.fillStyle = fill;
-  context.strokeStyle = DARK_INK;
-  context.lineWidth = 1;
-  context.fill();
-  context.stroke();
+  const diamond = diamondPath(x, y, radius);
+  Object.assign(context, { fillStyle: fill, strokeStyle: DARK_INK, lineWidth: 1 });
+  context.fill(diamond);
+  context.stroke(diamond);
 }
 
 /**
@@ -234,17 +222,15 @@ export function drawDimmed(context, axis, isKept, style, { top, bottom }) {
  */
 export function drawCopy(context, axis, { people, tolerance_mm }, style, { top, bottom }) {
   const of = (/** @type {string} */ name) => style.getPropertyValue(name);
-  context.fillStyle = of("--track");
-  context.fillRect(axis.left, top, axis.right - axis.left, bottom - top);
+  fillRect(context, of("--track"), axis.left, top, axis.right - axis.left, bottom - top);
   const height = bottom - top;
   for (const { frame, distance_mm, decided } of people.flat().sort((a, b) => a.distance_mm - b.distance_mm)) {
     if (!axis.shows(frame)) continue;
     const share = tolerance_mm > 0 ? Math.min(1, distance_mm / (2 * tolerance_mm)) : Number(distance_mm > 0);
     const tall = Math.max(2, Math.round(share * height));
     const width = Math.max(3, axis.pitch - gapOf(axis));
-    context.fillStyle = decided ? of("--faint") : distance_mm > tolerance_mm ? of("--warning") : of("--good");
-    context.fillRect(axis.middle(frame) - width / 2, bottom - tall, width, tall);
+    const color = decided ? "--faint" : distance_mm > tolerance_mm ? "--warning" : "--good";
+    fillRect(context, of(color), axis.middle(frame) - width / 2, bottom - tall, width, tall);
   }
-  context.fillStyle = of("--text");
-  context.fillRect(axis.left, Math.round((top + bottom) / 2), axis.right - axis.left, 1);
+  fillRect(context, of("--text"), axis.left, Math.round((top + bottom) / 2), axis.right - axis.left, 1);
 }

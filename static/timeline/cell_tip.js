@@ -5,13 +5,12 @@ import { make } from "../widgets/elements.js";
 const MARGIN_PX = 6;
 
 export class CellTip {
-  #tip = make("div", { id: "cell-tip", "aria-hidden": "true" });
+  #tip = make("div", { id: "cell-tip", "aria-hidden": "true", hidden: true });
   #over;
 
   /** @param {HTMLElement} over the timeline */
   constructor(over) {
     this.#over = over;
-    this.#tip.hidden = true;
     over.parentElement?.append(this.#tip);
   }
 

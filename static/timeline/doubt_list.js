@@ -1,6 +1,6 @@
 /** Tab of the drawer that lists doubtful and lost poses and doubted keyframes with thumbnails, the most severe first. */
 
-import { byId, iconButton, make } from "../widgets/elements.js";
+import { byId, iconButton, make, textButton } from "../widgets/elements.js";
 import { count, displayName, percent } from "../widgets/text.js";
 import { reasonOf } from "../model/selectors.js";
 import { contradictions } from "../model/keyframe_doubts.js";
@@ -28,8 +28,8 @@ export function mountDoubtList(store, queue) {
   /** @type {Map<string, HTMLLIElement>} rows by what they show */
   let rowsByKey = new Map();
   let limit = FEW_LISTED;
-  const moreRow = make("li");
-  const moreButton = make("button", { type: "button", className: "doubt-more" });
+  const moreButton = make("button", { type: "button", className: "doubt-more", title: "List less severe entries too" });
+  const moreRow = make("li", {}, moreButton);
   /** @type {(keyof import("../model/store.js").Facts)[]} */
   const listed = ["drawer", "timeline", "lanes", "session", "keyframeDoubts"];
   moreButton.addEventListener("click", () => {
@@ -37,7 +37,6 @@ export function mountDoubtList(store, queue) {
     show();
     list.children[FEW_LISTED]?.querySelector("button")?.focus();
   });
-  moreRow.append(moreButton);
   store.subscribe((changed) => {
     const isOpen = store.facts.drawer === "doubts";
     panel.hidden = controls.hidden = !isOpen;
@@ -60,7 +59,6 @@ export function mountDoubtList(store, queue) {
     }
     const hidden = doubts.length - shown.length;
     moreButton.textContent = `${count(hidden)} more`;
-    moreButton.title = "List less severe entries too";
     const rows = [...rowsByKey.values(), ...(hidden > 0 && limit < MAX_LISTED ? [moreRow] : [])];
     if (rows.length !== list.children.length || rows.some((row, i) => row !== list.children[i])) {
       const focused = list.contains(document.activeElement) ? document.activeElement : null;
@@ -117,35 +115,30 @@ export function mountDoubtList(store, queue) {
     const { session, calibration } = store.facts;
     const { person, first, last, spans, worst, status, limbs, limb, keyframe } = doubt;
     const info = session?.people[person];
-    const row = make("li");
-    const go = make("button", { type: "button", className: "doubt", "data-no-command": "" });
     const image = make("img", { alt: "", draggable: false });
     const cost = cellsOf(person)?.costs[worst] ?? 0;
     loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}-${calibration?.revision ?? 1}`);
-    const text = make("span", "doubt-text");
     const frames = `${first === last ? `frame ${first}` : `frames ${first}–${last}`}${spans.length > 1 ? `, in ${spans.length} stretches` : ""}`;
     const remark = cellsOf(person)?.get(worst)?.remark ?? "";
     const why =
       keyframe && session ? contradictions(keyframe, session).map((one) => `disagrees ${one}`)
       : limbs.length ? limbs.slice(0, 2).map(chanceOf)
       : [displayName(remark) || "pose uncertain"];
-    text.append(
-      line("status-badge", keyframe ? "keyframe" : status, keyframe ? "is-doubtful" : `is-${status}`),
+    const text = make(
+      "span",
+      "doubt-text",
+      line(`status-badge is-${keyframe ? "doubtful" : status}`, keyframe ? "keyframe" : status),
       ...((session?.people.length ?? 1) > 1 && info ? [named(info)] : []),
       ...why.map((words) => line("doubt-limb", words)),
       line("quiet", frames),
     );
+    const title = `Go to frame ${worst}, the worst of ${frames}: ${why.join("; ")}`;
+    const go = textButton("", title, () => queue.visit(doubt), { className: "doubt", "data-no-command": "" });
     go.append(image, text);
-    go.title = `Go to frame ${worst}, the worst of ${frames}: ${why.join("; ")}`;
-    go.addEventListener("click", (event) => {
-      if (event.detail > 0) go.blur();
-      queue.visit(doubt);
-    });
     const accepts = keyframe ? "this keyframe is right" : `mark ${frames} as reviewed`;
     const accept = iconButton(TICK, `Accept: ${accepts} (Alt+Enter)`, () => queue.accept(doubt));
     accept.classList.add("doubt-accept");
-    row.append(go, accept);
-    return row;
+    return make("li", {}, go, accept);
   }
 }
 
@@ -160,15 +153,11 @@ function chanceOf({ name, lost }, rank) {
 }
 
 /**
- * @param {string} kind class
+ * @param {string} kind classes
  * @param {string} text
- * @param {string} [more] another class
  */
-function line(kind, text, more) {
-  const one = make("span", `${kind} is-clipped`);
-  if (more) one.classList.add(more);
-  one.textContent = text;
-  return one;
+function line(kind, text) {
+  return make("span", `${kind} is-clipped`, text);
 }
 
 /**
@@ -186,7 +175,5 @@ function explain(row, sentence) {
 
 /** @param {import("../model/protocol.js").PersonInfo} person */
 function named({ name, color }) {
-  const one = line("person-name", name);
-  one.style.setProperty("--person", color);
-  return one;
+  return make("span", { className: "person-name is-clipped", "--person": color }, name);
 }

@@ -16,16 +16,12 @@ export function mountJumpMenu(store, jumps, listDoubts) {
   const menu = byId("jump-menu", HTMLElement);
   /** @type {Map<import("./jumps.js").Kind, {count: HTMLElement, buttons: HTMLButtonElement[]}>} */
   const rowsByKind = new Map();
-  const gapButton = make("button");
-  const list = make("button", {}, "List doubts by severity");
+  const gap = { type: /** @type {const} */ ("button"), className: "jump-gap", title: "Go to the middle of the longest gap between keyframes, the best place for a new one (Q)" };
+  const gapButton = make("button", { ...gap, onclick: () => jumps.toLongestGap() }, "Longest gap between keyframes");
   const previous = button("previous-doubt", () => jumps.go("doubt", -1));
   const next = button("next-doubt", () => jumps.go("doubt", 1));
   const open = button("show-jumps", () => show(menu.hidden));
   build();
-  list.addEventListener("click", () => {
-    show(false);
-    listDoubts();
-  });
   document.addEventListener("pointerdown", (event) => {
     const at = /** @type {Node} */ (event.target);
     if (!menu.contains(at) && !open.contains(at)) show(false);
@@ -58,15 +54,13 @@ export function mountJumpMenu(store, jumps, listDoubts) {
       rowsByKind.set(kind, { count: number, buttons });
       return row;
     });
-    gapButton.type = "button";
-    gapButton.className = "jump-gap";
-    gapButton.textContent = "Longest gap between keyframes";
-    gapButton.title = "Go to the middle of the longest gap between keyframes, the best place for a new one (Q)";
-    gapButton.addEventListener("click", () => jumps.toLongestGap());
-    list.type = "button";
-    list.className = "jump-list";
-    list.title = "List doubtful and lost poses with thumbnails, most severe first (Shift+L)";
-    menu.append(...rows, gapButton, list);
+    const title = "List doubtful and lost poses with thumbnails, most severe first (Shift+L)";
+    menu.append(...rows, gapButton, make("button", { type: "button", className: "jump-list", title, onclick: toList }, "List doubts by severity"));
+  }
+
+  function toList() {
+    show(false);
+    listDoubts();
   }
 
   /** @param {boolean} isShown */

@@ -34,24 +34,15 @@ const LINES = [
 
 /** Section of the list of keys, and content of the legend's popover. */
 export function markSection() {
-  const section = make("section", "mark-list");
-  const heading = make("h3", {}, "Marks and lines");
-  const list = make("dl");
-  list.append(
+  const rows = [
     ...STATUSES.map((status) => row(statusSwatch(status), STATUS_MEANINGS[status])),
     row(diamondSwatch(), "keyframe; larger with an exclamation mark: check it"),
     ...SOURCES.map((source) => row(sourceSwatch(source), SOURCE_MEANINGS[source])),
     row(earlierSwatch(), "of an earlier calibration"),
-    row(taskSamples(), `task: ${TASK_STATES.join(", ")}`),
+    row(make("span", "task-samples", ...TASK_STATES.map(taskSwatch)), `task: ${TASK_STATES.join(", ")}`),
     ...LINES.map(([kind, color, meaning]) => row(sampleOf(kind, `var(--image-${color})`), meaning)),
-  );
-  section.append(heading, list);
-  return section;
-}
-
-/** Samples of all states of a task, side by side. */
-function taskSamples() {
-  return make("span", "task-samples", ...TASK_STATES.map(taskSwatch));
+  ];
+  return make("section", "mark-list", make("h3", {}, "Marks and lines"), make("dl", {}, ...rows));
 }
 
 /**
@@ -59,10 +50,5 @@ function taskSamples() {
  * @param {string} meaning
  */
 function row(mark, meaning) {
-  const element = make("div");
-  const [term, description] = [make("dt"), make("dd")];
-  term.append(mark);
-  description.textContent = meaning;
-  element.append(term, description);
-  return element;
+  return make("div", {}, make("dt", {}, mark), make("dd", {}, meaning));
 }

@@ -3,6 +3,7 @@
  * to a frame; with Shift it marks a range. The strip at the bottom is an overview of the whole recording.
  */
 
+import { drawWithin, fillRect } from "../widgets/canvas.js";
 import { make } from "../widgets/elements.js";
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
 import { filterTest } from "../model/provenance.js";
@@ -177,29 +178,26 @@ export function mountTimeline(element, { store, navigation, jumps, frameWindow }
     const { lanes: bands, review, tasks, copy, overview } = layout();
     drawing.drawLabels(context, axis, style, bands, session.people, copy);
     if (annotation?.tasks.length) drawing.drawTasks(context, axis, statesByFrame(annotation.tasks), style, tasks);
-    context.save();
-    context.beginPath();
-    context.rect(axis.left, 0, axis.right - axis.left + 2, overview.top);
-    context.clip();
     const earlier = earlierCalibration(store.facts);
-    for (const [lane, band] of bands.entries()) {
-      const cells = bands.length > 1 ? lanes[lane] : timeline;
-      if (!cells) continue; // arrives shortly
-      if (bands.length > 1) drawing.drawPerson(context, axis, cells, style, band, session.people[lane].color);
-      else drawing.drawSources(context, axis, cells, style, band);
-      if (earlier[lane]?.size) drawing.drawEarlier(context, axis, earlier[lane], style, band);
-      drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
-      const doubted = keyframeDoubts.filter(({ person }) => bands.length === 1 || person === lane).map(({ frame }) => frame);
-      drawing.drawDoubtedKeyframes(context, axis, doubted, style, band);
-      drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
-      const isKept = filterTest(store.facts, bands.length > 1 ? lane : null);
-      if (isKept) drawDimmed(context, axis, isKept, style, band);
-    }
-    drawing.drawReviewed(context, axis, timeline, style, review);
-    if (otherCopy && copy) drawCopy(context, axis, otherCopy, style, copy);
-    drawing.drawStatuses(context, axis, timeline, style);
-    drawing.drawCosts(context, axis, timeline, style);
-    context.restore();
+    drawWithin(context, { left: axis.left, top: 0, right: axis.right + 2, bottom: overview.top }, () => {
+      for (const [lane, band] of bands.entries()) {
+        const cells = bands.length > 1 ? lanes[lane] : timeline;
+        if (!cells) continue; // arrives shortly
+        if (bands.length > 1) drawing.drawPerson(context, axis, cells, style, band, session.people[lane].color);
+        else drawing.drawSources(context, axis, cells, style, band);
+        if (earlier[lane]?.size) drawing.drawEarlier(context, axis, earlier[lane], style, band);
+        drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
+        const doubted = keyframeDoubts.filter(({ person }) => bands.length === 1 || person === lane).map(({ frame }) => frame);
+        drawing.drawDoubtedKeyframes(context, axis, doubted, style, band);
+        drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
+        const isKept = filterTest(store.facts, bands.length > 1 ? lane : null);
+        if (isKept) drawDimmed(context, axis, isKept, style, band);
+      }
+      drawing.drawReviewed(context, axis, timeline, style, review);
+      if (otherCopy && copy) drawCopy(context, axis, otherCopy, style, copy);
+      drawing.drawStatuses(context, axis, timeline, style);
+      drawing.drawCosts(context, axis, timeline, style);
+    });
     drawing.drawOverview(context, whole(), timeline, style, overview);
   }
 
@@ -213,10 +211,7 @@ export function mountTimeline(element, { store, navigation, jumps, frameWindow }
     const { cells, overview } = layout();
     if (range) drawing.drawRange(context, axis, range, style, overview.top - 3);
     if (hovered !== null) {
-      context.fillStyle = style.getPropertyValue("--muted");
-      context.globalAlpha = 0.5;
-      context.fillRect(axis.middle(hovered) - 0.5, 0, 1, overview.top - REACH);
-      context.globalAlpha = 1;
+      fillRect(context, style.getPropertyValue("--muted"), axis.middle(hovered) - 0.5, 0, 1, overview.top - REACH, 0.5);
     }
     drawing.drawWindow(context, whole(), visible, target, style, overview);
     if (!axis.shows(target)) return;

@@ -3,7 +3,7 @@
  * are CSS pixels.
  */
 
-import { drawWithin, setText } from "../widgets/canvas.js";
+import { drawWithin, fillRect, setText } from "../widgets/canvas.js";
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
 import { TASK_STATES } from "../model/tasks.js";
 import { trace } from "../model/series.js";
@@ -91,10 +91,8 @@ function drawName(context, axis, style, { name, color }, { top, bottom }) {
   const text = shortened(name, (one) => context.measureText(one).width <= room);
   context.fillText(text, axis.left - 9, (top + bottom) / 2);
   const { fillStyle } = context;
-  context.fillStyle = style.getPropertyValue("--edge");
-  context.fillRect(axis.left - 7, top - 1, 6, bottom - top + 2);
-  context.fillStyle = color;
-  context.fillRect(axis.left - 6, top, 4, bottom - top);
+  fillRect(context, style.getPropertyValue("--edge"), axis.left - 7, top - 1, 6, bottom - top + 2);
+  fillRect(context, color, axis.left - 6, top, 4, bottom - top);
   context.fillStyle = fillStyle;
 }
 
@@ -106,8 +104,7 @@ function drawName(context, axis, style, { name, color }, { top, bottom }) {
  * @param {Band} lane
  */
 export function drawSources(context, axis, cells, style, { top, bottom }) {
-  context.fillStyle = style.getPropertyValue("--track");
-  context.fillRect(axis.left, top, axis.right - axis.left, bottom - top);
+  fillRect(context, style.getPropertyValue("--track"), axis.left, top, axis.right - axis.left, bottom - top);
   const marks = SOURCES.map((source) => SOURCE_MARKS[source]);
   const colors = marks.map(({ color }) => style.getPropertyValue(color));
   const { sources } = cells;
@@ -136,8 +133,7 @@ export function drawPerson(context, axis, cells, style, { top, bottom }, color) 
   const lost = of("--bad");
   const fills = { good: color, doubtful: hatch(context, color, DARK_INK, false), lost: hatch(context, lost, of("--hatch"), true) };
   const narrow = { good: color, doubtful: of("--warning"), lost };
-  context.fillStyle = style.getPropertyValue("--track");
-  context.fillRect(axis.left, top, axis.right - axis.left, split - top);
+  fillRect(context, of("--track"), axis.left, top, axis.right - axis.left, split - top);
   // The worst last: where frames share a pixel, it stays visible.
   for (const kind of STATUSES) {
     const is = (/** @type {number} */ frame) =>
@@ -145,12 +141,9 @@ export function drawPerson(context, axis, cells, style, { top, bottom }, color) 
     const min = kind === "good" ? 1 : 2;
     eachRun(axis, (frame) => (is(frame) ? 0 : -1), gapOf(axis), (_, x, width) => {
       const wide = Math.max(min, width);
-      context.fillStyle = (width < PATTERN_FROM ? narrow : fills)[kind];
-      context.fillRect(x, top, wide, split - top);
+      fillRect(context, (width < PATTERN_FROM ? narrow : fills)[kind], x, top, wide, split - top);
       // Colours of people are bright for footage: on a bright page their areas have dark edges.
-      context.fillStyle = of("--edge");
-      context.fillRect(x, top, wide, 1);
-      context.fillRect(x, split - 1, wide, 1);
+      for (const y of [top, split - 1]) fillRect(context, of("--edge"), x, y, wide, 1);
     });
   }
 }
@@ -300,8 +293,7 @@ export function drawStatuses(context, axis, cells, style) {
     const color = style.getPropertyValue(STATUS_COLORS[status]);
     const fill = status === "good" ? color : hatch(context, color, style.getPropertyValue("--hatch"), status === "lost");
     eachRun(axis, (frame) => (statuses[frame] === index ? index : -1), gapOf(axis), (_, x, width) => {
-      context.fillStyle = width < PATTERN_FROM ? color : fill;
-      context.fillRect(x, STATUS.bottom - height, Math.max(min, width), height);
+      fillRect(context, width < PATTERN_FROM ? color : fill, x, STATUS.bottom - height, Math.max(min, width), height);
     });
   }
 }
@@ -337,20 +329,18 @@ export function drawCosts(context, axis, cells, style) {
  */
 export function drawOverview(context, whole, cells, style, overview) {
   const height = overview.bottom - overview.top;
-  context.fillStyle = style.getPropertyValue("--track");
-  context.fillRect(whole.left, overview.top, whole.right - whole.left, height);
+  fillRect(context, style.getPropertyValue("--track"), whole.left, overview.top, whole.right - whole.left, height);
   const { statuses, marks, sources } = cells;
-  /** @type {[(frame: number) => boolean, string, number, number][]} condition, colour, fraction of the height, minimum width */
+  /** @type {[(frame: number) => boolean, string, number][]} condition, colour, fraction of the height */
   const layers = [
-    [(frame) => sources[frame] !== NO_POSE, "--faint", 1 / 3, 1],
-    [(frame) => (marks[frame] & REVIEWED) !== 0, "--good", 1 / 2, 1],
-    [(frame) => STATUSES[statuses[frame] - 1] === "doubtful", "--warning", 2 / 3, 1],
-    [(frame) => STATUSES[statuses[frame] - 1] === "lost", "--bad", 1, 1],
+    [(frame) => sources[frame] !== NO_POSE, "--faint", 1 / 3],
+    [(frame) => (marks[frame] & REVIEWED) !== 0, "--good", 1 / 2],
+    [(frame) => STATUSES[statuses[frame] - 1] === "doubtful", "--warning", 2 / 3],
+    [(frame) => STATUSES[statuses[frame] - 1] === "lost", "--bad", 1],
   ];
-  for (const [is, color, share, min] of layers) {
-    context.fillStyle = style.getPropertyValue(color);
+  for (const [is, color, share] of layers) {
     eachRun(whole, (frame) => (is(frame) ? 0 : -1), 0, (_, x, width) => {
-      context.fillRect(x, overview.bottom - share * height, Math.max(min, width), share * height);
+      fillRect(context, style.getPropertyValue(color), x, overview.bottom - share * height, width, share * height);
     });
   }
   context.fillStyle = style.getPropertyValue("--text");
@@ -368,17 +358,14 @@ export function drawOverview(context, whole, cells, style, overview) {
  * @param {Band} overview
  */
 export function drawWindow(context, whole, visible, target, style, overview) {
-  context.fillStyle = style.getPropertyValue("--text");
-  context.fillRect(whole.middle(target) - 0.5, overview.top - 1, 1, overview.bottom - overview.top + 2);
+  fillRect(context, style.getPropertyValue("--text"), whole.middle(target) - 0.5, overview.top - 1, 1, overview.bottom - overview.top + 2);
   if (!visible) return;
   const [left, right] = [whole.start(visible.start), whole.start(visible.end)];
-  const width = Math.max(6, right - left);
-  context.fillStyle = context.strokeStyle = style.getPropertyValue("--accent");
-  context.globalAlpha = 0.25;
-  context.fillRect(left, overview.top - 2, width, overview.bottom - overview.top + 4);
-  context.globalAlpha = 1;
-  context.lineWidth = 1.5;
-  context.strokeRect(left, overview.top - 2, width, overview.bottom - overview.top + 4);
+  /** @type {[number, number, number, number]} */
+  const box = [left, overview.top - 2, Math.max(6, right - left), overview.bottom - overview.top + 4];
+  fillRect(context, style.getPropertyValue("--accent"), ...box, 0.25);
+  Object.assign(context, { strokeStyle: style.getPropertyValue("--accent"), lineWidth: 1.5 });
+  context.strokeRect(...box);
 }
 
 /**
@@ -394,10 +381,7 @@ export function drawRange(context, axis, { first, last }, style, bottom) {
   const left = Math.max(axis.left, axis.start(first));
   const right = Math.min(axis.right, axis.start(last + 1));
   if (right <= axis.left || left >= axis.right) return;
-  context.fillStyle = style.getPropertyValue("--accent");
-  context.globalAlpha = 0.14;
-  context.fillRect(left, 0, right - left, bottom);
-  context.globalAlpha = 1;
+  fillRect(context, style.getPropertyValue("--accent"), left, 0, right - left, bottom, 0.14);
   context.fillRect(left, 0, Math.max(2, right - left), 2);
   if (axis.shows(first)) context.fillRect(left, 0, 2, 7);
   if (axis.shows(last)) context.fillRect(Math.max(left, right - 2), 0, 2, 7);

@@ -1,4 +1,4 @@
-/** Draw texts and clipped areas on a canvas. */
+/** Draw texts, simple shapes and clipped areas on a canvas. */
 
 /**
  * Set how the next texts are drawn.
@@ -10,6 +10,48 @@
  */
 export function setText(context, textAlign, textBaseline, size = "10.5px") {
   Object.assign(context, { font: `${size} system-ui, sans-serif`, textAlign, textBaseline });
+}
+
+/**
+ * Fill a rectangle.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {string | CanvasPattern} color
+ * @param {number} x
+ * @param {number} y
+ * @param {number} width
+ * @param {number} height
+ * @param {number} [opacity]
+ */
+export function fillRect(context, color, x, y, width, height, opacity = 1) {
+  context.fillStyle = color;
+  context.globalAlpha = opacity;
+  context.fillRect(x, y, width, height);
+  context.globalAlpha = 1;
+}
+
+/**
+ * Add a straight line to a path.
+ *
+ * @param {Path2D} path
+ * @param {{x: number, y: number}} from
+ * @param {{x: number, y: number}} to
+ */
+export function addLine(path, from, to) {
+  path.moveTo(from.x, from.y);
+  path.lineTo(to.x, to.y);
+  return path;
+}
+
+/**
+ * Make the path of a diamond.
+ *
+ * @param {number} x middle
+ * @param {number} y
+ * @param {number} radius
+ */
+export function diamondPath(x, y, radius) {
+  return new Path2D(`M${x} ${y - radius}L${x + radius} ${y}L${x} ${y + radius}L${x - radius} ${y}Z`);
 }
 
 /**

@@ -126,6 +126,29 @@ export function iconButton(path, title, run) {
 }
 
 /**
+ * Make a check box, or a radio button, within its label.
+ *
+ * @param {string} label
+ * @param {string} title
+ * @param {Properties<"input">} [more] properties of the input
+ */
+export function checkbox(label, title, more) {
+  const input = make("input", { type: "checkbox", ...more });
+  return { element: make("label", { title }, input, make("span", {}, label)), input };
+}
+
+/**
+ * Make a row of a table: its name, and cells with texts.
+ *
+ * @param {string} name
+ * @param {string[]} texts
+ * @param {"th" | "td"} [kind] of the cells after the name
+ */
+export function tableRow(name, texts, kind = "td") {
+  return make("tr", {}, make("th", { scope: "row" }, name), ...texts.map((text) => make(kind, {}, text)));
+}
+
+/**
  * Show keyboard keys as key caps.
  *
  * @param {string[]} keys alternatives, each of them keys that are pressed together

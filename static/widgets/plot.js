@@ -1,6 +1,6 @@
 /** Plot with two numeric axes. Sizes are CSS pixels. */
 
-import { drawWithin, setText } from "./canvas.js";
+import { drawWithin, fillRect, setText } from "./canvas.js";
 import { roundUp } from "./frame_axis.js";
 
 const LEFT = 44;
@@ -57,13 +57,11 @@ export class Plot {
    * @param {string} unit of x
    */
   drawFrame(context, style, unit) {
-    context.fillStyle = style.getPropertyValue("--plot");
-    context.fillRect(this.left, this.top, this.right - this.left, this.bottom - this.top);
+    fillRect(context, style.getPropertyValue("--plot"), this.left, this.top, this.right - this.left, this.bottom - this.top);
     setText(context, "right", "middle");
     for (const value of ticks(this.ys, TICK_Y / (this.bottom - this.top))) {
       const y = Math.round(this.y(value));
-      context.fillStyle = style.getPropertyValue("--line");
-      context.fillRect(this.left, y, this.right - this.left, 1);
+      fillRect(context, style.getPropertyValue("--line"), this.left, y, this.right - this.left, 1);
       context.fillStyle = style.getPropertyValue("--muted");
       context.fillText(String(Number(value.toPrecision(6))), this.left - 6, y);
     }
@@ -71,8 +69,7 @@ export class Plot {
     context.textBaseline = "bottom";
     for (const value of ticks(this.xs, TICK_X / (this.right - this.left))) {
       const x = this.x(value);
-      context.fillStyle = style.getPropertyValue("--muted");
-      context.fillRect(x - 0.5, this.bottom, 1, 3);
+      fillRect(context, style.getPropertyValue("--muted"), x - 0.5, this.bottom, 1, 3);
       context.fillText(`${Number(value.toPrecision(6)).toLocaleString("en")}${unit}`, Math.min(x, this.right - 14), this.bottom + BOTTOM);
     }
   }
@@ -121,4 +118,14 @@ function ticks({ min, max }, share) {
   const step = roundUp(Math.max(1e-12, (max - min) * share));
   const first = Math.ceil(min / step - 1e-9);
   return Array.from({ length: Math.max(0, Math.floor(max / step + 1e-9) - first + 1) }, (_, i) => (first + i) * step);
+}
+
+/**
+ * Find the value nearest to another one; returns its index.
+ *
+ * @param {ArrayLike<number>} values ascending
+ * @param {number} value
+ */
+export function nearest(values, value) {
+  return Array.from(values).reduce((best, one, index) => (Math.abs(one - value) < Math.abs(values[best] - value) ? index : best), 0);
 }
