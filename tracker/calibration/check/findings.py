@@ -87,13 +87,9 @@ def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tup
             )
             moved = np.sum((mended.project(then) - view.project(now)) ** 2, axis=-1)
             px.append(moved / frame.views[camera].scale ** 2)
-            mm.append(moved * _mm_per_px(view, body.points_world) ** 2)
+            mm.append(moved * np.asarray(1000 * view.depths(body.points_world) / view.K[0, 0]) ** 2)
     rms_px, rms_mm = (float(np.sqrt(np.nanmean(np.concatenate(squares)))) for squares in (px, mm))
     return rms_px, rms_mm
-
-
-def _mm_per_px(camera: Camera, points_world: Array) -> Array:
-    return np.asarray(1000 * camera.depths(points_world) / camera.K[0, 0])
 
 
 def _sigma(diagnosis: Diagnosis, camera: int) -> Array:
