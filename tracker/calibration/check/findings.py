@@ -11,7 +11,6 @@ from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.footage.camera_source import LostFrames
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_correction import KINDS, N_CORRECTIONS, corrected, later_s
-from tracker.geometry.cameras import Camera
 
 WORDS = {
     "rotation": "turned", "position": "moved", "focal": "zoomed", "time": "shifted in time",
