@@ -14,7 +14,7 @@ from tracker.pipeline.find_people import FINDING
 from tracker.pipeline.track_session import EstimateStep
 
 if TYPE_CHECKING:
-    from tracker.estimation.initialization.first_pose import Trying
+    from tracker.estimation.initialization.frame_trials import Trying
     from tracker.pipeline.stored_run import TrackPlan
     from tracker.pipeline.track_session import Step, TrackSession
     from tracker.session.session import Session

@@ -11,7 +11,7 @@ import pytest
 from observed_people import write_openpose
 
 from tracker.errors import TrackerError
-from tracker.estimation.initialization.first_pose import find_first_poses_anywhere
+from tracker.estimation.initialization.frame_trials import find_first_poses_anywhere
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording

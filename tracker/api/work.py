@@ -9,7 +9,7 @@ import numpy as np
 from tracker.api.sessions import PersonName, SessionOrFolder, frames_of, opened, people_of, person_of
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
-from tracker.estimation.initialization.first_pose import Trying
+from tracker.estimation.initialization.frame_trials import Trying
 from tracker.estimation.tracking.method import OptionValue
 from tracker.pipeline.body_acquisition import acquire_body
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, unplaced

@@ -18,7 +18,8 @@ from tracker.batch.stretches import Division, RecordingStretch, divide
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.retarget import retarget_pose
-from tracker.estimation.initialization.first_pose import FirstPoses, find_first_poses
+from tracker.estimation.initialization.first_pose import FirstPoses
+from tracker.estimation.initialization.frame_trials import find_first_poses
 from tracker.estimation.initialization.generators.start_generators import GENERATORS
 from tracker.formats.model_toml import format_model
 from tracker.interchange.observations.stored import FOLDER as OBSERVATIONS

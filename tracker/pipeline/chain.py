@@ -15,7 +15,8 @@ from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.estimation.fitting.gauss_newton import PointTargets
-from tracker.estimation.initialization.first_pose import FirstPoses, Trying
+from tracker.estimation.initialization.first_pose import FirstPoses
+from tracker.estimation.initialization.frame_trials import Trying
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import has_preset_proportions

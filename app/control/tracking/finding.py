@@ -18,7 +18,8 @@ from app.state.progress import CHAIN_STEPS, FindState, Line
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition
-from tracker.estimation.initialization.first_pose import FirstPoses, TakenError, Trying
+from tracker.estimation.initialization.first_pose import FirstPoses
+from tracker.estimation.initialization.frame_trials import TakenError, Trying
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.body_acquisition import SIZES_EDITS, resized_start, with_sizes_changed

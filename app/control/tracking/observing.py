@@ -18,7 +18,7 @@ from app.state.observations import ObservedSet
 from tracker.compute.progress import Report
 from tracker.errors import TrackerError
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.initialization.first_pose import Trying
+from tracker.estimation.initialization.frame_trials import Trying
 from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
 from tracker.evaluation.judging.judge import judge
 from tracker.interchange.detection.detect import DetectionPlan, complete_detection, detect_people, open_name

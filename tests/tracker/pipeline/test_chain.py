@@ -19,7 +19,8 @@ from tracker.estimation.chamfer.method import CHAMFER
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.fitting.retarget import retarget_pose
-from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses, Trying
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
+from tracker.estimation.initialization.frame_trials import Trying
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.pipeline import chain, track_session

@@ -15,14 +15,9 @@ from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.fitting.hypothesis import Hypothesis
-from tracker.estimation.initialization import first_pose, known_start, own_figure
-from tracker.estimation.initialization.first_pose import (
-    FirstPose,
-    FirstPoses,
-    TakenError,
-    find_first_poses,
-    find_first_poses_anywhere,
-)
+from tracker.estimation.initialization import first_pose, frame_trials, known_start, own_figure
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
+from tracker.estimation.initialization.frame_trials import TakenError, find_first_poses, find_first_poses_anywhere
 from tracker.estimation.initialization.generators.start_generators import GENERATORS, from_voxels
 from tracker.estimation.initialization.start_fit import StartTrack
 from tracker.evidence.voxels.visual_hull import VisualHull
@@ -152,7 +147,7 @@ def searched(session, monkeypatch, statuses, heights, show=lambda trying: None):
         return FirstPoses(frame, poses)
 
     trials = []
-    monkeypatch.setattr(first_pose._Trial, "_poses_on", poses_on)
+    monkeypatch.setattr(frame_trials._Trial, "_poses_on", poses_on)
     found = find_first_poses_anywhere(
         session, OBSERVER, [0, 1], range(4), 0.05, show=lambda trying: (trials.append(trying), show(trying))
     )

@@ -14,7 +14,8 @@ from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition
 from tracker.estimation.fitting.hypothesis import Hypothesis
-from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses, TakenError, Trying
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
+from tracker.estimation.initialization.frame_trials import TakenError, Trying
 from tracker.pipeline import chain
 
 FRAME = 1
