@@ -12,11 +12,11 @@ from msgspec import Meta
 from app.drawing.curves import CurveGroup
 from app.messages.annotation import AskNextClick, DecideTask, PlanTasks, ResolveComment, WriteComment
 from app.messages.base import Command, Dofs, Frame, Index, Name, Number
+from app.messages.cameras import CheckCalibration, UseClocks
 from app.messages.inspector import (
     AcquireSizes,
     ApplySizes,
     ChangeBody,
-    CheckCalibration,
     CoupleSides,
     DraftSizes,
     FindPeople,
@@ -25,7 +25,6 @@ from app.messages.inspector import (
     SetPartSizes,
     SetTrackSettings,
     SetView3d,
-    UseClocks,
 )
 from app.messages.observation import SetCopyTolerance, UseCopy, UseObservations, WatchProvenance
 from app.messages.pose import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack

@@ -10,11 +10,10 @@ from app.drawing.epipolar_check import EpipolarDistance, EpipolarLine
 from app.messages.advice import AdviceMessage
 from app.messages.annotation import AnnotationMessage, PresenceMessage
 from app.messages.base import Message, Part, Status
+from app.messages.cameras import CalibrationMessage, ClocksMessage
 from app.messages.inspector import (
     AcquisitionMessage,
     BodySizesMessage,
-    CalibrationMessage,
-    ClocksMessage,
     FindingMessage,
     SettingsMessage,
     View3dMessage,

@@ -10,6 +10,7 @@ from app.control.tracking import track_settings
 from app.messages import annotation as plan_wire
 from app.messages import inspector as wire
 from app.messages.base import Command
+from app.messages.cameras import CheckCalibration, UseClocks
 from app.messages.observation import SetCopyTolerance, UseCopy, UseObservations
 from app.messages.parsing import MessageError
 from tracker.annotation.frame_choice import FrameChoice
@@ -81,7 +82,7 @@ def _find_people(controller: Controller, _: int, message: wire.FindPeople) -> No
     {"start": finding.start, "stop": finding.stop, "take": finding.take_best}[message.action]()
 
 
-def _calibration(controller: Controller, _: int, message: wire.CheckCalibration) -> None:
+def _calibration(controller: Controller, _: int, message: CheckCalibration) -> None:
     calibrating = controller.calibrating
     actions: dict[str, Callable[[], None]] = {
         "start": calibrating.start,
@@ -94,7 +95,7 @@ def _calibration(controller: Controller, _: int, message: wire.CheckCalibration)
     actions[message.action]()
 
 
-def _clocks(controller: Controller, _: int, message: wire.UseClocks) -> None:
+def _clocks(controller: Controller, _: int, message: UseClocks) -> None:
     clocks, n_cameras = controller.clocks, len(controller.session.cameras)
     for camera in (message.camera, message.other):
         if camera >= n_cameras:
@@ -170,8 +171,8 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.DraftSizes: _draft,
     wire.AcquireSizes: _acquire,
     wire.FindPeople: _find_people,
-    wire.CheckCalibration: _calibration,
-    wire.UseClocks: _clocks,
+    CheckCalibration: _calibration,
+    UseClocks: _clocks,
     UseObservations: _observations,
     plan_wire.PlanTasks: _plan,
     plan_wire.DecideTask: _decide,

@@ -14,8 +14,8 @@ from app.messages import inspector as wire
 from app.messages import observation as observed
 from app.messages.base import Message, made_of
 from app.messages.search import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
+from app.page.feeds.cameras import calibration, clocks
 from app.state.annotation import AnnotationState, ProposedClick
-from app.state.calibration import CalibrationState, ClocksState
 from app.state.floor_picking import FloorState
 from app.state.identity import are_same
 from app.state.observations import ObservationsState
@@ -26,16 +26,13 @@ from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.searches import Search, SearchKind
-from tracker.calibration.check.findings import CameraFinding
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.posing.grab import minor_points
 from tracker.evaluation.judging.judge import Doubt
 from tracker.formats.model_toml import PRESETS
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_correction import KINDS, in_units
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.methods import METHODS
-from tracker.session.session import Session
 
 _MAX_LISTED = 500
 """Entries of the list by severity that a page receives: more than a person goes through at once."""
@@ -186,26 +183,6 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
     return made_of(wire.FindingMessage, found, axes=axes, stage=found.trying or found.stage)
 
 
-def calibration(found: CalibrationState, n_people: int, field: MisfitField) -> wire.CalibrationMessage:
-    """Describe the check of the cameras.
-
-    Args:
-        found: its state.
-        n_people: number of people in the session.
-        field: see `misfit_field`, of its result.
-    """
-    check, preview = found.check, found.preview
-    rows = () if check is None else tuple(_camera(c, check) for c in check.cameras)
-    return made_of(
-        wire.CalibrationMessage, found, is_checked=check is not None, cameras=rows,
-        frames=() if check is None else check.frames, sentences=() if check is None else tuple(check.sentences),
-        misfits=field.arrows, misfit_factor=field.factor, others=found.n_others, better=found.n_better,
-        preview_frame=None if preview is None else preview.frame,
-        preview_fall_nats=0.0 if preview is None else round(preview.cost_before - preview.cost_after, 1),
-        outdated=tuple(_intervals(found.outdated.get(i, ())) for i in range(n_people)),
-    )  # fmt: skip
-
-
 def observations(found: ObservationsState, people: Sequence[str]) -> observed.ObservationsMessage:
     """Describe imported observations.
 
@@ -281,42 +258,6 @@ def _proposal(found: ProposedClick, cameras: Sequence[str]) -> plan_wire.ClickPr
         found.number, found.running, found.message, described, error, interval,
         None if found.after_mm is None else round(found.after_mm, 2),
     )  # fmt: skip
-
-
-def clocks(session: Session, found: ClocksState) -> wire.ClocksMessage:
-    """Describe the clocks of the cameras and the work on them."""
-    estimates = {
-        f.camera: wire.FoundClock(f.start_frames, None if f.rate is None else 1000 * f.rate, f.sigma_ms, f.is_clear)
-        for f in found.found
-    }
-    cameras = tuple(
-        wire.CameraClock(c.start_frames, 1000 * c.clock.rate, estimates.get(c.camera.name)) for c in session.cameras
-    )
-    at = found.moment
-    moment = None if at is None else wire.ComparedMoment(at.frame, found.views, at.centers_px, at.source)
-    return made_of(wire.ClocksMessage, found, cameras=cameras, moment=moment)
-
-
-def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:
-    """Return the first and last frames of the intervals that frames, ascending, make up."""
-    found = np.asarray(frames, dtype=int)
-    parts = np.split(found, np.flatnonzero(np.diff(found) > 1) + 1)
-    return tuple((int(part[0]), int(part[-1])) for part in parts if len(part))
-
-
-def _camera(found: CameraFinding, check: CalibrationCheck) -> wire.CameraCheck:
-    turned, moved, zoomed, shifted, drift = _numbers(found.correction)
-    deviations = dict(zip(in_units(found.sigma), _numbers(found.sigma), strict=True))
-    rivals = {kind: dict(zip(KINDS, _numbers(c), strict=True))[kind] for kind, c in found.rivals.items()}
-    return wire.CameraCheck(
-        found.name, found.misfit_px, found.misfit_mm, found.kinds, rivals, turned, moved, zoomed[0], shifted[0],
-        drift[0], deviations, check.since.get(found.name), check.n_lost(found.name), found.is_seen,
-    )  # fmt: skip
-
-
-def _numbers(correction: Array) -> list[tuple[float, ...]]:
-    """Return the numbers of each kind of a correction, in the units of people and the order of `KINDS`."""
-    return [tuple(np.atleast_1d(v).tolist()) for v in in_units(correction).values()]
 
 
 def reason(state: State, cameras: Sequence[str]) -> ReasonMessage:
