@@ -11,9 +11,9 @@ from tracker.errors import Remedy, TrackerError
 from tracker.estimation.initialization.first_pose import (
     FirstPose,
     FirstPoses,
+    FrameTask,
     Silhouettes,
     Source,
-    FrameTask,
     pose_on_frame,
 )
 from tracker.estimation.initialization.frame_ranking import ranked_frames
