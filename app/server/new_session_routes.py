@@ -10,12 +10,14 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
+from app.remedies import page_text
 from app.server import connections
 from app.server.page_requests import read_body, require_page
 from app.session.footage_preview import preview
 from app.session.new_session import NewSessionForm, make_session
 from app.session.path_choice import folder_contents, typed_path
 from app.session.survey import SurveyForm, survey
+from tracker.errors import TrackerError
 from tracker.formats.model_toml import PRESETS
 from tracker.session.assemble import DEFAULT_MODEL
 
@@ -68,6 +70,8 @@ class NewSessionRoutes:
         try:
             path = typed_path(request.query.get("path", "")[:_MAX_PATH])
             made = await asyncio.get_running_loop().run_in_executor(self._pool, preview, path)
+        except TrackerError as error:  # no footage lies there: the form draws a frame without a picture
+            raise web.HTTPNotFound(text=page_text(error)) from error
         finally:
             self._n_waiting -= 1
         return web.Response(body=made, content_type="image/jpeg")
