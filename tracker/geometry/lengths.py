@@ -36,7 +36,11 @@ class UsualSize(NamedTuple):
     def units_of(self, number: float, metres: Mapping[str, float]) -> list[str]:
         """Return the units, of those with their metres, in which a number is usual, nearest to the middle first."""
         fitting = [unit for unit in metres if self.has(number * metres[unit])]
-        return sorted(fitting, key=lambda u: abs(np.log((number * metres[u]) ** 2 / (self.low * self.high))))
+        return sorted(fitting, key=lambda unit: self.distance(number * metres[unit]))
+
+    def distance(self, size: float) -> float:
+        """Return how far a size is from the middle, as twice the logarithm of their ratio."""
+        return abs(np.log(size**2 / (self.low * self.high))) if size > 0 else np.inf
 
 
 USUAL_SIZES: Mapping[str, UsualSize] = {
@@ -56,8 +60,7 @@ _UNITS = {word: METRES_BY_WORD[unit] for word, unit in {
 
 def height_m(number: float) -> float:
     """Return the height of a person in metres, of a number in metres or centimetres, whichever is nearer to usual."""
-    low, high = USUAL_SIZES["person"]
-    return min(number, number * _UNITS["centimetres"], key=lambda h: abs(np.log(h**2 / (low * high))) if h > 0 else h)
+    return min(number, number * _UNITS["centimetres"], key=USUAL_SIZES["person"].distance)
 
 
 def check_heights(heights_m: Mapping[str, float] | float | None, error: type[TrackerError]) -> None:
