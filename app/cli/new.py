@@ -113,6 +113,8 @@ def _with_parts_of_folder(arguments: NewArguments) -> NewArguments:
     Raises:
         TrackerError: no calibration is given, and none lies there.
     """
+    from tracker.errors import SessionError
+    from tracker.files import paths_in
     from tracker.formats.calibrations.reading import read_cameras
     from tracker.session.footage_files import footage_in, side_parts
     from tracker.session.matching import camera_name
@@ -123,8 +125,11 @@ def _with_parts_of_folder(arguments: NewArguments) -> NewArguments:
     calibration = arguments.calibration or ((found,) if found else ())
     if not calibration:
         raise TrackerError("expected a calibration of the cameras, found none; give it with --calibration")
-    names = {c.name for c in read_cameras(calibration, arguments.units, arguments.poses, (), True).entries}
-    if folder is None or beside is None or camera_name(folder) in names:
+    if folder is None or beside is None:
+        return replace(arguments, calibration=calibration)
+    filmed = [camera_name(path) for path in (folder, *paths_in(folder, SessionError))]
+    cameras = read_cameras(calibration, arguments.units, arguments.poses, filmed, any_size=True)
+    if filmed[0] in {c.name for c in cameras.entries}:
         return replace(arguments, calibration=calibration)
     background, masks = arguments.background or beside.background, arguments.masks or beside.masks
     parts = {"calibration": calibration[0], "background": background, "masks": masks}
