@@ -82,7 +82,7 @@ export class Receiver {
     if (message.type === "session") return this.#begin(message);
     if (message.type === "timeline") return this.#mergeTimeline(message);
     if (message.type === "notice") return this.#notify(message);
-    if (message.type === "clocks") this.#recent.clear(); // a camera may show pictures of another time
+    if (message.type === "clocks" && this.#areSetAnew(message)) this.#recent.clear();
     if (message.type === "presence" && message.refusal) this.#refuse(message.refusal);
     const change = /** @type {((message: TextMessage, facts: Facts) => Partial<Facts>) | undefined} */ (CHANGES[message.type]);
     this.#store.set(change?.(message, this.#store.facts) ?? { [factOf(message.type)]: message });
@@ -118,6 +118,12 @@ export class Receiver {
     this.#early.set(overlay.frame, overlay);
     // A tracker can be some frames ahead of decoding. Older overlays belong to skipped frames.
     for (const frame of this.#early.keys()) if (this.#early.size > MAX_EARLY) this.#early.delete(frame);
+  }
+
+  /** @param {import("./protocol.js").ClocksMessage} clocks whether a camera shows pictures of another time by them */
+  #areSetAnew({ cameras }) {
+    const before = this.#store.facts.clocks?.cameras ?? [];
+    return cameras.some((c, i) => c.offset_frames !== before[i]?.offset_frames || c.drift_ms_per_s !== before[i].drift_ms_per_s);
   }
 
   /** @param {string} refusal why the name of this tab could not be had */
