@@ -67,7 +67,7 @@ class PoseEdits:
         """
         models = self._session_state.models
         is_known = 0 <= person < len(models) and all(0 <= dof < models[person].n_dofs for dof in dofs)
-        if not is_known or not np.isfinite(values).all():
+        if not is_known or len(set(dofs)) < len(dofs) or not np.isfinite(values).all():
             raise TrackerError("expected finite values of the body's degrees of freedom, found others; reload the page")
         require_unlocked(models[person], self._session_state.state.locked[person], dofs)
         with self._on(person, None) as model:

@@ -64,6 +64,8 @@ def test_wrong_degrees_of_freedom_are_refused(controller):
             controller.cost_map.watch(PAGE, 0, wrong)
     with pytest.raises(TrackerError, match="expected finite values"):
         controller.pose_edits.set_along(0, dofs, (0.1, np.nan))
+    with pytest.raises(TrackerError, match="expected finite values"):
+        controller.pose_edits.set_along(0, (dofs[0], dofs[0]), (0.1, 0.2))
     controller.dof_locks.set(0, [dofs[1]], True)
     with pytest.raises(TrackerError, match="left elbow extension is locked"):
         controller.pose_edits.set_along(0, dofs, (0.1, 0.2))
