@@ -88,6 +88,7 @@ class Clocks:
 
         with self._activities.editing(alone=True):
             self._calibrating.require_free()
+            self._work.require_free()
             self._calibrating.exchange_cameras(self._session_state.saver.change_cameras(change), "")
 
     def _estimate(self, way: str) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """The clocks of the cameras in the page's program: nudges, their history, estimates, and a fast moment."""
 
+import threading
+
 import pytest
 from gestures import drag, wait_for
 
@@ -75,6 +77,17 @@ def test_a_clear_estimate_is_taken(controller, monkeypatch):
     assert controller.session.cameras[1].clock.rate == 1e-5
     assert (starts(controller.session), labels(controller)) == ([0, 0.4, 0, 0], ["clock of RIGHT by sound"])
     assert controller.state.clocks.notes == ("the sound and the time code disagree",)
+
+
+def test_a_clock_stays_while_an_estimate_is_made_relative_to_it(controller, monkeypatch):
+    ends = threading.Event()
+    monkeypatch.setattr(clocks_room, "find_starts", lambda *_: (ends.wait(10) and [], []))
+    controller.clocks.estimate("sound")
+    with pytest.raises(TrackerError, match="expected no other work on the clocks under way"):
+        controller.clocks.nudge(FRONT, 1)
+    ends.set()
+    wait_for(lambda: not controller.state.clocks.running)
+    assert starts(controller.session) == [0] * 4
 
 
 def test_an_estimate_without_evidence_ends_with_its_sentence(controller):
