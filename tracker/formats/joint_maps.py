@@ -108,7 +108,7 @@ def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:
     if fit(best)[0] < _MIN_JOINTS:
         known = f"follow no known convention ({', '.join(m.name for m in known_joint_maps())})"
         found = f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}"
-        remedy = Remedy("give_joint_map", marker=_quoted(markers[0]))
+        remedy = Remedy("give_joint_map", marker=json.dumps(markers[0], ensure_ascii=False))
         raise FormatError(f"the markers of {source} {known}: found {found}", remedy)
     return best
 
@@ -129,11 +129,6 @@ def joint_map_of_size(n_points: int, source: str) -> JointMap:
     sizes = ", ".join(f"{len(m.points)} ({m.name})" for m in known_joint_maps() if m.points)
     expected = f"the number of points of a known skeleton, {sizes}"
     raise FormatError.mismatch(source, expected, n_points, Remedy("give_point_order", n=n_points))
-
-
-def _quoted(marker: str) -> str:
-    """Return a marker's name as a string of TOML."""
-    return json.dumps(marker, ensure_ascii=False)
 
 
 def read_joint_map(path: str | Path) -> JointMap:

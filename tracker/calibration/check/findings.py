@@ -11,7 +11,6 @@ from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.footage.camera_source import LostFrames
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_correction import KINDS, N_CORRECTIONS, corrected, later_s
-from tracker.geometry.cameras import Camera
 
 WORDS = {
     "rotation": "turned", "position": "moved", "focal": "zoomed", "time": "shifted in time",
@@ -87,13 +86,9 @@ def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tup
             )
             moved = np.sum((mended.project(then) - view.project(now)) ** 2, axis=-1)
             px.append(moved / frame.views[camera].scale ** 2)
-            mm.append(moved * _mm_per_px(view, body.points_world) ** 2)
+            mm.append(moved * np.asarray(1000 * view.depths(body.points_world) / view.K[0, 0]) ** 2)
     rms_px, rms_mm = (float(np.sqrt(np.nanmean(np.concatenate(squares)))) for squares in (px, mm))
     return rms_px, rms_mm
-
-
-def _mm_per_px(camera: Camera, points_world: Array) -> Array:
-    return np.asarray(1000 * camera.depths(points_world) / camera.K[0, 0])
 
 
 def _sigma(diagnosis: Diagnosis, camera: int) -> Array:

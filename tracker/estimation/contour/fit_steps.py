@@ -79,7 +79,7 @@ def contour_steps(views: Sequence[ViewEvidence], poses: Sequence[Array], plan: F
                     continue
                 first, done = first or i, done + (not is_start)
                 now = (*now[:person], i.pose, *now[person + 1 :])
-                px = _relative_px(i, first)
+                px = first.rms_px * float(np.sqrt(i.cost / first.cost)) if first.cost > 0 else i.rms_px
                 yield SearchStep(stage, now, px, now, px, done, is_last)
 
 
@@ -90,11 +90,6 @@ def _with_last(iterations: Iterator[FitIteration]) -> Iterator[tuple[FitIteratio
         yield now, False
         now = after
     yield now, True
-
-
-def _relative_px(now: FitIteration, first: FitIteration) -> float:
-    """Return the RMS distance of an iteration over the length of the contours at the start, px."""
-    return first.rms_px * float(np.sqrt(now.cost / first.cost)) if first.cost > 0 else now.rms_px
 
 
 def residual_segments(bodies: Sequence[PosedBody], view: ViewEvidence) -> FloatArray:

@@ -69,7 +69,7 @@ def measure_parts(state: FilterState, clouds: PartClouds, size_m: float, by_size
             the predicted axis. Both turn an axis that points the wrong way.
     """
     variances, axes = np.linalg.eigh(clouds.covariances)
-    order = _order_by_size(state.figure.order) if by_size else _closest_order(axes)
+    order = np.argsort(state.figure.order, axis=1) if by_size else _closest_order(axes)
     axes = np.take_along_axis(axes, order[:, None, :], axis=2)
     variances = np.take_along_axis(variances, order, axis=1)
     axes = axes * np.where(np.einsum("mii->mi", axes) < 0, -1.0, 1.0)[:, None, :]
@@ -142,11 +142,6 @@ def linearize_rotations(state: FilterState, rotations: Array, sigma_rad: float) 
         own = slice(3 * i, 3 * i + 3)
         H[own, own] = by_turn[i]
     return LinearizedMeasurement(turns.ravel(), H, np.eye(3 * N_PARTS) * sigma_rad**2)
-
-
-def _order_by_size(order: IntArray) -> IntArray:
-    """Return the index of the principal axis, ascending, for each axis of the parts, (10, 3)."""
-    return np.argsort(order, axis=1)
 
 
 def _closest_order(axes: Array) -> IntArray:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from tracker.body.model import BodyModel
-from tracker.body.parts import Joint, Landmark, Part
+from tracker.body.parts import Part
 
 Factors = tuple[float, float, float]
 """Factors along x, y, z."""
@@ -34,9 +34,9 @@ def altered_model(model: BodyModel, factors: Mapping[str, Factors] = BONE_FACTOR
     return replace(
         model,
         name=f"{model.name}_true",
-        joints=tuple(_moved_joint(j, factors) for j in model.joints),
+        joints=tuple(replace(j, position=_moved(j.position, j.name, factors)) for j in model.joints),
         parts=tuple(_stretched_part(p, factors) for p in model.parts),
-        landmarks=tuple(_moved_landmark(m, factors) for m in model.landmarks),
+        landmarks=tuple(replace(m, position=_moved(m.position, m.name, factors)) for m in model.landmarks),
     )
 
 
@@ -49,14 +49,6 @@ def _moved(
 ) -> tuple[float, float, float]:
     x, y, z = (p * f for p, f in zip(position, _factors_of(name, factors), strict=True))
     return x, y, z
-
-
-def _moved_joint(joint: Joint, factors: Mapping[str, Factors]) -> Joint:
-    return replace(joint, position=_moved(joint.position, joint.name, factors))
-
-
-def _moved_landmark(landmark: Landmark, factors: Mapping[str, Factors]) -> Landmark:
-    return replace(landmark, position=_moved(landmark.position, landmark.name, factors))
 
 
 def _stretched_part(part: Part, factors: Mapping[str, Factors]) -> Part:
