@@ -127,7 +127,7 @@ class SessionLock:
         if data is None:
             return  # released in the meantime
         holder = _parse(data)
-        if not (len(data) <= _MAX_BYTES and not data.strip(b"\0")) and (holder is None or is_alive(holder)):
+        if not _is_blank(data) and (holder is None or is_alive(holder)):
             raise SessionError(f"session {self._path.parent} is open already {_describe(holder, self._path)}")
         with suppress(FileNotFoundError), self._path.open("rb+") as file:
             # Several programs may find the same stale lock. The one that has this file to itself removes it; to the
@@ -176,6 +176,11 @@ def _parse(data: bytes) -> Holder | None:
     except (SessionError, ValueError, RecursionError):  # of msgspec and of texts, too
         return None
     return holder
+
+
+def _is_blank(data: bytes) -> bool:
+    """Return whether a lock file has no content: a full disk leaves it empty, a power cut perhaps as zeros."""
+    return len(data) <= _MAX_BYTES and not data.strip(b"\0")
 
 
 def _have_alone(number: int) -> bool:
