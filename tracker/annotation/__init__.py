@@ -1,7 +1,7 @@
 """Annotation for datasets: the plan of frames, the next best click, comments, blind copies, and joining two copies.
 
 Imports `pipeline` and `evaluation`. Callers use `plan`, `frame_choice`, `comments`, `next_click`, `expected_error`,
-`blind_copy`, `merge_sessions` and `session_copy.require_free`.
+`blind_copy`, `merge_sessions` and `speed`.
 """
 
 __all__ = [
@@ -12,6 +12,5 @@ __all__ = [
     "merge_sessions",
     "next_click",
     "plan",
-    "session_copy",
     "speed",
 ]

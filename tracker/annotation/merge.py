@@ -5,7 +5,7 @@ two copies chooses, a final edit `Merge` sets it, and keeps the other pose of a 
 """
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
@@ -141,17 +141,13 @@ def _joined(later: Any, earlier: Any) -> Any:
 def _joined_rows(a: Rows, b: Rows, conflicts: Sequence[Conflict]) -> Rows:
     """Return the union of the rows of two plans, and a task for each conflict."""
     tasks, states = _disagreements(conflicts)
-    return (
-        _by_uid((*a[0], *b[0], *tasks), lambda r: (r.time, r)),
-        _by_uid((*a[1], *b[1], *states), lambda r: (r.time, r)),
-        _by_uid((*a[2], *b[2]), lambda r: (r.time, r)),
-    )
+    return _by_uid((*a[0], *b[0], *tasks)), _by_uid((*a[1], *b[1], *states)), _by_uid((*a[2], *b[2]))
 
 
-def _by_uid(rows: Sequence[_Row], key: Callable[[_Row], Any]) -> list[_Row]:
+def _by_uid(rows: Sequence[_Row]) -> list[_Row]:
     """Return each row once, the earlier one where two copies planned the same; earliest first."""
     found: dict[str, _Row] = {}
-    for row in sorted(rows, key=key):
+    for row in sorted(rows, key=lambda r: (r.time, r)):
         found.setdefault(row.uid, row)
     return list(found.values())
 

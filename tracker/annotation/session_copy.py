@@ -1,7 +1,6 @@
 """Write a session folder with the annotations of others: it appears whole or not at all."""
 
 import os
-import secrets
 import shutil
 from collections.abc import Generator, Sequence
 from contextlib import closing, contextmanager
@@ -10,10 +9,9 @@ from pathlib import Path
 
 from tracker.annotation.numbered_settings import Numbered, renumbered
 from tracker.annotation.observation_copies import copy_observations
-from tracker.errors import SessionError
 from tracker.files import sync_folder
 from tracker.pipeline.calibration_revisions import follow_history
-from tracker.session.folder import tidy_path
+from tracker.session.folder import appearing, require_free, tidy_path
 from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_session
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.edit_log import EditLog
@@ -39,7 +37,7 @@ def write_session_copy(
     """
     folder = tidy_path(folder)
     require_free(folder)
-    with _appearing(folder) as temporary:
+    with _appearing_on_disk(folder) as temporary:
         save_session(replace(session, folder=temporary))
         if (session.folder / CALIBRATION_FILE).exists():  # to the bit: writing rounds, and each rounding is a revision
             shutil.copyfile(session.folder / CALIBRATION_FILE, temporary / CALIBRATION_FILE)
@@ -51,32 +49,13 @@ def write_session_copy(
         return [note for source in observed for note in copy_observations(source, temporary)]
 
 
-def require_free(folder: Path) -> None:
-    """Check that a session can appear at a folder: it does not exist, or is empty.
-
-    Raises:
-        SessionError: it is in use.
-    """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise SessionError(f"{folder} exists already and is not an empty folder; choose another name or remove it")
-
-
 @contextmanager
-def _appearing(folder: Path) -> Generator[Path, None, None]:
-    """Yield a folder beside another one, which it becomes at the end of the `with` block."""
-    temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        temporary.mkdir(parents=True)
+def _appearing_on_disk(folder: Path) -> Generator[Path, None, None]:
+    """Yield a folder as `appearing` does; what is written reaches the disk before the folder appears."""
+    with appearing(folder) as temporary:
         yield temporary
         for path, _, names in os.walk(temporary):
             for name in names:
                 with (Path(path) / name).open("rb") as file:
                     os.fsync(file.fileno())
-        if folder.exists():
-            folder.rmdir()
-        temporary.rename(folder)
-        sync_folder(folder.parent)
-    except OSError as error:
-        raise SessionError(f"cannot write the session {folder}: {error}; choose a folder you may write to") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    sync_folder(folder.parent)

@@ -179,11 +179,7 @@ class Manifest:
         Returns:
             Whether they were written: False if another worker has taken the task since.
         """
-        if not held.is_held():
-            return False
-        self._write(self.folder / STRETCHES / f"{task.key}.json", division)
-        held.release()
-        return True
+        return self._hand_in(self.folder / STRETCHES / f"{task.key}.json", held, division)
 
     def spent_on_stretches(self, task: RecordingTask) -> tuple[float, float]:
         """Return the time that the stretches of a recording took, by the clock and of processors, s."""
@@ -229,10 +225,14 @@ class Manifest:
         Returns:
             Whether it was written: False if another worker has taken the task since.
         """
+        result = msgspec.structs.replace(result, settings=task.recording.settings)
+        return self._hand_in(self.folder / "results" / f"{task.key}.json", held, result)
+
+    def _hand_in(self, path: Path, held: Claim, data: object) -> bool:
+        """Write a file of a task and give up its claim, unless another worker has taken it; return whether it did."""
         if not held.is_held():
             return False
-        result = msgspec.structs.replace(result, settings=task.recording.settings)
-        self._write(self.folder / "results" / f"{task.key}.json", result)
+        self._write(path, data)
         held.release()
         return True
 

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import floor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from tracker.geometry.cameras import Camera
+
+PathKind = Literal["footage", "background", "masks"]
 
 
 class LostFrames(NamedTuple):
@@ -77,6 +79,12 @@ class CameraSource:
     """Number of frames of the footage where frames at its end are left out because other cameras lack them."""
     clock: Clock = Clock()
     """Time of the pictures below a frame, and its drift."""
+
+    @property
+    def paths(self) -> dict[PathKind, Path]:
+        """Paths of its footage, background and masks; of those that it has."""
+        kinds: tuple[PathKind, ...] = get_args(PathKind)
+        return {kind: path for kind in kinds if (path := getattr(self, kind)) is not None}
 
     @property
     def start_frames(self) -> float:

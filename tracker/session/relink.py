@@ -6,19 +6,19 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import chain
+from itertools import chain, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
 from tracker.errors import RecordingError, Remedy, SessionError, TrackerError
 from tracker.files import entries_below
-from tracker.footage.camera_source import CameraSource
+from tracker.footage.camera_source import CameraSource, PathKind
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
 from tracker.session.footage_files import check_side_files, find_background, find_masks
 from tracker.session.matching import check_names, find_entry
-from tracker.session.missing_files import Kind, MissingFile, missing_files
+from tracker.session.missing_files import MissingFile, missing_files
 from tracker.session.session import Session, save_camera_files
 from tracker.validation import same_form
 
@@ -27,7 +27,7 @@ class Relinked(NamedTuple):
     """A file or folder with its new place."""
 
     camera: str
-    kind: Kind
+    kind: PathKind
     old: Path | None
     """None for masks of a camera that used none."""
     new: Path
@@ -123,7 +123,7 @@ def _given(session: Session, places: Places) -> list[Relinked]:
     found = []
     for source in session.cameras:
         name = source.camera.name
-        given: dict[Kind, Path] = {}
+        given: dict[PathKind, Path] = {}
         if (own := by_name.get(same_form(name))) is not None:
             given["footage"] = own
         if places.background is not None and source.background is not None:
@@ -181,15 +181,11 @@ def _choose(lost: MissingFile, candidates: Sequence[Path], check: Callable[[Path
 
 def _common_tail(a: Path, b: Path) -> int:
     """Return how many names two paths share at their ends."""
-    n = 0
-    for x, y in zip(reversed(a.parts), reversed(b.parts), strict=False):
-        if x != y:
-            break
-        n += 1
-    return n
+    pairs = zip(reversed(a.parts), reversed(b.parts), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
-def _check(session: Session, camera: str, kind: Kind, path: Path) -> None:
+def _check(session: Session, camera: str, kind: PathKind, path: Path) -> None:
     """Check that a file can take the place of one of the session.
 
     Raises:

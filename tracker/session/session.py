@@ -13,8 +13,8 @@ that both can be moved together, and absolute otherwise.
 
 import re
 import secrets
-import shutil
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.file_names import file_stems
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
-from tracker.session.folder import SESSION_FILE, session_folder, tidy_path
+from tracker.session.folder import SESSION_FILE, appearing, require_free, session_folder, tidy_path
 from tracker.session.session_file import FloorRow, SessionFile, checked, needed_version, read_session_file
 from tracker.validation import quoted
 
@@ -114,8 +114,7 @@ def create_session(
         RecordingError: footage is missing or unreadable (only if `n_frames` is left out).
     """
     folder = tidy_path(Path(folder))
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise SessionError(f"{folder} exists already and is not an empty folder; choose another name or remove it")
+    require_free(folder)
     sources = tuple(_absolute(c) for c in cameras)
     if n_frames is None:
         from tracker.footage.video import open_footage  # imported lazily: PyAV takes 0.1 s to load
@@ -124,17 +123,8 @@ def create_session(
     title, uid = name or folder.name, secrets.token_hex(16)
     session = Session(folder, title, float(fps), n_frames, sources, tuple(people), up, uid=uid)
     check_content(session)
-    temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        temporary.mkdir(parents=True)
+    with appearing(folder) as temporary:
         _write(session, temporary)
-        if folder.exists():
-            folder.rmdir()
-        temporary.rename(folder)
-    except OSError as error:
-        raise SessionError(f"cannot write the session {folder}: {error}; choose a folder you may write to") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
     return session
 
 
@@ -145,13 +135,9 @@ def save_session(session: Session) -> None:
         SessionError: a name or axis is not allowed, or the folder cannot be written.
     """
     check_content(session)
-    try:
+    with _writing(f"the session {session.folder}", "choose a folder you may write to"):
         session.folder.mkdir(parents=True, exist_ok=True)
         _write(replace(session, cameras=tuple(_absolute(c) for c in session.cameras)), session.folder)
-    except OSError as error:
-        raise SessionError(
-            f"cannot write the session {session.folder}: {error}; choose a folder you may write to"
-        ) from error
 
 
 def load_session(folder: str | Path) -> Session:
@@ -240,12 +226,21 @@ def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
 
 def _save_session_file(session: Session) -> None:
     check_content(session)
-    try:
+    with _writing(session.folder / SESSION_FILE):
         _write_session(session, session.folder)
+
+
+@contextmanager
+def _writing(what: str | Path, advice: str = "see that you may write to the folder") -> Generator[None, None, None]:
+    """Name what could not be written in the `with` block.
+
+    Raises:
+        SessionError: it could not.
+    """
+    try:
+        yield
     except OSError as error:
-        raise SessionError(
-            f"cannot write {session.folder / SESSION_FILE}: {error}; see that you may write to the folder"
-        ) from error
+        raise SessionError(f"cannot write {what}: {error}; {advice}") from error
 
 
 def save_model(session: Session, person: int, model: BodyModel) -> Session:
@@ -261,12 +256,10 @@ def save_model(session: Session, person: int, model: BodyModel) -> Session:
     changed = replace(session, people=tuple(people))
     path = session.folder / _model_files(people)[person]
     refuse_links(session.folder, SESSION_FILE, f"models/{path.name}")
-    try:
+    with _writing(path):
         path.parent.mkdir(exist_ok=True)
         write_text_atomic(path, format_model(model))
         _write_session(changed, session.folder)
-    except OSError as error:
-        raise SessionError(f"cannot write {path}: {error}; see that you may write to the folder") from error
     return changed
 
 
@@ -335,23 +328,16 @@ def check_content(session: Session) -> dict[str, Any]:
     """
     cameras = []
     for c in session.cameras:
-        row: dict[str, Any] = {"name": c.camera.name, "footage": _relative(c.footage, session.folder)}
-        if c.background is not None:
-            row["background"] = _relative(c.background, session.folder)
-        if c.masks is not None:
-            row["masks"] = _relative(c.masks, session.folder)
-        row["offset"] = c.offset
-        if c.declared_fps is not None:
-            row["declared_fps"] = c.declared_fps
-        if c.footage_frames is not None:
-            row["footage_frames"] = c.footage_frames
-        if c.clock.ahead_frames:
-            row["time_offset_s"] = round(c.clock.ahead_frames / session.fps, 12)
-        if c.clock.rate:
-            row["time_rate"] = float(c.clock.rate)
-        if c.clock.lost:
-            row["lost_frames"] = [list(lost) for lost in c.clock.lost]
-        cameras.append(row)
+        optional = {
+            "declared_fps": c.declared_fps,
+            "footage_frames": c.footage_frames,
+            "time_offset_s": round(c.clock.ahead_frames / session.fps, 12) if c.clock.ahead_frames else None,
+            "time_rate": float(c.clock.rate) or None,
+            "lost_frames": [list(lost) for lost in c.clock.lost] or None,
+        }
+        paths = {kind: _relative(path, session.folder) for kind, path in c.paths.items()}
+        row = {"name": c.camera.name, **paths, "offset": c.offset, **optional}
+        cameras.append({key: value for key, value in row.items() if value is not None})
     data: dict[str, Any] = {
         "name": session.name,
         "fps": session.fps,
@@ -373,12 +359,7 @@ def check_content(session: Session) -> dict[str, Any]:
 
 def _absolute(source: CameraSource) -> CameraSource:
     """Make relative paths absolute by the current working folder, which the session outlives."""
-    return replace(
-        source,
-        footage=tidy_path(source.footage),
-        background=tidy_path(source.background) if source.background is not None else None,
-        masks=tidy_path(source.masks) if source.masks is not None else None,
-    )
+    return replace(source, **{kind: tidy_path(path) for kind, path in source.paths.items()})  # pyrefly: ignore[bad-argument-type]
 
 
 def _relative(path: Path, folder: Path) -> str:

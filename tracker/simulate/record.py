@@ -1,7 +1,5 @@
 """Make a session folder of a simulated recording, with the truth about it."""
 
-import secrets
-import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -13,7 +11,7 @@ import cv2
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.errors import SessionError, TrackerError
+from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
@@ -23,6 +21,7 @@ from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import write_trc
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
+from tracker.session.folder import appearing, require_free
 from tracker.session.session import PALETTE, Person, Session, load_session, save_session
 from tracker.session.store.identities import derived_uid
 from tracker.simulate.motion.postures import Role, solve_posture
@@ -100,9 +99,7 @@ def simulate(out: str | Path, simulation: Simulation = _DEFAULT, progress: Progr
         altered_model(m, r.build.bone_factors) if body == "skinned" else m for r, m in zip(cast, presets, strict=True)
     ]
     poses = [solve_posture(role, model, n_frames, fps) for role, model in zip(cast, models, strict=True)]
-    temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        temporary.mkdir(parents=True)
+    with appearing(out) as temporary:
         sources = [_source(temporary, c, simulation.masks) for c in cameras]
         figures = [_figure(role, model, body) for role, model in zip(cast, models, strict=True)]
         backdrops = [see_room(c, seed, simulation.room) for c in cameras]
@@ -111,19 +108,11 @@ def simulate(out: str | Path, simulation: Simulation = _DEFAULT, progress: Progr
         people = [Person(r.name, m, color) for r, m, color in zip(cast, presets, cycle(PALETTE), strict=False)]
         uid = derived_uid(repr(simulation))  # the same arguments, the same recording
         save_session(Session(temporary, out.name, float(fps), n_frames, tuple(sources), tuple(people), uid=uid))
-        if out.exists():
-            out.rmdir()
-        temporary.rename(out)
-    except OSError as error:
-        raise SessionError(f"cannot write the session {out}: {error}; choose a folder you may write to") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
     return load_session(out)
 
 
 def _check(out: Path, n_frames: int, fps: float, body: str) -> None:
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise SessionError(f"{out} exists already and is not an empty folder; choose another name or remove it")
+    require_free(out)
     if n_frames < 1 or not 0 < fps <= 1000:
         raise TrackerError(
             f"expected at least one frame and a rate of 1 to 1000 frames a second, found {n_frames} and {fps:g}"

@@ -127,8 +127,7 @@ def _check_folders(arguments: AssignArguments) -> None:
     Raises:
         TrackerError: one is in use, or is named twice.
     """
-    from tracker.annotation.session_copy import require_free
-    from tracker.session.folder import tidy_path
+    from tracker.session.folder import require_free, tidy_path
 
     again = [_second_pass(folder) for folder in arguments.blind if arguments.repeat]
     folders = [tidy_path(folder) for folder in (*arguments.blind, *again)]

@@ -91,25 +91,19 @@ def calibrate_rig(
     # Cameras of the usual sizes are fitted, of which the priors and the nearest plane know.
     scale = 1.0 if board.square_m >= USUAL_SIZES["square"].low else board.square_m / USUAL_SIZES["square"].high
     board = replace(board, square_m=board.square_m / scale)
+    blanks = [blank_camera(n, s, fisheye=f) for n, s, f in zip(names, sizes, fisheye, strict=True)]
     with solvable("film the board in many places, nearer, farther and tilted"):
-        found = _calibrated(board, seen, names, sizes, fisheye, needed_frame, report)
+        found = _calibrated(board, seen, blanks, needed_frame, report)
     _check_determined(found, board)
     return found if scale == 1.0 else replace(found, rig=found.rig.scaled(scale))
 
 
 def _calibrated(
-    board: Board,
-    seen: SeenCorners,
-    names: Sequence[str],
-    sizes: Sequence[tuple[int, int]],
-    fisheye: Sequence[bool],
-    needed_frame: int | None,
-    report: Report,
+    board: Board, seen: SeenCorners, blanks: Sequence[Camera], needed_frame: int | None, report: Report
 ) -> BoardCalibration:
     """Calibrate cameras from a board of a usual size; the arguments are those of `calibrate_rig`."""
     fitting, adjusting, checking = stages(report, "lenses", "all cameras", "frames held out")
-    blanks = [blank_camera(n, s, fisheye=f) for n, s, f in zip(names, sizes, fisheye, strict=True)]
-    views = outlines(board, seen, posed_views(board, seen), list(sizes))
+    views = outlines(board, seen, posed_views(board, seen), [blank.size for blank in blanks])
     lenses = []
     for i, blank in enumerate(blanks):
         frames = choose_views({k: o for (camera, k), o in views.items() if camera == i}, MAX_LENS_VIEWS)

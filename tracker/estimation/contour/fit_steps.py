@@ -79,6 +79,7 @@ def contour_steps(views: Sequence[ViewEvidence], poses: Sequence[Array], plan: F
                     continue
                 first, done = first or i, done + (not is_start)
                 now = (*now[:person], i.pose, *now[person + 1 :])
+                # The length of the contours is that at the start, so that the distance falls with the cost.
                 px = first.rms_px * float(np.sqrt(i.cost / first.cost)) if first.cost > 0 else i.rms_px
                 yield SearchStep(stage, now, px, now, px, done, is_last)
 

@@ -115,8 +115,8 @@ def _folder_for(path: Path) -> Generator[Path, None, None]:
         raise FormatError(f"{where} cannot be read: {error.strerror or error}; check the path") from error
 
 
-def _run(path: Path, folder: Path) -> None:
-    """Run the other process on a file; its answer goes to the folder."""
+def _answer(path: Path, folder: Path) -> ReadAnswer:
+    """Run the other process on a file, and return its answer from the folder."""
     root = str(Path(__file__).resolve().parents[3])
     # Each thread of a library for matrices would take up addresses, which are limited.
     environment = os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -125,10 +125,6 @@ def _run(path: Path, folder: Path) -> None:
     subprocess.run(
         words, env=environment, timeout=LIMITS.seconds, capture_output=True, check=False, stdin=subprocess.DEVNULL
     )
-
-
-def _answer(path: Path, folder: Path) -> ReadAnswer:
-    _run(path, folder)
     try:
         answer = msgspec.json.decode((folder / "answer.json").read_bytes(), type=ReadAnswer)
     except (OSError, msgspec.DecodeError) as error:

@@ -2,10 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+from msgspec import Meta
 
 from tracker.body.searches import Search
 from tracker.geometry.arrays import Array
+from tracker.validation import Time
+
+RowId: TypeAlias = Annotated[int, Meta(ge=1, description="the number of a row")]
 
 SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", "smoothed", "imported")
 """Sources of a value, most manual first. Stored by index: add at the end, never reorder."""
@@ -207,19 +212,19 @@ class FramePose(NamedTuple):
 class HistoryEntry(NamedTuple):
     """An edit that can be undone or redone."""
 
-    edit: int
+    edit: RowId
     label: str
     author: str
-    time: str
-    undone: bool
+    time: Time
+    undone: bool = False
     """Whether it is undone, so that redo applies it."""
 
 
 class ModelRevision(NamedTuple):
     """A body model that poses were made with; never changed."""
 
-    id: int
+    id: RowId
     person: str
     toml: str
     """Text of the model file, including its dimensions."""
-    time: str
+    time: Time

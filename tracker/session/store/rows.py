@@ -24,12 +24,12 @@ from tracker.session.store.records import (
     ModelRevision,
     Pin,
     PoseRecord,
+    RowId,
 )
 from tracker.validation import MAX_FRAMES, Number, Time, check
 
 _Flag: TypeAlias = Annotated[int, Meta(ge=0, le=1, description="0 or 1")]
 _Frame: TypeAlias = Annotated[int, Meta(ge=0, lt=MAX_FRAMES, description=f"a frame from 0 to {MAX_FRAMES - 1}")]
-_Id: TypeAlias = Annotated[int, Meta(ge=1, description="the number of a row")]
 _Status: TypeAlias = Literal["", "good", "doubtful", "lost"]
 _Numbers: TypeAlias = Annotated[bytes, Meta(min_length=8, description="the bytes of numbers")]
 
@@ -58,13 +58,13 @@ class _Summary(msgspec.Struct):
     others: _Flag
     limbs: bytes | None
     assessed_since: _Flag
-    change: _Id
+    change: RowId
 
 
 class _Pose(msgspec.Struct):
     numbers: _Numbers
     sources: Annotated[bytes, Meta(min_length=1)]
-    model_revision: _Id
+    model_revision: RowId
     keyframe: _Flag
     status: _Status
     cost_px: Number | None
@@ -86,12 +86,12 @@ class _FramePose(msgspec.Struct):
     numbers: _Numbers
     cost_px: Number | None
     view_costs_px: bytes | None
-    model_revision: _Id
+    model_revision: RowId
 
 
 class _Alternative(msgspec.Struct):
     numbers: _Numbers
-    model_revision: _Id
+    model_revision: RowId
     cost_px: Number | None
 
 
@@ -100,20 +100,6 @@ class _Pin(msgspec.Struct):
     camera: str
     u: Number
     v: Number
-
-
-class _Edit(msgspec.Struct):
-    edit: _Id
-    label: str
-    author: str
-    time: Time
-
-
-class _Revision(msgspec.Struct):
-    id: _Id
-    person: str
-    toml: str
-    time: Time
 
 
 CURRENT_POSES = "FROM poses p JOIN pose_changes c ON c.id = p.change"
@@ -220,14 +206,14 @@ def row_to_pin(row: Sequence[Any], where: object) -> Pin:
 
 def row_to_entry(row: Sequence[Any]) -> HistoryEntry:
     """Convert the columns id, label, author and time of an edit that is not undone."""
-    found: _Edit = _checked(row, _Edit, f"edit {row[0]!r:.40}")
-    return HistoryEntry(found.edit, found.label, found.author, found.time, undone=False)
+    found: HistoryEntry = check(list(row), HistoryEntry, f"edit {row[0]!r:.40}", DamagedStoreError)
+    return found
 
 
 def row_to_revision(row: Sequence[Any]) -> ModelRevision:
     """Convert the columns id, person, toml and time."""
-    found: _Revision = _checked(row, _Revision, f"model revision {row[0]!r:.40}")
-    return ModelRevision(found.id, found.person, found.toml, found.time)
+    found: ModelRevision = check(list(row), ModelRevision, f"model revision {row[0]!r:.40}", DamagedStoreError)
+    return found
 
 
 def settings(text: Any, where: object) -> dict[str, Any]:

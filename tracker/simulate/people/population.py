@@ -61,85 +61,82 @@ _WIDE_HIPS = _both_sides(
 )
 _FLANKS = _both_sides(Lobe("torso", (0.0, 0.056, -0.035), (0.0, 0.056, -0.085), (0.056, 0.056)))
 
+
+def _individual(
+    height_m: float,
+    bones: Mapping[str, Factors],
+    girths: Mapping[str, float],
+    further: tuple[Lobe, ...] = (),
+    head_size: float = 1.0,
+) -> Individual:
+    """Return a person of a stature, metres, and of a build."""
+    return Individual(height_m, Build(bones, girths, further, head_size))
+
+
 POPULATION: Mapping[str, Individual] = MappingProxyType(
     {
-        "child_3": Individual(
+        "child_3": _individual(
             0.98,
-            Build(
-                _bones(legs=0.857, arms=0.94, hips=0.92),
-                {"upper_arm": 0.92, "forearm": 0.98, "thigh": 0.98},
-                (_SMALL_BELLY,),
-                head_size=1.42,
-            ),
+            _bones(legs=0.857, arms=0.94, hips=0.92),
+            {"upper_arm": 0.92, "forearm": 0.98, "thigh": 0.98},
+            (_SMALL_BELLY,),
+            head_size=1.42,
         ),
-        "child_6": Individual(
+        "child_6": _individual(
             1.17,
-            Build(
-                _bones(legs=0.896, arms=0.96, hips=0.90, shoulders=0.97),
-                {"torso": 0.95, "upper_arm": 0.84, "forearm": 0.90, "thigh": 0.90, "calf": 0.94},
-                head_size=1.28,
-            ),
+            _bones(legs=0.896, arms=0.96, hips=0.90, shoulders=0.97),
+            {"torso": 0.95, "upper_arm": 0.84, "forearm": 0.90, "thigh": 0.90, "calf": 0.94},
+            head_size=1.28,
         ),
-        "child_10": Individual(
+        "child_10": _individual(
             1.38,
-            Build(
-                _bones(legs=0.943, arms=0.97, hips=0.93, shoulders=0.96),
-                {"torso": 0.92, "upper_arm": 0.84, "forearm": 0.88, "thigh": 0.90, "calf": 0.93},
-                head_size=1.13,
-            ),
+            _bones(legs=0.943, arms=0.97, hips=0.93, shoulders=0.96),
+            {"torso": 0.92, "upper_arm": 0.84, "forearm": 0.88, "thigh": 0.90, "calf": 0.93},
+            head_size=1.13,
         ),
-        "heavy_child": Individual(
+        "heavy_child": _individual(
             1.45,
-            Build(
-                _bones(legs=0.945, arms=0.98, shoulders=0.97),
-                {"torso": 1.10, "upper_arm": 1.10, "forearm": 1.05, "thigh": 1.12, "calf": 1.10},
-                (_SMALL_BELLY, *_FLANKS),
-                head_size=1.12,
-            ),
+            _bones(legs=0.945, arms=0.98, shoulders=0.97),
+            {"torso": 1.10, "upper_arm": 1.10, "forearm": 1.05, "thigh": 1.12, "calf": 1.10},
+            (_SMALL_BELLY, *_FLANKS),
+            head_size=1.12,
         ),
-        "heavy_man": Individual(
+        "heavy_man": _individual(
             1.76,
-            Build(
-                _bones(legs=0.99, shoulders=1.03),
-                {"torso": 1.15, "upper_arm": 1.25, "forearm": 1.15, "thigh": 1.18, "calf": 1.14, "head": 1.04},
-                (_BELLY, *_FLANKS),
-            ),
+            _bones(legs=0.99, shoulders=1.03),
+            {"torso": 1.15, "upper_arm": 1.25, "forearm": 1.15, "thigh": 1.18, "calf": 1.14, "head": 1.04},
+            (_BELLY, *_FLANKS),
         ),
-        "heavy_woman": Individual(
+        "heavy_woman": _individual(
             1.62,
-            Build(
-                _bones(legs=0.97, arms=0.97, shoulders=0.92, hips=1.10, trunk=1.03),
-                {"torso": 1.10, "upper_arm": 1.20, "forearm": 1.05, "thigh": 1.22, "calf": 1.15},
-                (_SMALL_BELLY, *_BUST, *_WIDE_HIPS, *_FLANKS),
-            ),
+            _bones(legs=0.97, arms=0.97, shoulders=0.92, hips=1.10, trunk=1.03),
+            {"torso": 1.10, "upper_arm": 1.20, "forearm": 1.05, "thigh": 1.22, "calf": 1.15},
+            (_SMALL_BELLY, *_BUST, *_WIDE_HIPS, *_FLANKS),
         ),
-        "short_woman": Individual(
+        "short_woman": _individual(
             1.50,
-            Build(_bones(legs=0.96, arms=0.96, hips=1.08, trunk=1.03), WOMAN.girths, WOMAN.further, head_size=1.05),
+            _bones(legs=0.96, arms=0.96, hips=1.08, trunk=1.03),
+            WOMAN.girths,
+            WOMAN.further,
+            head_size=1.05,
         ),
-        "long_legged_woman": Individual(
+        "long_legged_woman": _individual(
             1.74,
-            Build(
-                _bones(legs=1.05, arms=1.0, shoulders=0.93, hips=1.03, trunk=0.95),
-                {"torso": 0.90, "upper_arm": 0.80, "forearm": 0.85, "thigh": 0.92, "calf": 0.90},
-                WOMAN.further[:2],
-                head_size=0.96,
-            ),
+            _bones(legs=1.05, arms=1.0, shoulders=0.93, hips=1.03, trunk=0.95),
+            {"torso": 0.90, "upper_arm": 0.80, "forearm": 0.85, "thigh": 0.92, "calf": 0.90},
+            WOMAN.further[:2],
+            head_size=0.96,
         ),
-        "tall_thin_man": Individual(
+        "tall_thin_man": _individual(
             1.97,
-            Build(
-                _bones(legs=1.035, arms=1.04, shoulders=0.95, hips=0.90, trunk=0.98),
-                {"torso": 0.86, "upper_arm": 0.82, "forearm": 0.88, "thigh": 0.84, "calf": 0.86},
-                head_size=0.92,
-            ),
+            _bones(legs=1.035, arms=1.04, shoulders=0.95, hips=0.90, trunk=0.98),
+            {"torso": 0.86, "upper_arm": 0.82, "forearm": 0.88, "thigh": 0.84, "calf": 0.86},
+            head_size=0.92,
         ),
-        "broad_man": Individual(
+        "broad_man": _individual(
             1.72,
-            Build(
-                _bones(legs=0.95, arms=1.03, shoulders=1.12, hips=1.02, trunk=1.05),
-                {"torso": 1.08, "upper_arm": 1.25, "forearm": 1.15, "thigh": 1.10, "calf": 1.08},
-            ),
+            _bones(legs=0.95, arms=1.03, shoulders=1.12, hips=1.02, trunk=1.05),
+            {"torso": 1.08, "upper_arm": 1.25, "forearm": 1.15, "thigh": 1.10, "calf": 1.08},
         ),
     }
 )
