@@ -6,7 +6,6 @@ other frames of footage with a multiple of the rate than the others have. Simula
 second; `walk` and `balance_real` are thinned. `--only` measures some of the tables.
 """
 
-import argparse
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +16,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from acquisition import PLAYED, quadrille
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table
 
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -458,15 +457,11 @@ MEASURES: Mapping[str, Callable[[Path, Path], Measured]] = {
 
 def main() -> None:
     """Measure and print, or write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder with walk, fast_arms and balance_real")
+    data, scratch = "folder with walk, fast_arms and balance_real", "folder for images, some gigabytes"
+    parser = benchmark_parser(__doc__, ["data"], data=data, scratch=scratch)
     parser.add_argument("--only", nargs="+", choices=[*MEASURES], default=[*MEASURES], help="tables to measure")
-    parser.add_argument("--scratch", type=Path, help="folder for images, some gigabytes; by default that of the system")
-    add_write_option(parser)
-    words = parser.parse_args()
-    names = [n for n in TABLES if n.split()[1] in words.only]
-    check_places(words.write, names)
-    for name in names:
+    words = read_words(parser, TABLES)
+    for name in (n for n in TABLES if n.split()[1] in words.only):
         with tempfile.TemporaryDirectory(dir=words.scratch) as folder:
             found = MEASURES[name.split()[1]](words.data, Path(folder))
         show(words.write, name, found.conditions, table(found.heads, found.rows, found.first))

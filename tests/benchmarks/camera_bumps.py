@@ -6,7 +6,6 @@ right calibration show false alarms, with acquired bodies and with those of heig
 that no other benchmark has. `--work DIR` keeps scenes, sessions and results, so that an interrupted run goes on.
 """
 
-import argparse
 import json
 import sys
 import tempfile
@@ -20,7 +19,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from acquisition import N_FRAMES, Recording, quadrille, recorded
 from calibration_repair import off
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table, work_folder
 from known_faults import fit_fault
 
 from tracker.calibration.check.fault_search import Fault
@@ -274,23 +273,19 @@ def rotation_cells(found: Sequence[Judged]) -> list[str]:
 
 def main() -> None:
     """Measure and print, or write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder with walk, fast_arms and two_people")
-    parser.add_argument("--work", type=Path, help="folder that keeps scenes, sessions and results")
+    data, work = "folder with walk, fast_arms and two_people", "folder that keeps scenes, sessions and results"
+    parser = benchmark_parser(__doc__, ["data"], data=data, work=work)
     parser.add_argument("--kept", action="store_true", help="show what --work keeps of an interrupted run, and end")
     parser.add_argument("--only", nargs="+", help="recordings to print, not to write")
     parser.add_argument("--bumps", type=int, default=len(TURNS), help="bumps of each recording, to print")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = read_words(parser, TABLES)
     if words.kept:
         names = [*FILMED, *(person for _, person in SIMULATED)]
         kept = [path for name in names for path in sorted((words.work / name).glob("*.json"))]
         _show([Judged(**json.loads(path.read_text("utf-8"))) for path in kept], words.write)
         return
     found = list[Judged]()
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = words.work or Path(scratch)
+    with work_folder(words.work) as folder:
         for index, recording in recordings(words.data, folder, words.only or [*FILMED, *(p for _, p in SIMULATED)]):
             for one in measured(recording, index, range(words.bumps), folder / recording.name):
                 found.append(one)
