@@ -11,7 +11,7 @@ import argparse
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
@@ -144,8 +144,7 @@ def recorded(data: Path, names: Sequence[str]) -> Iterator[Recording]:
 def measure(recording: Recording, folder: Path) -> list[Outcome]:
     """Track, acquire and track again; return the outcome of each person."""
     session = new_session(recording, folder)
-    for person, joints in recording.references.items():
-        quadrille("init", session, "--joints", joints, "--person", person)
+    set_first_poses(recording, session)
     before = _tracked(recording, session)
     for person in recording.references:
         quadrille("acquire", session, "--person", person)
@@ -157,15 +156,22 @@ def measure(recording: Recording, folder: Path) -> list[Outcome]:
     return out
 
 
-def new_session(recording: Recording, folder: Path) -> Path:
-    """Make a session of a recording in a folder."""
+def new_session(recording: Recording, folder: Path, bodies: Mapping[str, Path] | None = None) -> Path:
+    """Make a session of a recording in a folder; people without a body get one by height."""
     at = folder / recording.name
+    models = ["--model", *(f"{name}={path}" for name, path in bodies.items())] if bodies else []
     background = () if recording.background is None else ("--background", recording.background)
     quadrille(
         "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, *background, "--people",
-        *recording.references,
+        *recording.references, *models,
     )  # fmt: skip
     return at
+
+
+def set_first_poses(recording: Recording, session: Path) -> None:
+    """Fit everybody's pose to the reference joints of frame 0."""
+    for person, joints in recording.references.items():
+        quadrille("init", session, "--joints", joints, "--person", person)
 
 
 def percent(share: float | None) -> str:

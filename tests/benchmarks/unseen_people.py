@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from acquisition import Recording, new_session, quadrille
+from acquisition import Recording, new_session, quadrille, set_first_poses
 from doc_tables import Conditions, benchmark_parser, read_words, show, table, work_folder
 from joint_errors import HEADS, Compared, groups, measured, pooled
 
@@ -113,8 +113,7 @@ def acquired(scene: Scene, folder: Path) -> tuple[Path, list[Path]]:
         )  # fmt: skip
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             made = new_session(recording, Path(scratch))
-            for name, reference in zip(people, references, strict=True):
-                quadrille("init", made, "--joints", reference, "--person", name)
+            set_first_poses(recording, made)
             for name in people:
                 quadrille("acquire", made, "--person", name)
             made.rename(at)

@@ -13,8 +13,7 @@ from tracker.errors import TrackerError
 def begin_run(user, tracker):
     """Track from frame 2 until frame 3 is done; the next step, for which pause and stop wait, is let go soon."""
     start_run(user)
-    tracker.let_go(1)
-    wait_for(lambda: user.state.track.at == 3)
+    tracker.go_on(user, 1, at=3)
     threading.Timer(0.2, tracker.let_go, (1,)).start()
 
 
@@ -29,8 +28,7 @@ def test_a_paused_run_goes_on_only_when_its_frames_are_free(people, tracker):
     assert not anna.state.track.running
     ben.dragging.end(1)
     anna.tracking.resume()
-    tracker.let_go(1000)
-    wait_for(lambda: anna.state.track.message)
+    tracker.go_on(anna, 1000)
     assert anna.state.track.message == "done: 4 frames, 1 doubtful"
 
 
@@ -39,8 +37,7 @@ def test_a_run_whose_poses_are_refused_ends_with_a_notice(people, tracker):
     start_run(anna)
     ben.navigation.seek(4)
     ben.session_state.set(is_pin_held=True)  # as if begun a moment before the run
-    tracker.let_go(1000)
-    wait_for(lambda: anna.state.track.message)
+    tracker.go_on(anna, 1000)
     assert not anna.state.track.running
     assert anna.state.track.failed
     assert "ben sets a pin on frame 4" in anna.state.track.notice

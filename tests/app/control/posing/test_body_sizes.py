@@ -4,7 +4,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from gestures import PAGE, drag, pixel_of, wait_for
+from gestures import PAGE, drag, pixel_of
 
 from app.messages import encoding
 from app.state.page_view import View
@@ -169,9 +169,7 @@ def test_tracking_goes_on_in_the_new_body(placed, tracker):
     was = joints(placed, 2)
     lengthen(placed)
     placed.body_sizes.apply(0, refit=False)
-    placed.tracking.start(backward=False, until=3)
-    tracker.let_go(1)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=3, frames=1)
     assert placed.models == (placed.session.people[0].model,)
     assert placed.state.revisions == placed.state.present
     assert np.linalg.norm(joints(placed, 3) - was - (0.01, 0, 0), axis=1).max() < 0.01

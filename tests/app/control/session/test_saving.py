@@ -162,8 +162,7 @@ def test_frames_that_a_tracker_has_not_written_yet_are_not_saved(placed, tracker
     wait_for(lambda: placed.state.track.done == 3)
     assert placed.state.frame == 2
     assert not placed.state.saved
-    tracker.let_go(1000)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 1000)
     assert placed.state.saved
     assert disk.wrong == []
 
