@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fake_tracker import STEP_M
-from gestures import FRONT, PAGE, drag, wait_for
+from gestures import FRONT, PAGE, drag, drag_on, wait_for
 from run_poses import Estimate, doubted
 
 from app.state.run_choices import RunChoices
@@ -117,8 +117,7 @@ def test_a_draft_is_tracked_itself(placed, tracker):
 
 @pytest.mark.slow
 def test_keyframes_are_taken_as_they_are(placed, tracker):
-    placed.navigation.seek(4)
-    drag(placed, "torso", (0.0, 9.0))
+    drag_on(placed, 4, "torso", (0.0, 9.0))
     keyframe = placed.state.poses[0]
     placed.navigation.seek(2)
     placed.tracking.start(backward=False, until=5)
@@ -156,8 +155,7 @@ def test_a_run_takes_the_chosen_stride_and_cameras(placed, tracker):
 
 
 def test_a_run_over_keyframes_alone_is_no_entry(placed, tracker):
-    placed.navigation.seek(3)
-    drag(placed, "torso", (0.0, 9.0))
+    drag_on(placed, 3, "torso", (0.0, 9.0))
     placed.navigation.seek(2)
     tracker.track(placed, until=3, frames=1)
     assert placed.state.undo == "drag torso, frame 3"
