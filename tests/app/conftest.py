@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_line import SAMPLE
 from fake_tracker import FakeTracker
-from gestures import drag, wait_for
+from gestures import drag_on, wait_for
 
 from app import __main__
 from app.control.controller import Controller
@@ -158,7 +158,6 @@ def tracker(monkeypatch):
 def placed(opened, tracker):
     """A controller whose body stands on frame 2."""
     controller = opened()
-    controller.navigation.seek(2)
-    drag(controller, "torso", (4.0, 0.0))
+    drag_on(controller, 2, "torso", (4.0, 0.0))
     yield controller
     tracker.let_go(1000)  # nobody waits at the end

@@ -6,31 +6,23 @@ recordings there. Accuracy is the mean error of the 12 limb joints; a frame is l
 150 mm. Times depend on the machine; compare them with each other.
 """
 
-import argparse
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-from doc_tables import Conditions, add_write_option, check_places, measured, show, table
-from true_starts import read_simulated, start_of
+from doc_tables import Conditions, benchmark_parser, measured, read_words, show, table, work_folder
+from true_starts import Clip, read_simulated, start_of, track_from
 
-from tracker.body.model import BodyModel
 from tracker.body.motion.prediction import PredictSettings
 from tracker.estimation.chamfer.paper import PAPER_BODY, paper_settings
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.chamfer.tracker import ChamferTracker
 from tracker.estimation.fitting.contour_residuals import MatchSettings
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
-from tracker.formats.trc import MarkerTable
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
@@ -54,26 +46,10 @@ VARIANTS: Mapping[str, TrackSettings] = {
 SCENES = (("exercise", 21), ("dance", 21), ("reach_and_cross", 21))
 
 
-@dataclass(frozen=True, eq=False)
-class Clip:
-    """A recording with a reference."""
-
-    name: str
-    cameras: tuple[CameraSource, ...]
-    model: BodyModel
-    reference: MarkerTable
-    frames: range
-    fps: float
-
-
 def simulated(folder: Path, n_frames: int) -> list[Clip]:
     """Make the scenes."""
-    clips = []
-    for scene, seed in SCENES:
-        session = simulate(folder / scene, Simulation(scene, n_frames=n_frames, seed=seed))
-        true = read_simulated(session.folder)
-        clips.append(Clip(scene, session.cameras, true.models[0], true.references[0], range(n_frames), session.fps))
-    return clips
+    made = [simulate(folder / scene, Simulation(scene, n_frames=n_frames, seed=seed)) for scene, seed in SCENES]
+    return [read_simulated(session.folder, n_frames) for session in made]
 
 
 def recorded(data: Path, folder: Path) -> list[Clip]:
@@ -91,23 +67,24 @@ def recorded(data: Path, folder: Path) -> list[Clip]:
             )
         )
         session = load_session(folder / name)
-        joints = read_joints(reference, session.fps)
-        clips.append(Clip(name, session.cameras, session.people[0].model, joints, range(session.n_frames), session.fps))
+        model, joints = session.people[0].model, read_joints(reference, session.fps)
+        frames = range(session.n_frames)
+        clips.append(Clip(name, session, (model,), (joints,), (start_of(model, joints),), frames))
     return clips
 
 
 def measure(clip: Clip, settings: TrackSettings) -> tuple[float, int, float]:
     """Mean error in mm, lost frames, frames per second."""
-    model = load_model(PAPER_BODY, clip.model.height_m) if settings == VARIANTS[PAPER] else clip.model
-    start = start_of(model, clip.reference)
-    with Recording(clip.cameras) as recording:
-        observer = Observer(clip.cameras, recording)
-        subjects = Subjects.of([model], keyframes={0: {0: start}})
+    (model,), (reference,), cameras = clip.models, clip.references, clip.session.cameras
+    if settings == VARIANTS[PAPER]:
+        model = load_model(PAPER_BODY, model.height_m)
+    with Recording(cameras) as recording:
+        observer, start = Observer(cameras, recording), start_of(model, reference)
         began = time.perf_counter()
-        found = list(ChamferTracker(settings).estimates(TrackingRun(observer, subjects, [start], clip.frames)))
+        found = track_from(observer, [model], [start], clip.frames, settings)
         seconds = time.perf_counter() - began
-    joints = joints_of_poses(model, {f.frame: f.poses[0] for f in found}, clip.fps)
-    errors = evaluate_joints(joints, clip.reference, clip.frames)
+    joints = joints_of_poses(model, {f.frame: f.poses[0] for f in found}, clip.session.fps)
+    errors = evaluate_joints(joints, reference, clip.frames)
     return errors.mpjpe_mm, errors.lost_frames, len(found) / seconds
 
 
@@ -128,19 +105,15 @@ def conditions(clips: Sequence[Clip]) -> Conditions:
 
 def main() -> None:
     """Measure and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, help="folder with walk, balance_real and fast_arms")
+    parser = benchmark_parser(__doc__, data="folder with walk, balance_real and fast_arms")
     parser.add_argument("--frames", type=int, default=90, help="frames of each simulated scene")
     parser.add_argument(
         "--only", nargs="+", default=[*VARIANTS], choices=[*VARIANTS], help="variants to print; the table stays"
     )
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    words = read_words(parser, TABLES)
+    with work_folder(None) as folder:
         clips = simulated(folder, words.frames) + (recorded(words.data, folder) if words.data else [])
-        measure(replace(clips[0], frames=range(4)), DEFAULT)  # compiles the kernels
+        measure(clips[0]._replace(frames=range(4)), DEFAULT)  # compiles the kernels
         variants = {name: settings for name, settings in VARIANTS.items() if name in words.only}
         rows = measured(variants, clips, measure, lambda cell: "{:.1f} mm, {} lost, {:.1f} frames/s".format(*cell))
     cells = {name: [f"{mm:.0f} / {lost} / {fps:.2g}" for mm, lost, fps in row] for name, row in rows.items()}

@@ -11,14 +11,13 @@ import argparse
 import json
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table, work_folder
 
 from tracker.session.session import load_session
 from tracker.session.store.stored_poses import read_stored_poses
@@ -145,8 +144,7 @@ def recorded(data: Path, names: Sequence[str]) -> Iterator[Recording]:
 def measure(recording: Recording, folder: Path) -> list[Outcome]:
     """Track, acquire and track again; return the outcome of each person."""
     session = new_session(recording, folder)
-    for person, joints in recording.references.items():
-        quadrille("init", session, "--joints", joints, "--person", person)
+    set_first_poses(recording, session)
     before = _tracked(recording, session)
     for person in recording.references:
         quadrille("acquire", session, "--person", person)
@@ -158,15 +156,22 @@ def measure(recording: Recording, folder: Path) -> list[Outcome]:
     return out
 
 
-def new_session(recording: Recording, folder: Path) -> Path:
-    """Make a session of a recording in a folder."""
+def new_session(recording: Recording, folder: Path, bodies: Mapping[str, Path] | None = None) -> Path:
+    """Make a session of a recording in a folder; people without a body get one by height."""
     at = folder / recording.name
+    models = ["--model", *(f"{name}={path}" for name, path in bodies.items())] if bodies else []
     background = () if recording.background is None else ("--background", recording.background)
     quadrille(
         "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, *background, "--people",
-        *recording.references,
+        *recording.references, *models,
     )  # fmt: skip
     return at
+
+
+def set_first_poses(recording: Recording, session: Path) -> None:
+    """Fit everybody's pose to the reference joints of frame 0."""
+    for person, joints in recording.references.items():
+        quadrille("init", session, "--joints", joints, "--person", person)
 
 
 def percent(share: float | None) -> str:
@@ -219,15 +224,11 @@ def run(
         name: of the table in the document.
         conditions: of the measurement.
     """
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
-    parser.add_argument("--scenes", type=Path, help="folder that keeps the simulated recordings")
+    data = "folder with walk, balance_real, fast_arms and two_people"
+    parser = benchmark_parser(description, data=data, scenes="folder that keeps the simulated recordings")
     parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
-    add_write_option(parser)
-    words, rows = parser.parse_args(), list[RowT]()
-    check_places(words.write, [name])
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
+    words, rows = read_words(parser, [name]), list[RowT]()
+    with work_folder(None) as folder:
         for recording in chosen(words, folder):
             for row in measure_one(recording, folder):
                 print(f"{row.name}: {', '.join(map(' '.join, zip(heads, row.cells, strict=True)))}", flush=True)

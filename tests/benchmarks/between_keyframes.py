@@ -7,7 +7,6 @@ correlation is that of the seam, the largest distance of a limb joint in the two
 frame.
 """
 
-import argparse
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -17,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import RECORDED, quadrille
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table
 from joint_errors import processor_s, references_of
 from scipy.stats import spearmanr
 
@@ -145,13 +144,10 @@ def rows_of(folder: Path, references: list[Path]) -> dict[str, list[str]]:
 
 def main() -> None:
     """Measure all recordings, and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = benchmark_parser(__doc__, ["data"], data="folder of the recordings")
     parser.add_argument("sessions", type=Path)
-    parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
     parser.add_argument("--only", nargs="+", help="names of the recordings to measure")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = read_words(parser, TABLES)
     rows: dict[str, list[str]] = {}
     for name in (n for n in RECORDED if n in (given.only or RECORDED)):
         for row, cells in rows_of(given.sessions / name, references_of(name, given.data, None)).items():

@@ -12,31 +12,27 @@ It prints the weights; they are to be copied into the code. `--write` also draws
 DIR` keeps scenes, bodies and features there: after a change of the tracker, remove `DIR/rows` and run it again.
 """
 
-import argparse
 import itertools
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from acquisition import PLAYED, RECORDED, quadrille, recorded
-from doc_tables import add_write_option, check_places
+from acquisition import PLAYED, RECORDED, new_session, recorded
+from doc_tables import benchmark_parser, read_words, work_folder
 from status_model import LimbRows, Run, load_rows, save_rows
 from status_tables import write_results
+from true_starts import limb_joints, track_from
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
 from tracker.estimation.acquisition.from_joints import height_from_joints, place_joints
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.chamfer.tracker import ChamferTracker
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.tracking import confidence
 from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
@@ -149,24 +145,23 @@ def passes(cameras: Mapping[int, tuple[int, ...]]) -> Iterator[Pass]:
 
 def track(footage: Footage, models: Sequence[BodyModel], how: Pass) -> tuple[LimbRows, list[PoseEstimate]]:
     """Track all people from their joints in frame 0; return the rows, and the estimates."""
-    starts = [_start_of(m, t) for m, t in zip(models, footage.references, strict=True)]
+    truths = [limb_joints(reference)[0] for reference in footage.references]
+    starts = [fit_to_points(m, t, centers=True).pose for m, t in zip(models, truths, strict=True)]
     cameras = [footage.cameras[i] for i in how.cameras]
     cameras = cameras if how.background else [replace(c, background=None, masks=None) for c in cameras]
     settings = TrackSettings() if how.searched else replace(TrackSettings(), recover=None)
     frames = range(0, footage.n_frames, how.stride)
     with Recording(cameras) as recording:
-        subjects = Subjects.of(models, keyframes={0: dict(enumerate(starts))})
-        run = TrackingRun(Observer(cameras, recording), subjects, starts, frames, footage.fps / how.stride)
-        found = list(ChamferTracker(settings).estimates(run))
-    people = [_rows_of(p, found, subjects, footage) for p in range(len(models))]
+        observer = Observer(cameras, recording)
+        found = track_from(observer, models, starts, frames, settings, footage.fps / how.stride)
+    people = [_rows_of(p, found, models[p], footage.references[p]) for p in range(len(models))]
     return LimbRows(*(np.array(c) for c in zip(*itertools.chain(*people), strict=True))), found
 
 
 def _rows_of(
-    person: int, estimates: Sequence[PoseEstimate], subjects: Subjects, footage: Footage
+    person: int, estimates: Sequence[PoseEstimate], model: BodyModel, truth: MarkerTable
 ) -> Iterator[tuple[Any, ...]]:
     """Yield the rows of the limbs of one person."""
-    model, truth = subjects.models[person], footage.references[person]
     joints = {int(f): dict(zip(truth.names, p, strict=True)) for f, p in zip(truth.frames, truth.points, strict=True)}
     for found in estimates:
         if found.qualities[person] is not None and found.frame in joints:
@@ -201,15 +196,6 @@ def _joints_of(model: BodyModel, limb: str) -> list[str]:
     return [n for n in LIMB_JOINTS if model.point_parts[model.point_names.index(n)] in parts]
 
 
-def _start_of(model: BodyModel, reference: MarkerTable) -> Array:
-    return fit_to_points(model, _joints_at_start(reference), centers=True).pose
-
-
-def _joints_at_start(reference: MarkerTable) -> dict[str, Array]:
-    row = reference.points[np.flatnonzero(reference.frames == 0)[0]]
-    return {n: p for n, p in zip(reference.names, row, strict=True) if n in LIMB_JOINTS and np.all(np.isfinite(p))}
-
-
 def acquire(footage: Footage, models: Sequence[BodyModel], found: Sequence[PoseEstimate], person: int) -> BodyModel:
     """Acquire a body as `quadrille acquire` does after `track`: from good frames, and the joints of frame 0."""
     good = [f for f in found if f.frame == 0 or f.statuses[person] == "good"]
@@ -217,7 +203,7 @@ def acquire(footage: Footage, models: Sequence[BodyModel], found: Sequence[PoseE
         good = [f for f in found if f.frame == 0 or f.statuses[person] != "lost"]
     people = [person, *(i for i in range(len(models)) if i != person)]
     bodies = {f.frame: tuple(PosedBody(models[i], f.poses[i]) for i in people) for f in good}
-    placed = {0: place_joints(models[person], _joints_at_start(footage.references[person]))}
+    placed = {0: place_joints(models[person], limb_joints(footage.references[person])[0])}
     with Recording(footage.cameras) as recording:
         observer = Observer(footage.cameras, recording)
         return acquire_from_contours(observer, bodies, 0, placed, AcquisitionSettings()).body
@@ -286,12 +272,7 @@ def recorded_runs(data: Path, folder: Path, workshop: Workshop) -> Iterator[Run]
     """Track the recordings of a folder."""
     for recording in recorded(data, [*RECORDED]):
         at = folder / recording.name
-        if not at.exists():
-            quadrille(
-                "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
-                recording.background,
-            )  # fmt: skip
-        session = load_session(at)
+        session = load_session(at if at.exists() else new_session(recording, folder))
         truths = tuple(read_joints(path, session.fps) for path in recording.references.values())
         footage = Footage(session.cameras, session.n_frames, session.fps, truths)
         bodies = [f"{recording.name} {person}" for person in recording.references]
@@ -302,14 +283,9 @@ def recorded_runs(data: Path, folder: Path, workshop: Workshop) -> Iterator[Run]
 
 def main() -> None:
     """Track, fit, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
-    parser.add_argument("--work", type=Path, help="folder that keeps scenes, bodies and features")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
-    with tempfile.TemporaryDirectory() as name:
-        work = words.work or Path(name)
+    data, kept = "folder with walk, balance_real, fast_arms and two_people", "folder for scenes, bodies and features"
+    words = read_words(benchmark_parser(__doc__, data=data, work=kept), TABLES)
+    with work_folder(words.work) as work:
         workshop = Workshop(work)
         runs = [*simulated_runs(work / "scenes", workshop)]
         outside = [*recorded_runs(words.data, work / "sessions", workshop)] if words.data else []

@@ -6,18 +6,16 @@ other frames of footage with a multiple of the rate than the others have. Simula
 second; `walk` and `balance_real` are thinned. `--only` measures some of the tables.
 """
 
-import argparse
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from acquisition import PLAYED, quadrille
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table
 
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -188,6 +186,12 @@ def body_of(footage: Footage, folder: Path) -> Path:
     return at / "models" / "person.toml"
 
 
+def with_bodies(data: Path, folder: Path, names: Iterable[str]) -> dict[str, tuple[Footage, Path]]:
+    """Write the images of recordings, and acquire the body of each; return both by the recording's name."""
+    footages = {name: decoded(name, data / name, folder) for name in dict.fromkeys(names)}
+    return {name: (footage, body_of(footage, folder)) for name, footage in footages.items()}
+
+
 def error_mm(at: Path) -> float:
     """Return the mean error of the joints."""
     joints = _joints(at)
@@ -250,9 +254,13 @@ def bumps(data: Path, folder: Path) -> Measured:
     return Measured("camera off by", ("camera", "named", "error, mm", "corrected", "with the right one"), rows, said)
 
 
+def named_in_turn(found: Sequence[dict[str, Any]]) -> str:
+    """Return the cameras that each check named, as a cell."""
+    return ", then ".join(" and ".join(f["named"]) for f in found) or "none"
+
+
 def _row(camera: str, before: float, found: Sequence[dict[str, Any]], after: float, healthy: float) -> list[str]:
-    named = ", then ".join(" and ".join(f["named"]) for f in found) or "none"
-    return [camera, named, f"{before:.1f}", f"{after:.1f}", f"{healthy:.1f}"]
+    return [camera, named_in_turn(found), f"{before:.1f}", f"{after:.1f}", f"{healthy:.1f}"]
 
 
 def clock_ms(at: Path, camera: str) -> tuple[float, float]:
@@ -304,9 +312,9 @@ def drift(data: Path, folder: Path) -> Measured:
         found = _Trial(dense, every, camera, body_of(plain, folder), folder / label).found(0.0, DRIFT)
         said = [next(c for c in f["cameras"] if c["name"] == camera) for f in found.checks]
         sigma = f"{said[-1]['sigma']['drift_ms_per_s'] / 1000:.4f}" if said else ""
-        named = ", then ".join(" and ".join(f["named"]) for f in found.checks) or "none"
         off = f"{found.drift:.4f} ({100 * (found.drift / DRIFT - 1):+.0f}%)"
-        rows[label] = [camera, named, off, sigma, f"{found.before_mm:.1f}", f"{found.after_mm:.1f}"]
+        joints = f"{found.before_mm:.1f}", f"{found.after_mm:.1f}"
+        rows[label] = [camera, named_in_turn(found.checks), off, sigma, *joints]
         print(label, rows[label], flush=True)
     conditions_of = conditions(
         f"simulated people rendered at {DENSE_FPS:g} frames a second, thinned to 30; one camera loses "
@@ -358,15 +366,13 @@ class _Trial(NamedTuple):
 
 def lost(data: Path, folder: Path) -> Measured:
     """Let a camera lose frames within a recording."""
-    rows, known = {}, dict[str, tuple[Footage, Path]]()
+    rows, known = {}, with_bodies(data, folder, (case[0] for case in LOST))
     for name, index, since, n in LOST:
-        if name not in known:
-            footage = decoded(name, data / name, folder)
-            known[name] = footage, body_of(footage, folder)
         footage, body = known[name]
         camera, label = footage.cameras[index], f"{name}, {n} before {since}"
-        images, late = folder / f"{label}, images", partial(_lost, camera, since, n)
-        at = tracked(started(thinned(footage, images, late=late), folder / label, body))
+        lost = {(camera, k): float(n) for k in range(since, footage.n_images)}
+        late = thinned(footage, folder / f"{label}, images", late=lambda *at, lost=lost: lost.get(at, 0.0))
+        at = tracked(started(late, folder / label, body))
         before_mm = error_mm(at)
         found = [
             (c["name"], c["lost_frames"], c["since_frame"]) for f in repaired(at) for c in f["cameras"] if c["kind"]
@@ -382,18 +388,10 @@ def lost(data: Path, folder: Path) -> Measured:
     return Measured("recording", heads, rows, conditions_of)
 
 
-def _lost(camera: str, since: int, n: int, name: str, k: int) -> float:
-    """Return by how many frames the picture of a frame is late in a camera that loses n frames before another one."""
-    return float(n * (name == camera and k >= since))
-
-
 def change(data: Path, folder: Path) -> Measured:
     """Turn a camera within a recording."""
-    rows, known = {}, dict[str, tuple[Footage, Path]]()
+    rows, known = {}, with_bodies(data, folder, (case[0] for case in CHANGES))
     for i, (name, index, since, angles) in enumerate(CHANGES):
-        if name not in known:
-            footage = decoded(name, data / name, folder)
-            known[name] = footage, body_of(footage, folder)
         footage, body = known[name]
         camera = footage.cameras[index]
         turned = folder / f"turned {i}" / camera
@@ -444,8 +442,7 @@ def body(data: Path, folder: Path) -> Measured:
             ]  # fmt: skip
             print([*rows.items()][-1], flush=True)
     before, found = error_mm(at), repaired(at)
-    named = ", then ".join(" and ".join(f["named"]) for f in found)
-    rows["all frames, repeated"] = [named, "", f"{before:.1f}", f"{error_mm(at):.1f}"]
+    rows["all frames, repeated"] = [named_in_turn(found), "", f"{before:.1f}", f"{error_mm(at):.1f}"]
     said = conditions("`balance_real`", "acquired", "joints of frame 0")
     heads = ("cameras corrected", "frames that fit better", "distance to the reference before, mm", "after, mm")
     return Measured("corrected by", heads, rows, said)
@@ -458,15 +455,11 @@ MEASURES: Mapping[str, Callable[[Path, Path], Measured]] = {
 
 def main() -> None:
     """Measure and print, or write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder with walk, fast_arms and balance_real")
+    data, scratch = "folder with walk, fast_arms and balance_real", "folder for images, some gigabytes"
+    parser = benchmark_parser(__doc__, ["data"], data=data, scratch=scratch)
     parser.add_argument("--only", nargs="+", choices=[*MEASURES], default=[*MEASURES], help="tables to measure")
-    parser.add_argument("--scratch", type=Path, help="folder for images, some gigabytes; by default that of the system")
-    add_write_option(parser)
-    words = parser.parse_args()
-    names = [n for n in TABLES if n.split()[1] in words.only]
-    check_places(words.write, names)
-    for name in names:
+    words = read_words(parser, TABLES)
+    for name in (n for n in TABLES if n.split()[1] in words.only):
         with tempfile.TemporaryDirectory(dir=words.scratch) as folder:
             found = MEASURES[name.split()[1]](words.data, Path(folder))
         show(words.write, name, found.conditions, table(found.heads, found.rows, found.first))

@@ -6,11 +6,11 @@ right calibration show false alarms, with acquired bodies and with those of heig
 that no other benchmark has. `--work DIR` keeps scenes, sessions and results, so that an interrupted run goes on.
 """
 
-import argparse
 import json
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,9 +18,9 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
-from acquisition import N_FRAMES, Recording, quadrille, recorded
+from acquisition import N_FRAMES, Recording, new_session, quadrille, recorded, set_first_poses
 from calibration_repair import off
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table, work_folder
 from known_faults import fit_fault
 
 from tracker.calibration.check.fault_search import Fault
@@ -135,21 +135,10 @@ def bumped(cameras: Sequence[Camera], joints: Array, index: int, number: int, fo
     return Bump(i, kind, tuple(float(v) for v in direction), shift_px(direction))
 
 
-def started(recording: Recording, at: Path, calibration: Path, bodies: Mapping[str, Path]) -> Path:
-    """Make a session with the poses of frame 0; people without a body get one by height."""
-    models = ["--model", *(f"{name}={path}" for name, path in bodies.items())] if bodies else []
-    quadrille(
-        "new", at, "--videos", *recording.videos, "--calibration", calibration, "--background", recording.background,
-        "--people", *recording.references, *models,
-    )  # fmt: skip
-    for person, joints in recording.references.items():
-        quadrille("init", at, "--joints", joints, "--person", person)
-    return at
-
-
-def tracked(at: Path) -> Path:
-    """Track the first frames of a session."""
-    quadrille("track", at, "--no-whole-run", "--frames", f"0:{N_FRAMES}")
+def started(recording: Recording, folder: Path, bodies: Mapping[str, Path]) -> Path:
+    """Make a session with the poses of frame 0."""
+    at = new_session(recording, folder, bodies)
+    set_first_poses(recording, at)
     return at
 
 
@@ -157,7 +146,7 @@ def bodies_of(recording: Recording, folder: Path) -> dict[str, Path]:
     """Acquire the bodies of a recording under its right calibration, unless that is done."""
     at = folder / "bodies"
     if not at.exists():
-        made = started(recording, folder / "bodies in the making", recording.calibration, {})
+        made = started(recording, folder / "bodies in the making", {})
         for person in recording.references:
             quadrille("acquire", made, "--person", person, "--frames", f"0:{N_FRAMES}")
         made.rename(at)
@@ -224,7 +213,8 @@ def _kept(
     if not result.exists():
         recording, body, bodies, bump, right = trial
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            at = tracked(started(recording, Path(scratch) / recording.name, calibration, bodies))
+            at = started(replace(recording, calibration=calibration), Path(scratch), bodies)
+            quadrille("track", at, "--no-whole-run", "--frames", f"0:{N_FRAMES}")
             judgement = judged(at, recording.name, body, bump, right)
         result.write_text(json.dumps(judgement._asdict()), "utf-8")
     return Judged(**json.loads(result.read_text("utf-8")))
@@ -274,23 +264,19 @@ def rotation_cells(found: Sequence[Judged]) -> list[str]:
 
 def main() -> None:
     """Measure and print, or write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder with walk, fast_arms and two_people")
-    parser.add_argument("--work", type=Path, help="folder that keeps scenes, sessions and results")
+    data, work = "folder with walk, fast_arms and two_people", "folder that keeps scenes, sessions and results"
+    parser = benchmark_parser(__doc__, ["data"], data=data, work=work)
     parser.add_argument("--kept", action="store_true", help="show what --work keeps of an interrupted run, and end")
     parser.add_argument("--only", nargs="+", help="recordings to print, not to write")
     parser.add_argument("--bumps", type=int, default=len(TURNS), help="bumps of each recording, to print")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = read_words(parser, TABLES)
     if words.kept:
         names = [*FILMED, *(person for _, person in SIMULATED)]
         kept = [path for name in names for path in sorted((words.work / name).glob("*.json"))]
         _show([Judged(**json.loads(path.read_text("utf-8"))) for path in kept], words.write)
         return
     found = list[Judged]()
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = words.work or Path(scratch)
+    with work_folder(words.work) as folder:
         for index, recording in recordings(words.data, folder, words.only or [*FILMED, *(p for _, p in SIMULATED)]):
             for one in measured(recording, index, range(words.bumps), folder / recording.name):
                 found.append(one)

@@ -6,28 +6,20 @@ poses fitted to the true joints of frame 0. Accuracy is the mean error of the 12
 person is lost when one of them is off by more than 150 mm.
 """
 
-import argparse
-import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from doc_tables import Conditions, add_write_option, check_places, measured, show, table
-from true_starts import read_simulated
+from doc_tables import Conditions, benchmark_parser, measured, read_words, show, table, work_folder
+from true_starts import Clip, read_simulated, track_from
 
-from tracker.body.model import BodyModel
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.chamfer.tracker import ChamferTracker
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
-from tracker.session.session import Session
 from tracker.simulate import Simulation, simulate
 
 TABLES = ("closeness",)
@@ -51,19 +43,6 @@ STARTS, APART_RAD = {"tango": 5}, 1e-4
 the last digit."""
 
 
-@dataclass(frozen=True, eq=False)
-class Couple:
-    """A recording of several people with a reference of each."""
-
-    name: str
-    session: Session
-    models: tuple[BodyModel, ...]
-    references: tuple[MarkerTable, ...]
-    frames: range
-    starts: tuple[Array, ...]
-    """Poses fitted to the reference joints of frame 0, (n_values,) each."""
-
-
 class Cell(NamedTuple):
     """What a variant reached on a recording."""
 
@@ -75,14 +54,7 @@ class Cell(NamedTuple):
     """Frames on which somebody is nearer to somebody else's reference joints than to the own, summed."""
 
 
-def read_couple(folder: Path, n_frames: int) -> Couple:
-    """Read the first frames of a simulated session of several people."""
-    session, models, references, starts = read_simulated(folder)
-    frames = range(min(n_frames, session.n_frames))
-    return Couple(folder.name, session, models, references, frames, starts)
-
-
-def measure(couple: Couple, settings: TrackSettings) -> Cell:
+def measure(couple: Clip, settings: TrackSettings) -> Cell:
     """Track everybody and compare; the mean over all starts."""
     rng, cells = np.random.default_rng(SEED), []
     for i in range(STARTS.get(couple.name, 1)):
@@ -91,13 +63,12 @@ def measure(couple: Couple, settings: TrackSettings) -> Cell:
     return Cell(*np.mean(cells, axis=0).tolist())
 
 
-def _tracked_from(couple: Couple, starts: Sequence[Array], settings: TrackSettings) -> Cell:
+def _tracked_from(couple: Clip, starts: Sequence[Array], settings: TrackSettings) -> Cell:
     """Track everybody from some poses, (n_values,) each, and compare."""
     session, frames = couple.session, couple.frames
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
-        subjects = Subjects.of(couple.models, keyframes={0: dict(enumerate(starts))})
-        found = list(ChamferTracker(settings).estimates(TrackingRun(observer, subjects, starts, frames)))
+        found = track_from(observer, couple.models, starts, frames, settings)
     errors, lost, swapped = [], 0, 0
     for i, model in enumerate(couple.models):
         joints = joints_of_poses(model, {f.frame: f.poses[i] for f in found}, session.fps)
@@ -114,7 +85,7 @@ def _owner(joints: MarkerTable, references: Sequence[MarkerTable], frame: int) -
     return int(np.argmin(errors))
 
 
-def conditions(couples: Sequence[Couple]) -> Conditions:
+def conditions(couples: Sequence[Clip]) -> Conditions:
     """Return the conditions of the measurement."""
     return Conditions(
         footage=f"simulated couples, {len(couples[0].frames)} frames of each, their trunks' middles 1.5, 0.7, 0.45 and "
@@ -132,19 +103,15 @@ def conditions(couples: Sequence[Couple]) -> Conditions:
 
 def main() -> None:
     """Measure and write the section."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = benchmark_parser(__doc__, scenes="folder to keep the simulated scenes in, and to find them again")
     parser.add_argument("--frames", type=int, default=30, help="frames of each scene")
-    parser.add_argument("--scenes", type=Path, help="folder to keep the simulated scenes in, and to find them again")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
-    with tempfile.TemporaryDirectory() as name:
-        folder = words.scenes or Path(name)
+    words = read_words(parser, TABLES)
+    with work_folder(words.scenes) as folder:
         scenes = [*(f"couple_{d}" for d in DISTANCES), "tango"]
         for scene in scenes:
             if not (folder / scene).exists():
                 simulate(folder / scene, Simulation(scene, n_frames=words.frames, seed=SEED))
-        couples = [read_couple(folder / scene, words.frames) for scene in scenes]
+        couples = [read_simulated(folder / scene, words.frames) for scene in scenes]
         rows = measured(VARIANTS, couples, measure, lambda cell: "{:.1f} mm, {:.1f} lost, {:.1f} swapped".format(*cell))
     cells = {
         name: [f"{c.mpjpe_mm:.0f} / {c.lost_frames:.0f} / {c.swapped_frames:.0f}" for c in row]

@@ -7,8 +7,10 @@ tables apart. `--write docs/accuracy.md` replaces exactly these blocks; without 
 import argparse
 import re
 import subprocess
+import tempfile
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
@@ -79,12 +81,36 @@ def table(heads: Sequence[str], rows: Mapping[str, Sequence[str]], first: str = 
     return "\n".join(lines + [f"| {name} | {' | '.join(cells)} |" for name, cells in rows.items()]) + "\n"
 
 
-def add_write_option(parser: argparse.ArgumentParser) -> None:
-    """Add `--write DOC...`; pass its value to `check_places` and `show`."""
+def benchmark_parser(description: str | None, needed: Sequence[str] = (), **folders: str) -> argparse.ArgumentParser:
+    """Return a parser with an option for each folder, and with `--write DOC...`; read it by `read_words`.
+
+    Args:
+        description: of the benchmark.
+        needed: names of the folders without which it cannot run.
+        folders: the help of each option by its name.
+    """
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, text in folders.items():
+        parser.add_argument(f"--{name}", type=Path, required=name in needed, help=text)
     parser.add_argument(
         "--write", type=Path, nargs="+", default=[], metavar="DOC",
         help="documents whose tables are replaced, such as docs/accuracy.md docs/measurements.md",
     )  # fmt: skip
+    return parser
+
+
+def read_words(parser: argparse.ArgumentParser, tables: Sequence[str]) -> argparse.Namespace:
+    """Read the command line, and check the places of the tables in the documents; call it first."""
+    words = parser.parse_args()
+    check_places(words.write, tables)
+    return words
+
+
+@contextmanager
+def work_folder(work: Path | None) -> Iterator[Path]:
+    """Yield a folder for what is made: the given one, which stays, or one that goes afterwards."""
+    with tempfile.TemporaryDirectory() as scratch:
+        yield work or Path(scratch)
 
 
 def check_places(paths: Sequence[Path], names: Sequence[str]) -> None:

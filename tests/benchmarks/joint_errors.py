@@ -8,7 +8,6 @@ and frames called good that are off. Coverage is the share of joints within thei
 those of the whole command.
 """
 
-import argparse
 import resource
 import shutil
 import tempfile
@@ -18,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import RECORDED, quadrille
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table
 from scipy.stats import chi2, rankdata
 
 from tracker.evaluation.references import read_joints
@@ -112,6 +111,11 @@ def area(scores: np.ndarray, is_off: np.ndarray) -> float:
     return float((rankdata(scores)[is_off].sum() - n * (n + 1) / 2) / (n * m)) if n and m else np.nan
 
 
+def area_cell(scores: np.ndarray, is_off: np.ndarray, digits: int = 2) -> str:
+    """Return the area under the curve as a cell; empty where all or none are off, or scores are the same."""
+    return f"{area(scores, is_off):.{digits}f}" if is_off.any() and not is_off.all() and np.ptp(scores) else ""
+
+
 def assessed(folder: Path, person: int, reference: Path) -> Assessed:
     """Compare the stored poses of a person with known joints."""
     session = load_session(folder)
@@ -199,13 +203,10 @@ def group_of(session: str, n_people: int) -> str:
 
 def main() -> None:
     """Measure all sessions, and write both tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    scenes = "folder of the simulated recordings"
+    parser = benchmark_parser(__doc__, ["data"], data="folder of the recordings", scenes=scenes)
     parser.add_argument("sessions", type=Path)
-    parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
-    parser.add_argument("--scenes", type=Path, help="folder of the simulated recordings")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = read_words(parser, TABLES)
     found: list[Compared] = []
     names: dict[str, list[str]] = {title: [] for title in GROUPS}
     for folder in sorted(p for p in given.sessions.iterdir() if (p / "session.toml").exists()):

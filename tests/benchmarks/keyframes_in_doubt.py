@@ -6,7 +6,6 @@ pose on the frame that the run had worst of those that it flags or has off. `--w
 may be that of `unseen_people.py`.
 """
 
-import argparse
 import shutil
 import tempfile
 from collections import Counter
@@ -18,7 +17,7 @@ from zlib import crc32
 import numpy as np
 from acquisition import quadrille
 from between_keyframes import errors
-from doc_tables import add_write_option, check_places, show, table
+from doc_tables import benchmark_parser, read_words, show, table, work_folder
 from unseen_people import CONDITIONS, SCENES, SPARSE, Scene, acquired
 
 from tracker.body.limbs import limbs
@@ -112,17 +111,13 @@ def statuses(scene: Scene, folder: Path) -> Iterator[tuple[str, str]]:
 
 def main() -> None:
     """Measure all scenes, and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--work", type=Path, help="folder that keeps scenes and sessions")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = read_words(benchmark_parser(__doc__, work="folder that keeps scenes and sessions"), TABLES)
     rows = {}
-    with tempfile.TemporaryDirectory() as scratch:
+    with work_folder(given.work) as folder:
         for title, scenes in (("25 or 15 frames/s", SCENES), ("8 frames/s", SPARSE)):
             counts = {kind: Counter[str]() for kind in KINDS}
             for scene in (s for s in scenes if s.is_alone):
-                for kind, status in statuses(scene, given.work or Path(scratch)):
+                for kind, status in statuses(scene, folder):
                     counts[kind][status] += 1
                 print(scene.name, {kind: dict(own) for kind, own in counts.items()}, flush=True)
             for kind, own in counts.items():

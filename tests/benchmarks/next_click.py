@@ -8,7 +8,6 @@ everything on keyframes at equal distances. It is counted how many actions it ta
 20 mm (30 for two people) and no frame is lost. A folder NAME@plain is the session NAME, tracked by first passes.
 """
 
-import argparse
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
@@ -19,11 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 from between_keyframes import LOST_MM, errors
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table
 from joint_errors import references_of
 
 from tracker.annotation.expected_error import contradicted_keyframes, joint_units
 from tracker.annotation.next_click import Proposals, propose
+from tracker.api.work import ProgressSink
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.posing.grab import Constraints
@@ -150,20 +150,7 @@ class Annotator:
     def track(self, frames: range, people: tuple[int, ...]) -> None:
         """Track people again."""
         with open_stored_session(self.session) as opened:
-            opened.track(TrackPlan(frames, people, self.settings), Silent())
-
-
-class Silent:
-    """A sink that shows nothing."""
-
-    def report(self, stage, share, text="", /):
-        """See `Sink`."""
-
-    def show(self, trying):
-        """See `Sink`."""
-
-    def take(self, run, step):
-        """See `Sink`."""
+            opened.track(TrackPlan(frames, people, self.settings), ProgressSink(None))
 
 
 def unit_of(model, unit: str) -> tuple[list[str], np.ndarray]:
@@ -271,15 +258,12 @@ def rows_of(folder: Path, references: list[Path], seed: int, most: int) -> dict[
 
 def main() -> None:
     """Annotate all recordings, and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    scenes = "folder of the simulated recordings"
+    parser = benchmark_parser(__doc__, ["data"], data="folder of the recordings", scenes=scenes)
     parser.add_argument("sessions", type=Path, nargs="+")
-    parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
-    parser.add_argument("--scenes", type=Path, help="folder of the simulated recordings")
     parser.add_argument("--most", type=int, default=MAX_ACTIONS, help="actions; with fewer, no equal distances")
     parser.add_argument("--seed", type=int, default=0, help="of the hand that corrects the first session")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = read_words(parser, TABLES)
     rows: dict[str, list[str]] = {}
     for seed, folder in enumerate(given.sessions, given.seed):
         references = references_of(folder.name, given.data, given.scenes)

@@ -6,8 +6,6 @@ gives their errors. The noise of the prediction is calibrated on every other per
 `--scenes DIR` keeps the recordings and takes them up again.
 """
 
-import argparse
-import tempfile
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import N_FRAMES, PLAYED
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table, work_folder
 from scipy.stats import spearmanr
 
 from tracker.body.model import PosedBody
@@ -172,13 +170,9 @@ def figures(samples: Mapping[str, Sample], people: Mapping[str, Sequence[Tracked
 
 def main() -> None:
     """Measure and write the section."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=Path, help="folder of the recordings")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
-    with tempfile.TemporaryDirectory() as name:
-        tracked = [track(words.scenes or Path(name), person) for person in PLAYED]
+    words = read_words(benchmark_parser(__doc__, scenes="folder of the recordings"), TABLES)
+    with work_folder(words.scenes) as folder:
+        tracked = [track(folder, person) for person in PLAYED]
     people = {"calibrated on": tracked[::2], "checked on": tracked[1::2]}
     noise = calibrated(people["calibrated on"])
     samples = {name: sample(of_them, noise) for name, of_them in people.items()}

@@ -5,8 +5,6 @@ contours alone and by both, from nothing; without backgrounds, too. The other ha
 their real errors, of 200 errors that are injected, and of the true joints.
 """
 
-import argparse
-import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import new_session, quadrille, recorded
-from doc_tables import Conditions, add_write_option, check_places, show, table
-from scipy.stats import rankdata
+from doc_tables import Conditions, benchmark_parser, read_words, show, table, work_folder
+from joint_errors import area_cell
 
+from tracker.api.work import ProgressSink
 from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.pose_errors import OFF_M
@@ -110,7 +109,7 @@ def judged(at: Path, reference: Path) -> Iterator[tuple[str, list[str]]]:
     session = load_session(at)
     truth = Truth(read_joints(reference, session.fps))
     with Footage(session.cameras) as footage:
-        (found,) = judge(session, Observer(session.cameras, footage), NAME, TrackSettings(), _Silent())
+        (found,) = judge(session, Observer(session.cameras, footage), NAME, TrackSettings(), ProgressSink(None))
     yield f"{session.name}", cells([found], truth)
     points, random = found.imported, np.random.default_rng(0)
     rounds = [injected(points, random) for _ in range(ROUNDS)]
@@ -118,16 +117,6 @@ def judged(at: Path, reference: Path) -> Iterator[tuple[str, list[str]]]:
     yield f"{session.name}, injected", cells(again, truth)
     true = replace(points, joints_world=_true(points, truth.joints))
     yield f"{session.name}, true joints", cells([judge_person("person", true, found.tracked, None, session.fps)], truth)
-
-
-class _Silent:
-    """A sink that shows nothing."""
-
-    def report(self, stage: str, share: float, text: str = "", /) -> None: ...
-
-    def show(self, trying: object) -> None: ...
-
-    def take(self, run: object, step: object) -> None: ...
 
 
 def cells(found: list[Judgement], truth: Truth) -> list[str]:
@@ -145,16 +134,7 @@ def cells(found: list[Judgement], truth: Truth) -> list[str]:
     flagged = score >= 1 - score  # as `LimbVerdict.is_doubted`
     percent = [f"{100 * flagged[chosen].mean():.0f}%" if chosen.any() else "" for chosen in (is_off, ~is_off)]
     wrong = f"{sum(first) / len(found):.1f}" if is_off.sum() >= LISTED * len(found) else ""
-    return [f"{is_off.sum()} of {len(off)}", area(score, is_off), wrong, *percent]
-
-
-def area(score: np.ndarray, is_off: np.ndarray) -> str:
-    """Return the area under the curve, as a cell."""
-    n_off, n_fine = int(is_off.sum()), int((~is_off).sum())
-    if not n_off or not n_fine:
-        return ""
-    ranks = rankdata(score)
-    return f"{(ranks[is_off].sum() - n_off * (n_off + 1) / 2) / (n_off * n_fine):.3f}"
+    return [f"{is_off.sum()} of {len(off)}", area_cell(score, is_off, 3), wrong, *percent]
 
 
 def injected(points: BodyPoints, random: np.random.Generator) -> BodyPoints:
@@ -188,16 +168,13 @@ def _true(points: BodyPoints, truth: MarkerTable) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder with walk, fast_arms and balance_real")
+    parser = benchmark_parser(__doc__, ["data"], data="folder with walk, fast_arms and balance_real")
     parser.add_argument("--only", nargs="+", default=NAMES, help="recordings to print; the tables stay")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = read_words(parser, TABLES)
     tracked_rows, judged_rows = dict[str, list[str]](), dict[str, list[str]]()
-    with tempfile.TemporaryDirectory() as scratch:
+    with work_folder(None) as folder:
         for name in words.only:
-            at, tracked_rows[name] = compared(Path(scratch) / name, words.data, name)
+            at, tracked_rows[name] = compared(folder / name, words.data, name)
             (recording,) = recorded(words.data, [name])
             for label, row in judged(at, next(iter(recording.references.values()))):
                 judged_rows[label] = row

@@ -20,7 +20,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from board_rigs import rms_error_m
 from detected_people import acted, detected, filmed_couple
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table
 from filmed_people import aligned, blanks, dancing, observed, rig
 
 from tracker.calibration.check.point_problem import triangulate_all
@@ -224,14 +224,10 @@ def _scaled(T_world_camera: Array, scale: float) -> Array:
 
 def read_arguments(description: str | None, kinds: Sequence[str], tables: Sequence[str]) -> argparse.Namespace:
     """Read the words of a benchmark of recordings and of simulated rigs."""
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--data", type=Path, help="folder of the recordings; without it, simulated people only")
+    parser = benchmark_parser(description, data="folder of the recordings; without it, simulated people only")
     parser.add_argument("--only", nargs="+", choices=kinds, default=kinds, help="tables to measure")
     parser.add_argument("--rigs", type=int, default=20, help="number of simulated rigs of each kind")
-    add_write_option(parser)
-    arguments = parser.parse_args()
-    check_places(arguments.write, tables)
-    return arguments
+    return read_words(parser, tables)
 
 
 def main():

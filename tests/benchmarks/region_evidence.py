@@ -21,8 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from acquisition import RECORDED
 from doc_tables import table
+from joint_errors import area_cell
 from numpy.typing import NDArray
-from scipy.stats import rankdata
+from true_starts import joint_centers, limb_joints
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
@@ -39,7 +40,6 @@ from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import EdgeSettings
 from tracker.footage.recording import Recording
-from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session, load_session
 from tracker.session.store.stored_poses import read_stored_poses
@@ -78,7 +78,7 @@ class Tracked:
         known, model = self.joints[person], self.models[person]
         out = np.full((len(bodies), len(limbs(model))), np.nan)
         for row, frame, people in zip(out, self.frames, bodies, strict=True):
-            found = dict(zip(model.point_names, model.joint_centers_world(people[person].values), strict=True))
+            found = joint_centers(model, people[person].values)
             for i, limb in enumerate(limbs(model)):
                 of_limb = [
                     n for n in known.get(frame, {}) if model.point_parts[model.point_names.index(n)] in limb.parts
@@ -109,16 +109,10 @@ def read_tracked(folder: Path, references: Sequence[Path]) -> Tracked:
     for own in stored:
         n = len(limbs(own[frames[0]].body.model))
         lost.append(np.array([own[k].record.limbs_lost or [np.nan] * n for k in frames]))
-    joints = []
-    for path in references:
-        read = read_joints(path, session.fps)
-        joints.append({
-            int(k): {n: p for n, p in zip(read.names, row, strict=True) if n in LIMB_JOINTS and np.all(np.isfinite(p))}
-            for k, row in zip(read.frames, read.points, strict=True)
-        })  # fmt: skip
+    joints = tuple(limb_joints(read_joints(path, session.fps)) for path in references)
     bodies = [tuple(own[k].body for own in stored) for k in frames]
     is_keyframe = np.array([[own[k].record.keyframe for k in frames] for own in stored])
-    return Tracked(session, frames, bodies, is_keyframe, tuple(lost), tuple(joints))
+    return Tracked(session, frames, bodies, is_keyframe, tuple(lost), joints)
 
 
 def displaced(tracked: Tracked, observer: Observer) -> list[Bodies]:
@@ -166,14 +160,6 @@ def _first_limbs(models: Sequence[BodyModel]) -> list[int]:
     return np.cumsum([0, *(len(limbs(m)) for m in models)])[:-1].tolist()
 
 
-def area(scores: Array, happened: NDArray[np.bool_]) -> str:
-    """Return the area under the curve as a cell; empty where nothing or everything happened, or scores are the same."""
-    n, n_other = int(happened.sum()), int((~happened).sum())
-    if not n or not n_other or np.ptp(scores) == 0:
-        return ""
-    return f"{(rankdata(scores)[happened].sum() - n * (n + 1) / 2) / (n * n_other):.2f}"
-
-
 def rows(tracked: Tracked, is_displaced: bool) -> Iterator[list[str]]:
     """Yield the cells of each person, in the order of `HEADS`."""
     with Recording(tracked.session.cameras) as recording:
@@ -192,9 +178,9 @@ def rows(tracked: Tracked, is_displaced: bool) -> Iterator[list[str]]:
         )
         off_frame = off_frame > 0
         yield [
-            f"{off[use].sum()} of {use.sum()}", area(lost[use], off[use]), area(elsewhere[use], off[use]),
-            f"{off_frame.sum()} of {len(off_frame)}", area(lost_of_frame, off_frame),
-            area(elsewhere_of_frame, off_frame), f"{(found & off & use).sum()} of {(off & use).sum()}",
+            f"{off[use].sum()} of {use.sum()}", area_cell(lost[use], off[use]), area_cell(elsewhere[use], off[use]),
+            f"{off_frame.sum()} of {len(off_frame)}", area_cell(lost_of_frame, off_frame),
+            area_cell(elsewhere_of_frame, off_frame), f"{(found & off & use).sum()} of {(off & use).sum()}",
             f"{(found & ~off & use).sum()} of {(~off & use).sum()}", f"{measured.learn_ms:.1f}",
             f"{measured.score_ms:.1f}",
         ]  # fmt: skip

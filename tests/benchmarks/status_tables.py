@@ -75,11 +75,11 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run], write: Sequence[P
     for part, lines in {
         "groups": _groups_table(simulated, recorded),
         "people": _people_table(simulated, recorded),
-        "reliability": "\n".join(_reliability_table(runs, odds)),
-        "ranking": "\n".join(_ranking_table(runs, found)),
-        "attainable": "\n".join(_attainable_table(runs, found)),
-        "thresholds": "\n".join(_threshold_table(runs, odds)),
-        "called lost": "\n".join(_lost_table(runs, odds)),
+        "reliability": _reliability_table(runs, odds),
+        "ranking": _ranking_table(runs, found),
+        "attainable": _attainable_table(runs, found),
+        "thresholds": _threshold_table(runs, odds),
+        "called lost": _lost_table(runs, odds),
     }.items():
         show(write, f"calibrate_status {part}", CONDITIONS, lines, is_repeated=part not in ("groups", "ranking"))
     for path in write:
@@ -163,37 +163,34 @@ def _share(part: int, whole: int) -> str:
     return f"{part / whole:.0%} ({part} of {whole})" if whole else "none"
 
 
-def _reliability_table(runs: Sequence[Run], odds: Sequence[Array]) -> list[str]:
-    """Return the rows of Markdown."""
-    lines = ["| probability given to a limb | off by more than 100 mm | off by more than 150 mm |", "|---|---|---|"]
-    columns = []
-    for curve in _curves(runs, odds):
-        columns.append(dict(zip(curve.bins, curve.points, strict=True)))
-    for low, high in itertools.pairwise(EDGES):
-        cells = [_reliability_cell(column.get((low, high))) for column in columns]
-        lines.append(f"| {low:.0%} to {high:.0%} | {' | '.join(cells)} |")
-    return lines
+def _reliability_table(runs: Sequence[Run], odds: Sequence[Array]) -> str:
+    """Return the table in Markdown."""
+    columns = [dict(zip(curve.bins, curve.points, strict=True)) for curve in _curves(runs, odds)]
+    rows = {
+        f"{low:.0%} to {high:.0%}": [_reliability_cell(column.get((low, high))) for column in columns]
+        for low, high in itertools.pairwise(EDGES)
+    }
+    return table(("off by more than 100 mm", "off by more than 150 mm"), rows, "probability given to a limb")
 
 
-def _ranking_table(runs: Sequence[Run], found: Sequence[Statuses]) -> list[str]:
-    """Return the rows of Markdown."""
+def _ranking_table(runs: Sequence[Run], found: Sequence[Statuses]) -> str:
+    """Return the table in Markdown."""
     groups: dict[str, Callable[[Run], bool]] = {
         "4 cameras, one person": lambda r: not r.condition and len(r.bodies) == 1,
         "4 cameras, several people": lambda r: not r.condition and len(r.bodies) > 1,
         "half the frame rate": lambda r: r.condition == "half the frame rate",
     }
-    lines = [f"| recordings | {' | '.join(f'first {s:.0%}' for s in FIRST)} |", "|---" * (1 + len(FIRST)) + "|"]
+    rows = {}
     for title, keep in groups.items():
         own = [s for r, s in zip(runs, found, strict=True) if r.searched and keep(r)]
-        lines.append(f"| {title} | {' | '.join(f'{x:.0%}' for x in first_off(own, FIRST))} |")
-    return lines
+        rows[title] = [f"{x:.0%}" for x in first_off(own, FIRST)]
+    return table([f"first {s:.0%}" for s in FIRST], rows, "recordings")
 
 
-def _attainable_table(runs: Sequence[Run], found: Sequence[Statuses]) -> list[str]:
-    """Return the rows of Markdown."""
+def _attainable_table(runs: Sequence[Run], found: Sequence[Statuses]) -> str:
+    """Return the table in Markdown."""
     heads = ("generic body", "error known", "acquired body", "error known")
-    lines = [f"| recordings | {' | '.join(f'{h}: fine, flagged' for h in heads)} |", "|---" * 5 + "|"]
-    rng = np.random.default_rng(1)
+    rows, rng = {}, np.random.default_rng(1)
     groups: dict[str, Callable[[Run], bool]] = {
         f"4 cameras, {title}": lambda r, s=several: not r.condition and (len(r.bodies) > 1) == s
         for title, several in (("one person", False), ("several people", True))
@@ -205,15 +202,15 @@ def _attainable_table(runs: Sequence[Run], found: Sequence[Statuses]) -> list[st
             own = [s for r, s in zip(runs, found, strict=True) if r.searched and r.body == body and keep(r)]
             known = [s._replace(odds=s.worst_mm + rng.normal(0.0, KNOWN_MM, len(s.worst_mm))) for s in own]
             cells += [f"{fine:.0%}, {flagged:.0%}" for fine, flagged in map(least_fine, (own, known))]
-        lines.append(f"| {title} | {' | '.join(cells)} |")
-    return lines
+        rows[title] = cells
+    return table([f"{h}: fine, flagged" for h in heads], rows, "recordings")
 
 
-def _threshold_table(runs: Sequence[Run], odds: Sequence[Array]) -> list[str]:
-    """Return the rows of Markdown: what thresholds of the probabilities cost."""
-    lines = ["| doubtful from | generic body | flagged | acquired body | flagged |", "|---" * 5 + "|"]
+def _threshold_table(runs: Sequence[Run], odds: Sequence[Array]) -> str:
+    """Return the table in Markdown: what thresholds of the probabilities cost."""
+    rows = {}
     for probability in THRESHOLDS:
-        cells = [f"{probability:.0%}"]
+        cells = []
         for body in BODIES:
             used = [
                 (r, o) for r, o in zip(runs, odds, strict=True) if r.searched and r.body == body and not r.condition
@@ -221,12 +218,12 @@ def _threshold_table(runs: Sequence[Run], odds: Sequence[Array]) -> list[str]:
             shift = np.array([_shift(OFF_ODDS, probability), 0.0])
             counts = summed(statuses(r.rows, o + shift).counts() for r, o in used)
             cells += [_cell(counts), f"{counts.flagged / counts.frames:.0%}"]
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines
+        rows[f"{probability:.0%}"] = cells
+    return table(("generic body", "flagged", "acquired body", "flagged"), rows, "doubtful from")
 
 
-def _lost_table(runs: Sequence[Run], odds: Sequence[Array]) -> list[str]:
-    """Return the rows of Markdown."""
+def _lost_table(runs: Sequence[Run], odds: Sequence[Array]) -> str:
+    """Return the table in Markdown."""
     groups: dict[str, Callable[[Run], bool]] = {
         "4 cameras": lambda r: r.searched and not r.condition,
         "2 cameras": lambda r: r.condition == "2 cameras",
@@ -246,7 +243,7 @@ def _lost_table(runs: Sequence[Run], odds: Sequence[Array]) -> list[str]:
             _share(int((flew & (status != "good")).sum()), int(flew.sum())),
         ]  # fmt: skip
         lines.append(f"| {title} | {' | '.join(cells)} |")
-    return lines
+    return "\n".join(lines)
 
 
 def _shift(threshold_odds: float, probability: float) -> float:

@@ -8,35 +8,29 @@ spreads and penetration, without the prediction. The poses lie in one valley whe
 them costs more than both. `--work DIR` keeps the simulated recordings.
 """
 
-import argparse
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from acquisition import quadrille, recorded
+from acquisition import new_session, recorded
 from calibrate_status import SECOND, SECOND_SEED
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, benchmark_parser, read_words, show, table, work_folder
+from true_starts import joint_centers, limb_joints, track_from
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.acquisition.from_joints import height_from_joints
 from tracker.estimation.by_frame.pose_score import common_evidence, scorer_without_prediction
 from tracker.estimation.by_frame.settings import trust
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.chamfer.tracker import ChamferTracker
 from tracker.estimation.fitting.gauss_newton import fit_to_points
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
-from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
 from tracker.session.assemble import DEFAULT_MODEL
-from tracker.session.session import load_session
+from tracker.session.session import Session, load_session
 from tracker.simulate import Simulation, simulate
 
 TABLES = ("true_pose_costs",)
@@ -62,9 +56,7 @@ class Dancer(NamedTuple):
     """A recording of one person with known joints."""
 
     name: str
-    cameras: tuple[CameraSource, ...]
-    n_frames: int
-    fps: float
+    session: Session
     model: BodyModel
     joints: dict[int, dict[str, Array]]
     """True limb joints by frame and name, (3,) each, metres."""
@@ -97,10 +89,7 @@ def dancers(folder: Path, data: Path | None) -> Iterator[Dancer]:
     for recording in recorded(data, RECORDED) if data else ():
         at = folder / "sessions" / recording.name
         if not at.exists():
-            quadrille(
-                "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
-                recording.background,
-            )  # fmt: skip
+            new_session(recording, at.parent)
         yield read_dancer(recording.name, at, recording.references["person"])
 
 
@@ -109,22 +98,18 @@ def read_dancer(name: str, folder: Path, reference: Path) -> Dancer:
     session = load_session(folder)
     table_of = read_joints(reference, session.fps)
     generic = load_model(DEFAULT_MODEL)
-    joints = {
-        frame: {n: p for n, p in zip(table_of.names, row, strict=True) if n in LIMB_JOINTS and np.all(np.isfinite(p))}
-        for frame, row in zip(table_of.frames.tolist(), table_of.points, strict=True)
-    }
     model = generic.with_height(height_from_joints(generic, table_of))
-    return Dancer(name.replace("_", " "), session.cameras, session.n_frames, session.fps, model, joints)
+    return Dancer(name.replace("_", " "), session, model, limb_joints(table_of))
 
 
 def measure(dancer: Dancer, settings: TrackSettings) -> list[FrameResult]:
     """Track a recording, and compare the poses of each frame."""
     model, start = dancer.model, fit_to_points(dancer.model, dancer.joints[0], centers=True).pose
-    with Recording(dancer.cameras) as recording:
-        observer = Observer(dancer.cameras, recording)
-        subjects = Subjects.of([model], keyframes={0: {0: start}})
-        run = TrackingRun(observer, subjects, [start], range(dancer.n_frames), dancer.fps)
-        found = {f.frame: f for f in ChamferTracker(settings).estimates(run)}
+    session = dancer.session
+    with Recording(session.cameras) as recording:
+        observer = Observer(session.cameras, recording)
+        frames = range(session.n_frames)
+        found = {f.frame: f for f in track_from(observer, [model], [start], frames, settings, session.fps)}
         frames = [k for k in found if k in dancer.joints and k > 0]
         return [_compare(dancer, observer, settings, k, found[k].poses[0]) for k in frames]
 
@@ -151,7 +136,7 @@ def _compare(dancer: Dancer, observer: Observer, settings: TrackSettings, frame:
 
 def _error_mm(dancer: Dancer, frame: int, pose: Array) -> float:
     """Return the mean error of the limb joints of a pose, (n_values,)."""
-    places = dict(zip(dancer.model.point_names, dancer.model.joint_centers_world(pose), strict=True))
+    places = joint_centers(dancer.model, pose)
     return 1000 * float(np.mean([np.linalg.norm(places[n] - p) for n, p in dancer.joints[frame].items()]))
 
 
@@ -180,16 +165,12 @@ CONDITIONS = Conditions(
 
 def main() -> None:
     """Measure and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, help="folder with walk and fast_arms")
-    parser.add_argument("--work", type=Path, help="folder that keeps the sessions")
+    parser = benchmark_parser(__doc__, data="folder with walk and fast_arms", work="folder that keeps the sessions")
     parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
-    with tempfile.TemporaryDirectory() as name:
+    words = read_words(parser, TABLES)
+    with work_folder(words.work) as folder:
         rows = dict[str, list[str]]()
-        for dancer in dancers(words.work or Path(name), words.data):
+        for dancer in dancers(folder, words.data):
             if words.only and dancer.name.replace(" ", "_") not in words.only:
                 continue
             rows[dancer.name] = cells(measure(dancer, TrackSettings()))

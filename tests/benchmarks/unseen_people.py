@@ -6,14 +6,13 @@ by the first pass alone and by the whole run, as by `joint_errors.py`. After a c
 figures, they no longer serve: raise `SEED` and measure again. `--work DIR` keeps scenes and sessions.
 """
 
-import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from acquisition import Recording, new_session, quadrille
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from acquisition import Recording, new_session, quadrille, set_first_poses
+from doc_tables import Conditions, benchmark_parser, read_words, show, table, work_folder
 from joint_errors import HEADS, Compared, groups, measured, pooled
 
 from tracker.session.assemble import DEFAULT_MODEL
@@ -114,8 +113,7 @@ def acquired(scene: Scene, folder: Path) -> tuple[Path, list[Path]]:
         )  # fmt: skip
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             made = new_session(recording, Path(scratch))
-            for name, reference in zip(people, references, strict=True):
-                quadrille("init", made, "--joints", reference, "--person", name)
+            set_first_poses(recording, made)
             for name in people:
                 quadrille("acquire", made, "--person", name)
             made.rename(at)
@@ -154,21 +152,18 @@ def rows_of_few(folder: Path) -> dict[str, list[str]]:
 
 def main() -> None:
     """Measure all scenes, and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--work", type=Path, help="folder that keeps scenes and sessions")
+    parser = benchmark_parser(__doc__, work="folder that keeps scenes and sessions")
     names = [s.name for s in (*SCENES, *SPARSE)]
     parser.add_argument("--only", nargs="+", choices=names, help="scenes to print, not to write")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = read_words(parser, TABLES)
     for title, scenes, conditions in zip(TABLES[:2], (SCENES, SPARSE), (CONDITIONS, SPARSE_CONDITIONS), strict=True):
         chosen = [s for s in scenes if s.name in (given.only or names)]
-        with tempfile.TemporaryDirectory() as scratch:
-            rows = rows_of(chosen, given.work or Path(scratch))
+        with work_folder(given.work) as folder:
+            rows = rows_of(chosen, folder)
         show([] if given.only else given.write, title, conditions, table(HEADS, rows, "people"))
     if not given.only:
-        with tempfile.TemporaryDirectory() as scratch:
-            rows = rows_of_few(given.work or Path(scratch))
+        with work_folder(given.work) as folder:
+            rows = rows_of_few(folder)
         show(given.write, TABLES[2], FEW_CONDITIONS, table(HEADS, rows, "people"))
 
 

@@ -54,8 +54,17 @@ class Screenshot:
     scheme: str = "dark"
 
 
-async def nothing(_: Page) -> None:
-    """The page as it opens."""
+def by_keys(*steps: str | tuple[str, str, float]) -> Act:
+    """Return an act that presses keys; after one, it may wait so many seconds for what the page must show."""
+
+    async def act(page: Page) -> None:
+        for step in steps:
+            key, *shown = (step,) if isinstance(step, str) else step
+            await page.keyboard.press(key)
+            if shown:
+                await shows(page, *shown)
+
+    return act
 
 
 async def posing(page: Page) -> None:
@@ -80,13 +89,6 @@ async def pins(page: Page) -> None:
         await shows(page, f"quadrille.state.overlay.pins.length === {camera + 1}", 20)
 
 
-async def layers(page: Page) -> None:
-    """Every layer in its menu, some of them on."""
-    for key in ("Shift+Digit7", "Shift+Digit8"):
-        await page.keyboard.press(key)
-    await page.keyboard.press("a")
-
-
 async def searching(page: Page) -> None:
     """A search at a speed for watching."""
     await page.keyboard.press("b")
@@ -95,15 +97,9 @@ async def searching(page: Page) -> None:
     await shows(page, "quadrille.state.state.job.evaluations > 50", 60)
 
 
-async def searched(page: Page) -> None:
-    await page.keyboard.press("b")
-    await page.keyboard.press("f")
-    await shows(page, "quadrille.state.state.job.message.startsWith('done')", 120)
-
-
 async def replaying(page: Page) -> None:
     """A finished search, looked at half way."""
-    await searched(page)
+    await by_keys("b", ("f", "quadrille.state.state.job.message.startsWith('done')", 120))(page)
     box = await page.locator("#drawer input[type=range]").bounding_box()
     await page.mouse.click(box["x"] + box["width"] / 3, box["y"] + box["height"] / 2)
 
@@ -111,30 +107,6 @@ async def replaying(page: Page) -> None:
 async def landscape(page: Page) -> None:
     await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "left_elbow")))
     await page.keyboard.press("v")
-
-
-async def tracking(page: Page) -> None:
-    """A tracker that has been paused on its way."""
-    await page.keyboard.press("t")
-    await shows(page, "quadrille.state.state.track.done > 3", 120)
-    await page.keyboard.press("Alt+p")
-
-
-async def tracked(page: Page) -> None:
-    """Tracked, with the curves of the arms."""
-    await page.keyboard.press("t")
-    await shows(page, "quadrille.state.state.track.message.startsWith('done')", 180)
-    await page.keyboard.press("c")
-
-
-async def refused(page: Page) -> None:
-    """An error, said to the user: nobody has been placed."""
-    await page.keyboard.press("t")
-    await shows(page, "document.querySelector('#advice').dataset.level === 'fault'", 20)
-
-
-async def helping(page: Page) -> None:
-    await page.keyboard.press("?")
 
 
 async def palette(page: Page) -> None:
@@ -151,30 +123,11 @@ async def history(page: Page) -> None:
     await page.keyboard.press("h")
 
 
-async def fitted(page: Page) -> None:
-    """Two people placed by hand, then fitted."""
-    await page.keyboard.press("g")
-    await shows(page, "/fit/i.test(quadrille.state.state.undo ?? '')", 60)
-
-
 async def before_fit(page: Page) -> None:
     """A fit, with the pose before it and the costs of each view."""
-    await page.keyboard.press("g")
-    await shows(page, "quadrille.state.state.compared?.work === 'fit'", 60)
-    await page.keyboard.press("Shift+B")
-    await shows(page, "quadrille.state.state.compared.is_before_shown", 20)
+    compared = "quadrille.state.state.compared"
+    await by_keys(("g", f"{compared}?.work === 'fit'", 60), ("Shift+B", f"{compared}.is_before_shown", 20))(page)
     await page.click("#show-comparison")
-
-
-async def doubts(page: Page) -> None:
-    """Two people tracked, and what is doubtful, with the worst pose shown."""
-    await page.keyboard.press("t")
-    await shows(page, "quadrille.state.state.track.message.startsWith('done')", 300)
-    await page.keyboard.press("Shift+L")
-    await page.keyboard.press("Alt+ArrowDown")
-    await shows(
-        page, "[...document.querySelectorAll('.doubt img')].slice(0, 3).every((one) => one.naturalWidth > 0)", 60
-    )
 
 
 async def inspector(page: Page) -> None:
@@ -193,11 +146,6 @@ async def settings(page: Page) -> None:
         await page.click(f"[data-section={section}] summary")
 
 
-async def sessions(page: Page) -> None:
-    """What opens another session."""
-    await page.keyboard.press("Control+o")
-
-
 async def new_session(page: Page) -> None:
     """The form of a new session, with the first check that fails."""
     await page.keyboard.press("Control+k")
@@ -210,44 +158,45 @@ async def new_session(page: Page) -> None:
     await page.locator("#new-session-checks .is-failed").wait_for()
 
 
-async def filled(page: Page) -> None:
-    await page.keyboard.press("1")
-
-
+TRACK = "t", "quadrille.state.state.track.message.startsWith('done')", 300
+THUMBNAILS = "[...document.querySelectorAll('.doubt img')].slice(0, 3).every((one) => one.naturalWidth > 0)"
+NOTHING, TRACKED = by_keys(), by_keys(TRACK, "c")
+DOUBTS = by_keys(TRACK, "Shift+L", ("Alt+ArrowDown", THUMBNAILS, 60))
+FAULT = "document.querySelector('#advice').dataset.level === 'fault'"
 SCREENS = [
-    Screenshot("empty", "fresh", nothing),
-    Screenshot("empty-light", "fresh", nothing, scheme="light"),
+    Screenshot("empty", "fresh", NOTHING),
+    Screenshot("empty-light", "fresh", NOTHING, scheme="light"),
     Screenshot("posing", "placed", posing),
     Screenshot("posing-large", "placed", posing, LARGE),
-    Screenshot("filled", "placed", filled),
+    Screenshot("filled", "placed", by_keys("1")),
     Screenshot("pins", "placed", pins),
     Screenshot("pins-light", "placed", pins, scheme="light"),
-    Screenshot("layers", "placed", layers),
+    Screenshot("layers", "placed", by_keys("Shift+Digit7", "Shift+Digit8", "a")),
     Screenshot("search-running", "near", searching),
     Screenshot("search-replay", "near", replaying),
     Screenshot("search-replay-large", "near", replaying, LARGE, "light"),
     Screenshot("landscape", "placed", landscape),
-    Screenshot("tracking", "placed", tracking),
-    Screenshot("curves", "placed", tracked),
-    Screenshot("curves-light-large", "placed", tracked, LARGE, "light"),
-    Screenshot("notice", "fresh", refused),
-    Screenshot("keys", "placed", helping),
+    Screenshot("tracking", "placed", by_keys(("t", "quadrille.state.state.track.done > 3", 120), "Alt+p")),
+    Screenshot("curves", "placed", TRACKED),
+    Screenshot("curves-light-large", "placed", TRACKED, LARGE, "light"),
+    Screenshot("notice", "fresh", by_keys(("t", FAULT, 20))),
+    Screenshot("keys", "placed", by_keys("?")),
     Screenshot("palette", "placed", palette),
     Screenshot("history", "placed", history),
-    Screenshot("one-camera", "one", nothing),
-    Screenshot("eight-cameras", "eight", nothing),
-    Screenshot("eight-cameras-large-light", "eight", nothing, LARGE, "light"),
+    Screenshot("one-camera", "one", NOTHING),
+    Screenshot("eight-cameras", "eight", NOTHING),
+    Screenshot("eight-cameras-large-light", "eight", NOTHING, LARGE, "light"),
     Screenshot("before-fit", "near", before_fit),
-    Screenshot("doubts", "tango", doubts),
-    Screenshot("doubts-light-large", "tango", doubts, LARGE, "light"),
+    Screenshot("doubts", "tango", DOUBTS),
+    Screenshot("doubts-light-large", "tango", DOUBTS, LARGE, "light"),
     Screenshot("inspector", "placed", inspector),
     Screenshot("inspector-light-large", "tango", inspector, LARGE, "light"),
     Screenshot("settings", "tango", settings),
     Screenshot("settings-light-large", "placed", settings, LARGE, "light"),
-    Screenshot("sessions", "placed", sessions),
+    Screenshot("sessions", "placed", by_keys("Control+o")),
     Screenshot("new-session", "fresh", new_session),
-    Screenshot("two-people", "tango", nothing),
-    Screenshot("page", "tango", fitted, (1600, 900)),
+    Screenshot("two-people", "tango", NOTHING),
+    Screenshot("page", "tango", by_keys(("g", "/fit/i.test(quadrille.state.state.undo ?? '')", 60)), (1600, 900)),
 ]
 
 TUTORIAL = ("empty", "inspector", "posing", "pins", "search-replay", "landscape", "curves", "palette")

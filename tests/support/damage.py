@@ -1,6 +1,8 @@
 """Damage to the file of a store, as disks, drives and programs do it; and everything that a store shows."""
 
+import sqlite3
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 
@@ -8,6 +10,8 @@ from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import Alternative, MarkChange, PinChange, PoseChange, PoseRecord
 
 N_FRAMES = 120
+OLD_STORES = Path(__file__).parents[1] / "tracker" / "session" / "store"
+"""Stores of earlier versions as SQL."""
 
 
 def written_store(path):
@@ -98,3 +102,18 @@ def damaged(data, older, rng):
     elif kind == "zero bytes":
         data[at : at + 16] = bytes(min(16, len(data) - at))
     return bytes(data), kind
+
+
+def altered(path, *statements, parameters=()):
+    """Change a store as a disk does, without the program's checksums."""
+    with closing(sqlite3.connect(path)) as db:
+        for statement in statements:
+            db.execute(statement, parameters)
+        db.commit()
+
+
+def old_store(path, version):
+    """Write a store as the program of a version wrote it; return its path."""
+    with closing(sqlite3.connect(path)) as db:
+        db.executescript((OLD_STORES / f"store_version_{version}.sql").read_text("utf-8"))
+    return path

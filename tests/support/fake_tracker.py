@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+from gestures import wait_for
 
 from tracker.estimation.chamfer.method import CHAMFER
 from tracker.estimation.tracking.estimate import PoseEstimate
@@ -60,6 +61,16 @@ class FakeTracker:
         """Let it track so many frames more."""
         for _ in range(frames):
             self.steps.release()
+
+    def go_on(self, controller, frames, at=None):
+        """Let it track so many frames more, and wait until the run is at a frame, or at its end."""
+        self.let_go(frames)
+        wait_for(lambda: controller.state.track.message if at is None else controller.state.track.at == at)
+
+    def track(self, controller, until, frames, at=None, backward=False):
+        """Start a run, and go on."""
+        controller.tracking.start(backward=backward, until=until)
+        self.go_on(controller, frames, at)
 
     def with_settings(self, settings):
         """Stands for the tracker's constructor."""

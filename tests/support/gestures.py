@@ -28,8 +28,13 @@ def drag(controller, point, by, camera=FRONT, person=0):
     controller.dragging.end(PAGE)
 
 
+def drag_on(controller, frame, point, by):
+    """Go to a frame, and drag there."""
+    controller.navigation.seek(frame)
+    drag(controller, point, by)
+
+
 def start_run(user):
     """Begin to track frames 3 to 6 from a pose that is set by hand on frame 2."""
-    user.navigation.seek(2)
-    drag(user, "torso", (4.0, 0.0))
+    drag_on(user, 2, "torso", (4.0, 0.0))
     user.tracking.start(False, 6)

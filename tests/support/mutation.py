@@ -4,8 +4,13 @@ import copy
 import json
 import re
 import tomllib
+import traceback
+import warnings
 
+import numpy as np
 import tomli_w
+
+from tracker.errors import TrackerError
 
 # Numbers and words that no reader may choke on.
 ODD_TEXT = [
@@ -125,3 +130,18 @@ def mutated(rng, name, data, others):
     for _ in range(rng.choice((1, 1, 1, 1, 2, 4))):
         data = mutate_bytes(rng, data, others) or b" "
     return data
+
+
+def tried(case, read, failures, data=b""):
+    """Read a mutated file; returns whether it was refused (or the answer is True), and adds faults to the failures."""
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            return read() is True
+    except TrackerError as error:
+        if len(str(error)) > 2000:
+            failures.append(f"case {case}: a message of {len(str(error))} characters: {str(error)[:300]}")
+        return True
+    except Exception:
+        failures.append(f"case {case}: {traceback.format_exc(limit=-3)}\n{data[:300]!r}")
+        return False

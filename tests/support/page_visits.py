@@ -9,6 +9,7 @@ from urllib.parse import quote
 import aiohttp
 from aiohttp import web
 from declared_messages import checked
+from serving import listening
 
 from app.page.socket import PaneSocket
 from app.participants.participants import Participants
@@ -31,6 +32,11 @@ class Page:
     async def shows(self, *layers, reductions=(1, 1, 1, 1), by_part=False):
         """Say what the page shows."""
         await self.send("view", layers=layers, reductions=reductions, by_part=by_part)
+
+    async def seek(self, frame):
+        """Go to a frame, and wait until the state shows it."""
+        await self.send("seek", frame=frame)
+        return await self.hear("state", lambda m: m["frame"] == frame)
 
     async def hear(self, kind, condition=lambda _: True, timeout_s=60.0):
         """The next message of a kind for which a condition holds; binary ones with their `payload`."""
@@ -62,19 +68,16 @@ async def visiting(controller, notices=(), role="host", name="", participants=No
 
     app = web.Application()
     app.router.add_get("/ws", serve)
-    runner = web.AppRunner(app, shutdown_timeout=0.1)
-    await runner.setup()
-    await web.TCPSite(runner, "127.0.0.1", 0).start()
     try:
         async with (
+            listening(app) as port,
             aiohttp.ClientSession() as session,
-            session.ws_connect(f"http://127.0.0.1:{runner.addresses[0][1]}/ws") as socket,
+            session.ws_connect(f"http://127.0.0.1:{port}/ws") as socket,
         ):
             page = Page(socket)
             await page.shows("image", "contours", "joints")
             yield page
     finally:
-        await runner.cleanup()
         if participants is None:
             people.close()
 

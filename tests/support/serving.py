@@ -1,8 +1,57 @@
 """Serve an aiohttp application for the length of a test."""
 
+import json
 from contextlib import asynccontextmanager
+from pathlib import Path
 
+import aiohttp
 from aiohttp import web
+
+from app.server import server
+from app.server.access import Access
+from app.server.static_files import static_folder
+
+
+async def answer(client, path, **headers):
+    """Return status and text of an answer; bytes that are no text are replaced."""
+    async with client.get(path, headers=headers) as response:
+        return response.status, await response.text(errors="replace")
+
+
+class Nobody:
+    """Serves no panes."""
+
+    async def serve(self, socket, role, name=""):
+        pass
+
+
+class Page:
+    """A page of the program, which has its cookie."""
+
+    def __init__(self, session, origin):
+        self.session, self._origin = session, origin
+
+    async def get(self, path, **headers):
+        """See `answer`."""
+        return await answer(self.session, path, **headers)
+
+    async def post(self, path, body, **headers):
+        """Post JSON, or bytes as they are; return status and text of the answer."""
+        headers = {"Origin": self._origin, "Content-Type": "application/json"} | headers
+        data = body if isinstance(body, bytes) else json.dumps(body).encode()
+        async with self.session.post(path, data=data, headers=headers) as response:
+            return response.status, await response.text()
+
+
+@asynccontextmanager
+async def page_of(*routes, kind=Page):
+    """Serve the program with some routes alone; gives its page."""
+    app = server.create_app(Nobody(), Path("/nowhere/viser"), Access(token="secret"), static_folder())
+    for own in routes:
+        own.add_to(app)
+    async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
+        session.cookie_jar.update_cookies({f"quadrille_{port}": "secret"})
+        yield kind(session, f"http://127.0.0.1:{port}")
 
 
 @asynccontextmanager

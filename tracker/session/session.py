@@ -359,7 +359,12 @@ def check_content(session: Session) -> dict[str, Any]:
 
 def _absolute(source: CameraSource) -> CameraSource:
     """Make relative paths absolute by the current working folder, which the session outlives."""
-    return replace(source, **{kind: tidy_path(path) for kind, path in source.paths.items()})  # pyrefly: ignore[bad-argument-type]
+    return replace(
+        source,
+        footage=tidy_path(source.footage),
+        background=tidy_path(source.background) if source.background is not None else None,
+        masks=tidy_path(source.masks) if source.masks is not None else None,
+    )
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -1,11 +1,10 @@
 """Sessions from elsewhere: pipes in the place of files do not hang a command, and a trigger does not run."""
 
 import os
-import sqlite3
-from contextlib import closing
 
 import pytest
 from command_line import SAMPLE, WITH_POSE, assert_refused
+from damage import altered
 
 
 def replaced_by_a_pipe(path):
@@ -76,9 +75,8 @@ def test_named_pipes_in_place_of_footage(run, session, kind):
 
 
 def test_a_trigger_in_a_store_by_mail_does_not_run(run, placed):
-    with closing(sqlite3.connect(placed / "annotations.sqlite")) as db:
-        db.execute("CREATE TRIGGER gone AFTER INSERT ON poses BEGIN DELETE FROM poses; END")
-        db.commit()
+    trigger = "CREATE TRIGGER gone AFTER INSERT ON poses BEGIN DELETE FROM poses; END"
+    altered(placed / "annotations.sqlite", trigger)
     before = (placed / "annotations.sqlite").read_bytes()
     for words in (["info", "--no-check"], ["init", "--joints", SAMPLE / "truth.trc", "--frame", "5"]):
         assert_refused(run(words[0], placed, *words[1:]), ["the trigger 'gone' is none of the program"])

@@ -7,6 +7,7 @@ from contextlib import closing
 import pytest
 from command_line import SAMPLE, WITH_POSE, assert_refused, stored
 from crashes import crashed_in_a_commit
+from damage import altered
 
 from tracker.session.lock import SessionLock
 
@@ -20,9 +21,7 @@ def edited(run, session):
 
 
 def damage(session):
-    with closing(sqlite3.connect(session / "annotations.sqlite")) as db:
-        db.execute("UPDATE pose_changes SET frame = frame + 1")
-        db.commit()
+    altered(session / "annotations.sqlite", "UPDATE pose_changes SET frame = frame + 1")
 
 
 def test_a_damaged_store_goes_back_to_its_backup(run, edited):

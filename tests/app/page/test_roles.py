@@ -96,8 +96,7 @@ async def test_a_reviewer_verifies_under_the_name_of_joining(opened):
     host.annotating.plan(FrameChoice(frames="0,1"), None, [], each=False)
     async with visiting(host, role="review", name=" Rita ") as page:
         assert (await page.hear("session"))["role"] == "review"
-        await page.send("seek", frame=1)
-        await page.hear("state", lambda m: m["frame"] == 1)
+        await page.seek(1)
         await page.send("annotation", action="verify", person=0, frame=0)
         found = await page.hear("annotation", lambda m: m["tasks"] and m["tasks"][0]["state"] == "verified")
         assert (found["annotator"], found["tasks"][0]["by"]) == ("Rita", "Rita")
@@ -112,8 +111,7 @@ async def test_a_named_look_moves_without_moving_the_host_and_writes_nothing(ope
     drag(host, "torso", (4.0, 0.0))
     entries = host.history.entries(9)
     async with visiting(host, role="look", name="Lou") as page:
-        await page.send("seek", frame=2)
-        await page.hear("state", lambda m: m["frame"] == 2)
+        await page.seek(2)
         for refused in ({"kind": "mark", "toggle": "reviewed"}, {"kind": "undo"}):
             await page.send(refused.pop("kind"), **refused)
             assert "only look" in (await page.hear("notice"))["text"]
@@ -162,8 +160,7 @@ async def test_a_host_who_sends_without_pause_only_waits(opened, monkeypatch):
     async with visiting(host) as page:
         for _ in range(sent):
             await page.send("annotation", action="comment", person=0, frame=0, limb=None, text="again")
-        await page.send("seek", frame=3)
-        await page.hear("state", lambda m: m["frame"] == 3)
+        await page.seek(3)
     assert len(done) == sent
 
 

@@ -274,8 +274,7 @@ async def test_a_wrong_message_is_one_notice_and_the_socket_stays_open(controlle
         await page.hear("timeline")
         await page.send_raw(data, binary)
         assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
-        await page.send("seek", frame=7)
-        await page.hear("state", lambda m: m["frame"] == 7)
+        await page.seek(7)
         assert len([m for m in page.told if m["type"] == "notice"]) == 1
     (record,) = caplog.records
     assert record.getMessage().startswith("a page sent a wrong message: expected ")
@@ -287,8 +286,7 @@ async def test_a_fault_of_the_program_is_a_notice(controller, monkeypatch):
     async with visiting(controller) as page:
         await page.send("undo")
         assert "ZeroDivisionError" in (await page.hear("notice"))["text"]
-        await page.send("seek", frame=7)
-        await page.hear("state", lambda m: m["frame"] == 7)
+        await page.seek(7)
 
 
 async def test_many_cells_travel_as_columns(controller, monkeypatch):
@@ -402,8 +400,7 @@ async def test_a_page_without_visible_panes_gets_no_view_until_it_shows_one(page
     await page.shows("image", "contours")
     await page.hear("image")
     await page.shows("image", "contours", reductions=(0, 0, 0, 0))
-    await page.send("seek", frame=3)
-    await page.hear("state", lambda m: m["frame"] == 3)
+    await page.seek(3)
     await page.send("history", limit=1)
     await page.hear("history")
     assert not [m for m in page.told if m["type"] in ("image", "overlay") and m["frame"] == 3]

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from gestures import FRONT, drag, pixel_of, start_run, wait_for
+from gestures import FRONT, drag, drag_on, pixel_of, start_run, wait_for
 
 from app.participants.participants import Participants
 from app.storage.turns import TurnError
@@ -45,8 +45,7 @@ def test_others_see_an_edit_on_the_frame_that_they_look_at(anna, ben):
 def test_an_edit_elsewhere_leaves_the_shown_pose_as_the_same_object(anna, ben):
     drag(ben, "torso", (4.0, 0.0))
     values = ben.state.people[0].values
-    anna.navigation.seek(3)
-    drag(anna, "torso", (9.0, 0.0))
+    drag_on(anna, 3, "torso", (9.0, 0.0))
     assert ben.state.people[0].values is values, "nothing is drawn again"
 
 
@@ -58,12 +57,10 @@ def test_a_pose_is_edited_in_turn(anna, ben):
     with pytest.raises(TurnError, match="anna drags"):
         ben.pose_edits.turn(0, [0], 0.1, 0)
     assert ben.state.saved
-    ben.navigation.seek(1)
-    drag(ben, "torso", (5.0, 0.0))  # another frame is free
+    drag_on(ben, 1, "torso", (5.0, 0.0))  # another frame is free
     anna.dragging.move(1, (start[0] + 8, start[1]), 1)
     anna.dragging.end(1)
-    ben.navigation.seek(0)
-    drag(ben, "torso", (5.0, 0.0))
+    drag_on(ben, 0, "torso", (5.0, 0.0))
     assert shown(anna) == shown(ben)
 
 
@@ -89,8 +86,7 @@ def test_both_drag_at_once_on_frames_of_their_own(anna, ben):
 
 def test_undo_is_of_ones_own(anna, ben):
     drag(anna, "torso", (4.0, 0.0))
-    ben.navigation.seek(1)
-    drag(ben, "torso", (5.0, 0.0))
+    drag_on(ben, 1, "torso", (5.0, 0.0))
     assert (anna.state.undo, ben.state.undo) == ("drag torso, frame 0", "drag torso, frame 1")
     anna.history.undo()
     assert anna.stored_poses.rows(0)[0] == [1]
@@ -106,8 +102,7 @@ def test_a_restart_knows_that_several_have_worked(people, opened):
     anna, ben = people.host, people.join("annotate", "ben").controller
     drag(anna, "torso", (4.0, 0.0))
     drag(ben, "torso", (4.0, 0.0))
-    ben.navigation.seek(1)
-    drag(ben, "torso", (5.0, 0.0))
+    drag_on(ben, 1, "torso", (5.0, 0.0))
     people.close()
     again = opened()
     again.session_state.saver.moves._author = "anna"
@@ -122,8 +117,7 @@ def test_alone_again_ones_own_entries_are_gone_along(people):
     drag(ben, "torso", (4.0, 0.0))
     first = anna.history.entries(1)[0].edit
     for frame in (1, 2):
-        anna.navigation.seek(frame)
-        drag(anna, "torso", (5.0, 0.0))
+        drag_on(anna, frame, "torso", (5.0, 0.0))
     last = anna.history.entries(1)[0].edit
     anna.history.go_to(first)
     assert anna.stored_poses.rows(0)[0] == [0]
@@ -304,14 +298,12 @@ def test_bodies_of_the_host_are_taken_over(anna, ben):
     assert np.array_equal(anna.state.poses[0], ben.state.poses[0])
 
 
-def test_a_run_of_one_leaves_the_others_to_other_frames(people, tracker):
-    anna, ben = people.host, people.join("annotate", "ben").controller
+def test_a_run_of_one_leaves_the_others_to_other_frames(anna, ben, tracker):
     start_run(anna)
     ben.navigation.seek(4)
     with pytest.raises(TurnError, match="tracks frames 3 to 6"):
         drag(ben, "torso", (4.0, 0.0))
-    ben.navigation.seek(9)
-    drag(ben, "torso", (4.0, 0.0))
+    drag_on(ben, 9, "torso", (4.0, 0.0))
     with pytest.raises(TurnError, match="tracks frames"):
         ben.ranges.track(2, 8, backward=False)
     tracker.let_go(1000)

@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from gestures import FRONT, drag, pixel_of, start_run, wait_for
+from gestures import FRONT, drag, drag_on, pixel_of, start_run, wait_for
 
 from app.control.tracking import ranges
 from app.storage.turns import TurnError
@@ -13,13 +13,11 @@ from tracker.errors import TrackerError
 def begin_run(user, tracker):
     """Track from frame 2 until frame 3 is done; the next step, for which pause and stop wait, is let go soon."""
     start_run(user)
-    tracker.let_go(1)
-    wait_for(lambda: user.state.track.at == 3)
+    tracker.go_on(user, 1, at=3)
     threading.Timer(0.2, tracker.let_go, (1,)).start()
 
 
-def test_a_paused_run_goes_on_only_when_its_frames_are_free(people, tracker):
-    anna, ben = people.host, people.join("annotate", "ben").controller
+def test_a_paused_run_goes_on_only_when_its_frames_are_free(anna, ben, tracker):
     begin_run(anna, tracker)
     anna.tracking.pause()
     ben.navigation.seek(5)
@@ -29,18 +27,15 @@ def test_a_paused_run_goes_on_only_when_its_frames_are_free(people, tracker):
     assert not anna.state.track.running
     ben.dragging.end(1)
     anna.tracking.resume()
-    tracker.let_go(1000)
-    wait_for(lambda: anna.state.track.message)
+    tracker.go_on(anna, 1000)
     assert anna.state.track.message == "done: 4 frames, 1 doubtful"
 
 
-def test_a_run_whose_poses_are_refused_ends_with_a_notice(people, tracker):
-    anna, ben = people.host, people.join("annotate", "ben").controller
+def test_a_run_whose_poses_are_refused_ends_with_a_notice(anna, ben, tracker):
     start_run(anna)
     ben.navigation.seek(4)
     ben.session_state.set(is_pin_held=True)  # as if begun a moment before the run
-    tracker.let_go(1000)
-    wait_for(lambda: anna.state.track.message)
+    tracker.go_on(anna, 1000)
     assert not anna.state.track.running
     assert anna.state.track.failed
     assert "ben sets a pin on frame 4" in anna.state.track.notice
@@ -52,8 +47,7 @@ def test_a_run_whose_poses_are_refused_ends_with_a_notice(people, tracker):
     wait_for(lambda: anna.state.track.message.startswith("done"))
 
 
-def test_a_stop_reports_what_it_could_not_save(people, tracker):
-    anna, ben = people.host, people.join("annotate", "ben").controller
+def test_a_stop_reports_what_it_could_not_save(anna, ben, tracker):
     begin_run(anna, tracker)
     ben.navigation.seek(4)
     ben.session_state.set(is_pin_held=True)
@@ -93,8 +87,7 @@ def test_work_on_a_range_that_fails_at_once_leaves_nothing_running(monkeypatch, 
 
 def test_work_on_a_range_has_its_turn(people, monkeypatch, anna, ben):
     for frame in (2, 8):
-        anna.navigation.seek(frame)
-        drag(anna, "torso", (4.0, 0.0))
+        drag_on(anna, frame, "torso", (4.0, 0.0))
     monkeypatch.setattr(ranges, "AT_ONCE", 2)  # in the background, two frames at a time
     is_held, may_go_on = threading.Event(), threading.Event()
 

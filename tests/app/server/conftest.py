@@ -2,21 +2,13 @@
 
 import json
 import shutil
+from contextlib import AsyncExitStack
 
-import aiohttp
 import pytest
 from command_line import SAMPLE
-from serving import listening
+from serving import Page, page_of
 
-from app.server import server
-from app.server.access import Access
 from app.server.session_routes import SessionRoutes
-from app.server.static_files import static_folder
-
-
-class Nobody:
-    async def serve(self, socket, role, name):
-        pass
 
 
 @pytest.fixture
@@ -27,15 +19,8 @@ def folders(tmp_path):
     return tmp_path / "walk", tmp_path / "dance", tmp_path / "state"
 
 
-class Client:
-    """A page of the program."""
-
-    def __init__(self, session, port, routes):
-        self.session, self._origin, self.routes = session, f"http://127.0.0.1:{port}", routes
-
-    async def get(self, path):
-        async with self.session.get(path) as response:
-            return response.status, await response.text()
+class Client(Page):
+    """A page that makes and opens sessions."""
 
     async def make(self, form):
         status, text = await self.open(form, "/sessions/new")
@@ -43,28 +28,17 @@ class Client:
         return [json.loads(line) for line in text.splitlines()]
 
     async def open(self, body, path="/sessions/open", **headers):
-        headers = {"Origin": self._origin, "Content-Type": "application/json"} | headers
-        data = body if isinstance(body, bytes) else json.dumps(body).encode()
-        async with self.session.post(path, data=data, headers=headers) as response:
-            return response.status, await response.text()
+        return await self.post(path, body, **headers)
 
 
 @pytest.fixture
-async def serve(folders, tmp_path):
-    clients = []
+async def serve(folders):
+    async with AsyncExitStack() as stack:
 
-    async def start(why=None, unsaved=None):
-        app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), static_folder())
-        routes = SessionRoutes(folders[0], folders[2], why, lambda: unsaved)
-        routes.add_to(app)
-        context = listening(app)
-        port = await context.__aenter__()
-        session = aiohttp.ClientSession(f"http://127.0.0.1:{port}")
-        session.cookie_jar.update_cookies({f"quadrille_{port}": "secret"})
-        clients.append((context, session))
-        return Client(session, port, routes)
+        async def start(why=None, unsaved=None):
+            routes = SessionRoutes(folders[0], folders[2], why, lambda: unsaved)
+            client = await stack.enter_async_context(page_of(routes, kind=Client))
+            client.routes = routes
+            return client
 
-    yield start
-    for context, session in clients:
-        await session.close()
-        await context.__aexit__(None, None, None)
+        yield start

@@ -7,28 +7,19 @@ import tempfile
 import threading
 import zipfile
 
-import aiohttp
 import pytest
 from bodies import MODELS
 from observed_people import BODY_25, seen, walking, write_openpose
-from serving import listening
+from serving import page_of
 from stored_motions import store_motion
 
-from app.server import server
-from app.server.access import Access
 from app.server.export_routes import ExportRoutes
-from app.server.static_files import static_folder
 from tracker.formats.trc import write_trc
 from tracker.interchange.exports import formats
 from tracker.interchange.exports.export_format import ExportFormat
 from tracker.interchange.observations.importing import plan_import, store_import
 from tracker.interchange.observations.request import ImportRequest
 from tracker.session.session import load_session
-
-
-class Nobody:
-    async def serve(self, socket, role, name=""):
-        pass
 
 
 @pytest.fixture
@@ -41,14 +32,21 @@ def temporary(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-async def client(tmp_path, temporary):
+async def page(tmp_path, temporary):
     folder = tmp_path / "dance"
     store_motion(folder, [MODELS["gavrila22"]] * 2, gaps={(0, 3)})
-    app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), static_folder())
-    ExportRoutes(folder).add_to(app)
-    async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
-        session.cookie_jar.update_cookies({f"quadrille_{port}": "secret"})
-        yield session
+    async with page_of(ExportRoutes(folder)) as page:
+        yield page
+
+
+@pytest.fixture
+def client(page):
+    return page.session
+
+
+async def sent_archive(client, path):
+    async with client.get(path) as response:
+        return zipfile.ZipFile(io.BytesIO(await response.read()))
 
 
 async def test_files_are_made_sent_and_deleted(client, temporary):
@@ -64,16 +62,13 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
         rows = (await response.text()).splitlines()
     assert rows[2].split("\t")[4] == "mm"
     assert [row.split("\t")[0] for row in rows[6:]] == ["2", "3", "4", "5"]
-    async with client.get("/export/mot?frames=0:2") as response:
-        archive = zipfile.ZipFile(io.BytesIO(await response.read()))
+    archive = await sent_archive(client, "/export/mot?frames=0:2")
     assert sorted(archive.namelist()) == ["dance_ann.mot", "dance_ann.osim", "dance_bob.mot", "dance_bob.osim"]
     async with client.get("/export/progress") as response:
         assert await response.json() == {"done": 0, "total": 0}
-    async with client.get("/export/openpose?frames=1,2&pixels=original") as response:
-        archive = zipfile.ZipFile(io.BytesIO(await response.read()))
+    archive = await sent_archive(client, "/export/openpose?frames=1,2&pixels=original")
     assert "dance_openpose/cam0_json/cam0_000000000002_keypoints.json" in archive.namelist()
-    async with client.get("/export/trc?person=ann&only=keyframes&provenance=1") as response:
-        archive = zipfile.ZipFile(io.BytesIO(await response.read()))
+    archive = await sent_archive(client, "/export/trc?person=ann&only=keyframes&provenance=1")
     assert sorted(archive.namelist()) == ["dance_ann.trc", "dance_ann.trc.provenance.json"]
     assert [p["frame"] for p in json.loads(archive.read(archive.namelist()[1]))["people"]["ann"]] == [1]
     assert list(temporary.iterdir()) == []
@@ -129,24 +124,22 @@ async def test_observations_are_sent_back_in_their_own_files(client, temporary, 
         ("mp4", 400, "not found"),
     ],
 )
-async def test_wrong_requests_are_answered_with_the_reason(client, temporary, path, status, expected):
-    async with client.get(f"/export/{path}") as response:
-        assert response.status == status
-        assert expected in await response.text()
+async def test_wrong_requests_are_answered_with_the_reason(page, temporary, path, status, expected):
+    answered, text = await page.get(f"/export/{path}")
+    assert answered == status
+    assert expected in text
     assert list(temporary.iterdir()) == []
 
 
-async def test_strangers_and_foreign_pages_get_nothing(client):
+async def test_strangers_and_foreign_pages_get_nothing(page):
     for path in ("/export/trc", "/export/like/net"):
-        async with client.get(path, headers={"Sec-Fetch-Site": "cross-site"}) as response:
-            assert response.status == 403
-    client.cookie_jar.clear()
+        assert (await page.get(path, **{"Sec-Fetch-Site": "cross-site"}))[0] == 403
+    page.session.cookie_jar.clear()
     for path in ("/export", "/export/progress", "/export/trc", "/export/like/net"):
-        async with client.get(path) as response:
-            assert response.status == 403
+        assert (await page.get(path))[0] == 403
 
 
-async def test_one_runs_at_a_time_and_stops_when_the_page_goes(client, temporary, monkeypatch):
+async def test_one_runs_at_a_time_and_stops_when_the_page_goes(page, temporary, monkeypatch):
     reached, go_on = asyncio.Event(), threading.Event()
     loop = asyncio.get_running_loop()
 
@@ -158,16 +151,14 @@ async def test_one_runs_at_a_time_and_stops_when_the_page_goes(client, temporary
     one = formats.FORMATS["coco"]
     monkeypatch.setitem(formats.FORMATS.own, "coco", ExportFormat("coco", one.title, one.suffixes, slow))
     try:
-        first = asyncio.create_task(client.get("/export/coco"))
+        first = asyncio.create_task(page.session.get("/export/coco"))
         await asyncio.wait_for(reached.wait(), 20)
-        async with client.get("/export/csv") as response:
-            assert response.status == 409
-            assert "Another export is in progress" in await response.text()
+        status, text = await page.get("/export/csv")
+        assert (status, "Another export is in progress" in text) == (409, True)
         first.cancel()
         async with asyncio.timeout(20):
             while list(temporary.iterdir()):
                 await asyncio.sleep(0.02)
-        async with client.get("/export/csv") as response:
-            assert response.status == 200
+        assert (await page.get("/export/csv"))[0] == 200
     finally:
         go_on.set()

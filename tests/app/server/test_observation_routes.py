@@ -3,18 +3,15 @@
 import json
 import math
 import shutil
+from contextlib import AsyncExitStack
 
-import aiohttp
 import pytest
 from observed_people import seen, true_motion, write_openpose
-from serving import listening
+from serving import page_of
 from unreadable_folders import refuse_folders
 
-from app.server import server
-from app.server.access import Access
 from app.server.copy_routes import CopyRoutes
 from app.server.observation_routes import ObservationRoutes
-from app.server.static_files import static_folder
 from tracker import files
 from tracker.body.model import PosedBody
 from tracker.evaluation.judging.judge import Judgement, LimbVerdict
@@ -27,43 +24,21 @@ PLAN, IMPORT, REPORT = "/observations/plan", "/observations/import", "/observati
 COPY = "/copies/open"
 
 
-class Nobody:
-    async def serve(self, socket, role, name=""):
-        pass
-
-
 @pytest.fixture
-async def serve(controller, tmp_path):
-    """Serve the section of the session; gives how the page posts to it, and its client."""
-    clients = []
+async def serve(controller):
+    """Serve the section of the session; gives its page."""
+    async with AsyncExitStack() as stack:
 
-    async def start(refusal=None):
-        app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), static_folder())
-        ObservationRoutes(controller, refusal).add_to(app)
-        CopyRoutes(controller, refusal).add_to(app)
-        context = listening(app)
-        port = await context.__aenter__()
-        client = aiohttp.ClientSession(f"http://127.0.0.1:{port}")
-        client.cookie_jar.update_cookies({f"quadrille_{port}": "secret"})
-        clients.append((context, client))
+        async def start(refusal=None):
+            routes = ObservationRoutes(controller, refusal), CopyRoutes(controller, refusal)
+            return await stack.enter_async_context(page_of(*routes))
 
-        async def post(path, body, **headers):
-            own = {"Origin": f"http://127.0.0.1:{port}", "Content-Type": "application/json"} | headers
-            data = body if isinstance(body, bytes) else json.dumps(body).encode()
-            async with client.post(path, data=data, headers=own) as response:
-                return response.status, await response.text()
-
-        return post, client
-
-    yield start
-    for context, client in clients:
-        await client.close()
-        await context.__aexit__(None, None, None)
+        yield start
 
 
 @pytest.fixture
 async def post(serve):
-    return (await serve())[0]
+    return (await serve()).post
 
 
 @pytest.fixture
@@ -149,27 +124,26 @@ async def test_a_body_that_is_no_form_or_too_large_is_refused(post):
 
 
 async def test_only_the_page_itself_may_ask(controller, serve, form):
-    post, client = await serve()
+    page = await serve()
+    post = page.post
     assert (await post(PLAN, form, Origin="http://evil.example"))[0] == 403
     assert (await post(PLAN, form, **{"Sec-Fetch-Site": "cross-site"}))[0] == 403
-    async with client.get(REPORT, headers={"Sec-Fetch-Site": "cross-site"}) as response:
-        assert response.status == 403
-    client.cookie_jar.clear()
+    assert (await page.get(REPORT, **{"Sec-Fetch-Site": "cross-site"}))[0] == 403
+    page.session.cookie_jar.clear()
     assert [(await post(path, form))[0] for path in (PLAN, IMPORT)] == [403, 403]
-    async with client.get(REPORT) as response:
-        assert response.status == 403
-    other, _ = await serve("No paths here.")
+    assert (await page.get(REPORT))[0] == 403
+    other = (await serve("No paths here.")).post
     assert await other(PLAN, form) == (403, "No paths here.")
     assert await other(IMPORT, {}) == (403, "No paths here.")
     assert controller.state.observations.plan is None
 
 
 async def test_the_report_of_a_judgement_is_downloaded(controller, serve, form):
-    post, client = await serve()
-    async with client.get(REPORT) as response:
-        assert (response.status, "judge imported observations first" in await response.text()) == (400, True)
-    await post(PLAN, form)
-    await post(IMPORT, {})
+    page = await serve()
+    status, text = await page.get(REPORT)
+    assert (status, "judge imported observations first" in text) == (400, True)
+    await page.post(PLAN, form)
+    await page.post(IMPORT, {})
     person, points = controller.session.people[0].name, read_points(controller.session, "net")[0]
     frames = {3: {"left arm": LimbVerdict(0.98, 0.2, "left arm jumps", "left_wrist")}}
     body = controller.session.people[0].model
@@ -178,7 +152,7 @@ async def test_the_report_of_a_judgement_is_downloaded(controller, serve, form):
     )
     judgement = Judgement(person, frames, {}, {}, points, {3: pose})
     controller.observing._set(judged="net", judgements=(judgement,))
-    async with client.get(REPORT) as response:
+    async with page.session.get(REPORT) as response:
         assert response.status == 200
         assert response.headers["Content-Disposition"] == "attachment; filename*=UTF-8''session_net_judged.html"
         text = await response.text()
@@ -188,7 +162,7 @@ async def test_the_report_of_a_judgement_is_downloaded(controller, serve, form):
 
 async def test_another_copy_is_opened_by_its_path_where_paths_may_be_named(controller, serve, session, tmp_path, post):
     copy = shutil.copytree(session, tmp_path / "ben")
-    refused, _ = await serve("no paths here")
+    refused = (await serve("no paths here")).post
     assert await refused(COPY, {"folder": str(copy)}) == (403, "no paths here")
     assert (await post(COPY, {"folder": "ben"}))[0] == 400  # neither from the root nor from the home
     assert (await post(COPY, {"folder": str(copy)}, Origin="http://elsewhere.example"))[0] == 403

@@ -6,7 +6,7 @@ from pathlib import Path
 import aiohttp
 import pytest
 from aiohttp import web
-from serving import listening, running
+from serving import answer, listening, running
 from yarl import URL
 
 from app.server import address, server
@@ -91,6 +91,11 @@ async def client(port):
         yield session
 
 
+async def echo(socket):
+    await socket.send_str("hello")
+    assert await socket.receive_str() == "hello"
+
+
 async def raw_get(port, target, host="localhost"):
     """Send a request whose target no client library has tidied up; return status and the whole answer."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
@@ -113,13 +118,11 @@ async def test_page_and_modules_are_served_with_their_headers(client):
         assert "javascript" in response.content_type
         assert response.headers["Cache-Control"] == "no-cache"
         tag = response.headers["ETag"]
-    async with client.get("/static/main.js", headers={"If-None-Match": tag}) as response:
-        assert response.status == 304
+    assert (await answer(client, "/static/main.js", **{"If-None-Match": tag}))[0] == 304
 
 
 async def test_files_are_kept_under_the_version_that_the_page_names(client):
-    async with client.get("/") as response:
-        page = await response.text()
+    _, page = await answer(client, "/")
     (address,) = re.findall(r'src="(static/[0-9a-f]{16}/main\.js)"', page)
     assert re.findall(r'"(static/(?:theme|styles)[^"]*)"', page) == []
     async with client.get(f"/{address}") as response:
@@ -143,9 +146,8 @@ async def test_no_other_file_has_a_version(port, name):
     [{"Host": "evil.example"}, {"Origin": "http://evil.example"}, {"Origin": "null"}, {"Origin": "http://localhost:1"}],
 )
 async def test_foreign_requests_get_403(client, fake_viser, path, headers):
-    async with client.get(path, headers=headers) as response:
-        assert response.status == 403
-        assert "refused" in await response.text()
+    status, text = await answer(client, path, **headers)
+    assert (status, "refused" in text) == (403, True)
     assert not fake_viser.requests
 
 
@@ -161,12 +163,10 @@ async def test_a_request_through_a_port_forward_passes_by_its_own_name_only(port
         url = f"http://127.0.0.1:{port}/ws"
         tunnel = {"Host": "localhost:9999"}
         async with session.ws_connect(url, headers=tunnel, origin="http://localhost:9999") as sock:
-            await sock.send_str("hello")
-            assert await sock.receive_str() == "hello"
+            await echo(sock)
         for path in ("", "ws", "viser/"):
             headers = tunnel | {"Origin": "http://evil.example"}
-            async with session.get(f"http://127.0.0.1:{port}/{path}", headers=headers) as response:
-                assert response.status == 403
+            assert (await answer(session, f"http://127.0.0.1:{port}/{path}", **headers))[0] == 403
 
 
 @pytest.mark.parametrize("prefix", ["/static/", "/viser/", "/"])
@@ -241,8 +241,7 @@ class TestToken:
     async def test_address_gives_a_cookie_and_the_cookie_opens_everything(self, client):
         host = {"Host": "lab.example.org:8080"}
         for path in ("/", "/?token=guess", "/static/main.js", "/ws", "/viser/"):
-            async with client.get(path, headers=host) as response:
-                assert response.status == 403
+            assert (await answer(client, path, **host))[0] == 403
         async with client.get("/?token=secret", headers=host) as response:
             assert response.status == 200
             cookie = response.cookies[NAMED.cookie(host["Host"])]
@@ -252,26 +251,22 @@ class TestToken:
             assert f'url={NAMED.root}"' in await response.text()
         holder = host | {"Cookie": f"{cookie.key}={cookie.value}"}
         for path in ("/", "/static/main.js", "/viser/"):
-            async with client.get(path, headers=holder) as response:
-                assert response.status == 200
+            assert (await answer(client, path, **holder))[0] == 200
         async with client.ws_connect("/ws", headers=holder) as sock:
-            await sock.send_str("hello")
-            assert await sock.receive_str() == "hello"
+            await echo(sock)
 
     async def test_everything_is_served_below_the_root_to_those_who_have_the_cookie(self, fake_viser):
         app = server.create_app(EchoPanes(), fake_viser.socket_path, NAMED, static_folder())
         async with running(LimitedRunner(app, NAMED.roots)) as port, aiohttp.ClientSession() as session:
             root, name = f"http://127.0.0.1:{port}{NAMED.root}", NAMED.cookie(f"127.0.0.1:{port}")
             for path in ("", "static/main.js", "viser/", "ws"):
-                async with session.get(root + path) as response:  # the path alone does not admit
-                    assert response.status == 403
+                assert (await answer(session, root + path))[0] == 403  # the path alone does not admit
             holder = {"Cookie": f"{name}={NAMED.token}"}
             for path, content in (("", b"<html"), ("static/main.js", b"import"), ("viser/a%20b?c", b"viser /a%20b?c")):
                 async with session.get(URL(root + path, encoded=True), headers=holder) as response:
                     assert (response.status, content in await response.read()) == (200, True)
             async with session.ws_connect(root + "ws", headers=holder) as sock:
-                await sock.send_str("hello")
-                assert await sock.receive_str() == "hello"
+                await echo(sock)
 
     @pytest.mark.parametrize("token", ["\xe9", "secret\xe9", "%C3%A9", "%ED%A0%80", "\u20ac"])
     async def test_a_token_that_is_not_ascii_is_refused_like_any_other(self, port, token):
@@ -297,9 +292,8 @@ class TestToken:
         assert "another account" in caplog.text
 
     async def test_a_typed_address_names_the_one_to_open(self, client):
-        async with client.get("/") as response:
-            assert response.status == 403
-            assert "open the address that quadrille open printed" in await response.text()
+        status, text = await answer(client, "/")
+        assert (status, "open the address that quadrille open printed" in text) == (403, True)
 
 
 @pytest.mark.slow

@@ -3,22 +3,14 @@
 import asyncio
 import threading
 
-import aiohttp
 import pytest
-from serving import listening
+from serving import page_of
 
-from app.server import server, thumbnail_routes
-from app.server.access import Access
-from app.server.static_files import static_folder
+from app.server import thumbnail_routes
 from app.server.thumbnail_routes import ThumbnailRoutes
 from tracker.errors import RecordingError
 
 JPEG = b"\xff\xd8 a picture"
-
-
-class Nobody:
-    async def serve(self, socket, role, name=""):
-        pass
 
 
 class Maker:
@@ -39,12 +31,10 @@ class Maker:
 
 
 @pytest.fixture
-async def client(tmp_path):
+async def client():
     maker = Maker()
-    app = server.create_app(Nobody(), tmp_path / "nobody", Access(), static_folder())
-    ThumbnailRoutes(maker.make, lambda: maker.is_busy).add_to(app)
-    async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
-        yield session, maker
+    async with page_of(ThumbnailRoutes(maker.make, lambda: maker.is_busy)) as page:
+        yield page.session, maker
         maker.free.set()
 
 

@@ -4,7 +4,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from gestures import PAGE, drag, pixel_of, wait_for
+from gestures import PAGE, drag, drag_on, pixel_of
 
 from app.messages import encoding
 from app.state.page_view import View
@@ -34,8 +34,7 @@ def joints(controller, frame):
 def posed(controller):
     """Two keyframes, set by hand."""
     for frame in FRAMES:
-        controller.navigation.seek(frame)
-        drag(controller, "left_wrist", (6.0, -9.0))
+        drag_on(controller, frame, "left_wrist", (6.0, -9.0))
     return controller
 
 
@@ -106,8 +105,7 @@ def test_poses_that_are_kept_are_shown_with_their_own_body_and_marked(posed):
     assert np.linalg.norm(draft - was[3], axis=1).max() < 0.01
     assert not encoding.state(posed.session, posed.state).other_sizes
     # An edit of a kept pose leaves it its body; refitting afterwards is a second edit.
-    posed.navigation.seek(3)
-    drag(posed, "left_wrist", (3.0, 0.0))
+    drag_on(posed, 3, "left_wrist", (3.0, 0.0))
     assert posed.models == (old,)
     assert posed.state.revisions != posed.state.present
     posed.body_sizes.apply(0, refit=True)
@@ -169,9 +167,7 @@ def test_tracking_goes_on_in_the_new_body(placed, tracker):
     was = joints(placed, 2)
     lengthen(placed)
     placed.body_sizes.apply(0, refit=False)
-    placed.tracking.start(backward=False, until=3)
-    tracker.let_go(1)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=3, frames=1)
     assert placed.models == (placed.session.people[0].model,)
     assert placed.state.revisions == placed.state.present
     assert np.linalg.norm(joints(placed, 3) - was - (0.01, 0, 0), axis=1).max() < 0.01

@@ -71,9 +71,7 @@ def test_a_search_leaves_locked_degrees_of_freedom_alone(controller):
 def test_a_tracking_run_is_told_what_is_locked(placed, tracker):
     locked = dofs_of(placed, "left_shoulder")
     placed.dof_locks.set(0, locked, True)
-    placed.tracking.start(backward=False, until=4)
-    tracker.let_go(2)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=4, frames=2)
     (free,) = tracker.run.subjects.active_dofs
     assert set(np.flatnonzero(~free)) == set(locked)
 

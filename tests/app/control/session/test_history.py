@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from full_disks import full_disk
-from gestures import drag
+from gestures import drag_on
 
 from tracker.errors import SessionError
 
@@ -16,8 +16,7 @@ def labels(controller, limit=100):
 def edited(controller):
     """A controller with five edits on as many frames."""
     for frame in range(5):
-        controller.navigation.seek(frame)
-        drag(controller, "torso", (5.0 + frame, 0.0))
+        drag_on(controller, frame, "torso", (5.0 + frame, 0.0))
     return controller
 
 
@@ -50,14 +49,12 @@ def test_the_history_lives_on_after_a_restart(edited, opened):
 @pytest.mark.slow
 def test_an_edit_on_a_full_disk_is_shown_and_saved_by_hand(edited, opened):
     with full_disk(0):
-        edited.navigation.seek(6)
-        drag(edited, "torso", (30.0, 0.0))
+        drag_on(edited, 6, "torso", (30.0, 0.0))
         moved = edited.state.poses[0]
         edited.pinning.begin(1, 6, 0, 0, "left_wrist", (200.0, 200.0), False)
         edited.pinning.end(1)
         assert "check the disk" in edited.state.save_error
-        edited.navigation.seek(2)
-        drag(edited, "torso", (30.0, 0.0))
+        drag_on(edited, 2, "torso", (30.0, 0.0))
         edited.navigation.seek(6)
         assert np.array_equal(edited.state.poses[0], moved)
         assert len(edited.state.pins[0]) == 1

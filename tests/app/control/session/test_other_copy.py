@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from gestures import drag, wait_for
+from gestures import drag, drag_on, wait_for
 
 from app.drawing.ghosts import copy_lines
 from app.state.page_view import View
@@ -22,8 +22,7 @@ RAISED_RAD = 0.4
 def both(session, tmp_path, controller):
     """A controller with keyframes on frames 0 and 1, and the folder of ben's copy, where an arm on frame 1 differs."""
     for frame in (0, 1):
-        controller.navigation.seek(frame)
-        drag(controller, "torso", (4.0, 0.0))
+        drag_on(controller, frame, "torso", (4.0, 0.0))
     ben = shutil.copytree(session, tmp_path / "ben")
     with closing(AnnotationStore(ben / "annotations.sqlite")) as store:
         store.commit("by ben", [PoseChange("person", frame, moved(store, controller, frame)) for frame in (1, 2)])

@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from gestures import FRONT, PAGE, drag, pixel_of, wait_for
+from gestures import FRONT, PAGE, drag, drag_on, pixel_of, wait_for
 
 from app.messages.encoding import state as state_message
 from tracker.body.dimensions import dimensions_of
@@ -105,8 +105,7 @@ def alternative(controller):
 
 def ranges(controller):
     drag(controller, "torso", (4.0, 0.0))
-    controller.navigation.seek(6)
-    drag(controller, "torso", (4.0, 0.0))
+    drag_on(controller, 6, "torso", (4.0, 0.0))
     controller.ranges.interpolate(2, 6)
     controller.ranges.mark(2, 6, "reviewed")
     controller.navigation.seek(4)
@@ -162,8 +161,7 @@ def test_frames_that_a_tracker_has_not_written_yet_are_not_saved(placed, tracker
     wait_for(lambda: placed.state.track.done == 3)
     assert placed.state.frame == 2
     assert not placed.state.saved
-    tracker.let_go(1000)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 1000)
     assert placed.state.saved
     assert disk.wrong == []
 

@@ -58,9 +58,7 @@ def corrected(controller):
 
 
 def tracked(controller, tracker, until):
-    controller.tracking.start(backward=False, until=until)
-    tracker.let_go(until + 1)
-    wait_for(lambda: controller.state.track.message)
+    tracker.track(controller, until=until, frames=until + 1)
 
 
 def test_poses_of_an_earlier_calibration_alone_are_tracked_again(placed, tracker):
@@ -69,8 +67,7 @@ def test_poses_of_an_earlier_calibration_alone_are_tracked_again(placed, tracker
     wait_for(lambda: placed.state.calibration.outdated == {0: (2, 3, 4, 5, 6, 7, 8, 9)})
     tracker.seen.clear()
     placed.calibrating.track_again()
-    tracker.let_go(20)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 20)
     assert tracker.seen == [2, 3, 4, 5, 6, 7, 8, 9]
     wait_for(lambda: placed.state.calibration.outdated == {0: (2,)})  # the keyframe
     with pytest.raises(TrackerError, match="keyframes stay as they were set"):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gestures import drag, wait_for
+from gestures import drag_on, wait_for
 
 from app.control.tracking.comparing_runs import method_of
 from app.state.comparison import Stretch
@@ -85,8 +85,7 @@ def test_frames_without_former_poses_are_refused_with_a_reason(controller):
 
 def test_a_pose_by_hand_is_named_by_its_source(twice):
     controller, _, _ = twice
-    controller.navigation.seek(5)
-    drag(controller, "left_wrist", (5.0, 5.0))
+    drag_on(controller, 5, "left_wrist", (5.0, 5.0))
     controller.comparing_runs.compare(5, 5)
     ((one,),) = controller.state.range_comparison.frames
     assert one.other_method == "contour"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gestures import drag, wait_for
+from gestures import drag_on, wait_for
 
 from app.control.tracking import ranges
 from tracker.body.motion.interpolation import interpolate_pose
@@ -13,10 +13,8 @@ from tracker.session.store.annotation_store import AnnotationStore
 @pytest.fixture
 def two_keys(controller):
     """A controller whose body stands on frames 2 and 12."""
-    controller.navigation.seek(2)
-    drag(controller, "torso", (4.0, 0.0))
-    controller.navigation.seek(12)
-    drag(controller, "left_wrist", (40.0, -60.0))
+    drag_on(controller, 2, "torso", (4.0, 0.0))
+    drag_on(controller, 12, "left_wrist", (40.0, -60.0))
     return controller
 
 
@@ -54,8 +52,7 @@ def test_interpolating_fills_between_the_ends_as_one_entry(two_keys, session):
 
 @pytest.mark.slow
 def test_keyframes_within_are_passed_through_and_stay(two_keys, session):
-    two_keys.navigation.seek(6)
-    drag(two_keys, "right_wrist", (-30.0, -30.0))
+    drag_on(two_keys, 6, "right_wrist", (-30.0, -30.0))
     before = stored(session, 6)
     two_keys.ranges.interpolate(12, 2)  # whichever way round it is said
     np.testing.assert_array_equal(stored(session, 6).values, before.values)
@@ -177,8 +174,7 @@ def test_long_work_is_watched_and_stopped_as_one_entry(two_keys, monkeypatch):
 def test_a_frame_that_jumps_is_named_and_no_longer_once_it_is_mended(two_keys):
     two_keys.ranges.interpolate(2, 12)
     assert two_keys.state.inconsistent_frames == ()
-    two_keys.navigation.seek(7)
-    drag(two_keys, "torso", (120.0, 0.0))
+    drag_on(two_keys, 7, "torso", (120.0, 0.0))
     wait_for(lambda: two_keys.state.inconsistent_frames)
     assert set(two_keys.state.inconsistent_frames) <= {6, 7, 8}
     two_keys.history.undo()

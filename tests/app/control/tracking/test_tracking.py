@@ -9,17 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fake_tracker import STEP_M
-from gestures import FRONT, PAGE, drag, wait_for
+from gestures import FRONT, PAGE, drag, drag_on, wait_for
 from run_poses import Estimate, doubted
 
 from app.state.run_choices import RunChoices
 from tracker.errors import SessionError, TrackerError
 from tracker.pipeline import track_session
 from tracker.session.store.annotation_store import AnnotationStore
-
-
-def at(controller, frame):
-    return lambda: controller.state.track.at == frame
 
 
 def end_the_step_soon(tracker):
@@ -35,8 +31,7 @@ def test_a_run_goes_out_from_a_frame_in_both_directions_and_keeps_its_pose(place
     start, last, ended = x_of(placed), placed.session.n_frames - 1, []
     placed.tracking.start_outward(2, (0,), None, ended.append)
     assert placed.state.track.total == last
-    tracker.let_go(2)  # the start and the frame before it
-    wait_for(at(placed, 1))
+    tracker.go_on(placed, 2, at=1)  # the start and the frame before it
     assert (placed.state.track.first, placed.state.track.last) == (2, 0)
     assert placed.state.poses[0][0] == pytest.approx(start + STEP_M)
     end_the_step_soon(tracker)
@@ -58,9 +53,7 @@ def test_a_run_goes_out_from_a_frame_in_both_directions_and_keeps_its_pose(place
 
 def test_a_camera_that_seems_off_is_a_notice_at_the_end_of_a_run(placed, tracker, monkeypatch):
     monkeypatch.setattr(track_session, "contradiction", lambda recording: "camera LEFT is turned")
-    placed.tracking.start(backward=False, until=4)
-    tracker.let_go(2)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=4, frames=2)
     measures = "press Check the cameras in the inspector's Calibration to measure it."
     assert placed.state.track.notice == f"Camera LEFT is turned; {measures}"
     assert not placed.state.track.failed
@@ -72,8 +65,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     placed.tracking.start(backward=False, until=9)
     assert placed.state.track.running
     assert (placed.state.track.first, placed.state.track.last, placed.state.track.total) == (3, 9, 7)
-    tracker.let_go(2)
-    wait_for(at(placed, 4))
+    tracker.go_on(placed, 2, at=4)
     shown = placed.state.people[0]
     assert placed.state.frame == 4
     assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm relocated")
@@ -81,8 +73,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     costs = placed.state.cost_px, placed.state.view_costs_px
     assert costs[0] == pytest.approx(np.mean(costs[1]))  # of the pose, not those that the tracker had
     assert x_of(placed) == pytest.approx(start + 2 * STEP_M)
-    tracker.let_go(5)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 5)
     assert placed.state.track.message == "done: 7 frames, 1 doubtful, 1 lost"
     assert placed.state.frame == 9
     assert placed.state.undo == "track forward from frame 3"
@@ -111,9 +102,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
 
 
 def test_backward_runs_to_the_first_frame(placed, tracker):
-    placed.tracking.start(backward=True, until=None)
-    tracker.let_go(2)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=None, frames=2, backward=True)
     assert tracker.seen == [1, 0]
     assert placed.state.frame == 0
     assert placed.state.undo == "track backward from frame 1"
@@ -122,26 +111,21 @@ def test_backward_runs_to_the_first_frame(placed, tracker):
 def test_a_draft_is_tracked_itself(placed, tracker):
     placed.navigation.seek(5)
     assert placed.state.people[0].source is None
-    placed.tracking.start(backward=False, until=6)
-    tracker.let_go(2)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=6, frames=2)
     assert tracker.seen == [5, 6]
 
 
 @pytest.mark.slow
 def test_keyframes_are_taken_as_they_are(placed, tracker):
-    placed.navigation.seek(4)
-    drag(placed, "torso", (0.0, 9.0))
+    drag_on(placed, 4, "torso", (0.0, 9.0))
     keyframe = placed.state.poses[0]
     placed.navigation.seek(2)
     placed.tracking.start(backward=False, until=5)
     np.testing.assert_array_equal(tracker_fixed(placed, tracker)[4][0], keyframe)
-    tracker.let_go(3)  # the shown keyframe is tracked, too: between both, people are tracked both ways
-    wait_for(at(placed, 4))
+    tracker.go_on(placed, 3, at=4)  # the shown keyframe is tracked, too: between both, people are tracked both ways
     assert placed.state.people[0].source == "manual"
     np.testing.assert_array_equal(placed.state.poses[0], keyframe)
-    tracker.let_go(1)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 1)
     cells = placed.stored_poses.timeline()
     assert cells[4]["keyframe"]
     assert (cells[4]["source"], cells[5]["source"]) == ("manual", "tracked")
@@ -157,12 +141,9 @@ def test_a_run_takes_the_chosen_stride_and_cameras(placed, tracker):
     names = placed.session.camera_names
     alone = placed.state.settings
     placed.tracking.choose(RunChoices(stride=3, cameras=(names[1], names[3])))
-    placed.tracking.start(backward=False, until=9)
-    tracker.let_go(1)
-    wait_for(at(placed, 5))
+    tracker.track(placed, until=9, frames=1, at=5)
     assert None not in placed.state.view_costs_px  # the cost of a pose is that in all cameras
-    tracker.let_go(1)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 1)
     assert tracker.seen == [5, 8]
     observer = tracker.run.observer
     assert [c.camera.name for c in observer.cameras] == [names[1], names[3]]
@@ -174,20 +155,15 @@ def test_a_run_takes_the_chosen_stride_and_cameras(placed, tracker):
 
 
 def test_a_run_over_keyframes_alone_is_no_entry(placed, tracker):
-    placed.navigation.seek(3)
-    drag(placed, "torso", (0.0, 9.0))
+    drag_on(placed, 3, "torso", (0.0, 9.0))
     placed.navigation.seek(2)
-    placed.tracking.start(backward=False, until=3)
-    tracker.let_go(1)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=3, frames=1)
     assert placed.state.undo == "drag torso, frame 3"
 
 
 @pytest.mark.slow
 def test_pause_and_go_on_are_one_entry(placed, tracker, session):
-    placed.tracking.start(backward=False, until=8)
-    tracker.let_go(2)
-    wait_for(at(placed, 4))
+    tracker.track(placed, until=8, frames=2, at=4)
     end_the_step_soon(tracker)
     placed.tracking.pause()
     assert not placed.state.track.running
@@ -197,8 +173,7 @@ def test_pause_and_go_on_are_one_entry(placed, tracker, session):
     store.close()
     placed.navigation.seek(3)
     placed.tracking.resume()
-    tracker.let_go(3)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 3)
     assert tracker.seen == [3, 4, 5, 6, 7, 8]
     assert placed.state.frame == 8
     placed.history.undo()
@@ -207,9 +182,7 @@ def test_pause_and_go_on_are_one_entry(placed, tracker, session):
 
 @pytest.mark.slow
 def test_stop_ends_a_run_and_keeps_what_it_found(placed, tracker):
-    placed.tracking.start(backward=False, until=None)
-    tracker.let_go(3)
-    wait_for(at(placed, 5))
+    tracker.track(placed, until=None, frames=3, at=5)
     end_the_step_soon(tracker)
     placed.activities.stop()
     assert placed.state.track.first is None
@@ -224,21 +197,17 @@ def test_stop_ends_a_run_and_keeps_what_it_found(placed, tracker):
 
 def test_looking_around_does_not_stop_a_run(placed, tracker, monkeypatch):
     monkeypatch.setattr("app.control.tracking.tracking._SAVE_S", 1e9)
-    placed.tracking.start(backward=False, until=None)
-    tracker.let_go(3)
-    wait_for(at(placed, 5))
+    tracker.track(placed, until=None, frames=3, at=5)
     placed.navigation.seek(4)  # tracked, and not written of its own accord
     assert not placed.state.follow
     assert placed.state.people[0].status == "doubtful"
-    tracker.let_go(2)
-    wait_for(at(placed, 7))
+    tracker.go_on(placed, 2, at=7)
     assert placed.state.frame == 4
     assert placed.state.track.running
     placed.tracking.follow(True)
     assert placed.state.frame == 7
     assert placed.state.people[0].source == "tracked"
-    tracker.let_go(1)
-    wait_for(at(placed, 8))
+    tracker.go_on(placed, 1, at=8)
     assert placed.state.frame == 8
 
 
@@ -250,9 +219,7 @@ def test_seeking_while_nothing_runs_leaves_following_as_it_is(placed):
 @pytest.mark.slow
 @pytest.mark.parametrize("edit", ["drag", "set", "search", "undo"])
 def test_edits_stop_a_run(placed, tracker, edit):
-    placed.tracking.start(backward=False, until=None)
-    tracker.let_go(3)
-    wait_for(at(placed, 5))
+    tracker.track(placed, until=None, frames=3, at=5)
     end_the_step_soon(tracker)
     {
         "drag": lambda: drag(placed, "left_knee", (3.0, 3.0)),
@@ -274,9 +241,7 @@ def test_edits_stop_a_run(placed, tracker, edit):
 
 @pytest.mark.slow
 def test_undo_goes_to_the_nearest_frame_of_the_run(placed, tracker):
-    placed.tracking.start(backward=False, until=6)
-    tracker.let_go(4)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=6, frames=4)
     for here, there in ((30, 6), (4, 4), (0, 3)):
         placed.navigation.seek(here)
         placed.history.undo()
@@ -286,9 +251,7 @@ def test_undo_goes_to_the_nearest_frame_of_the_run(placed, tracker):
 
 @pytest.mark.slow
 def test_a_hand_takes_hold_of_the_frame_that_it_saw(placed, tracker):
-    placed.tracking.start(backward=False, until=None)
-    tracker.let_go(4)
-    wait_for(at(placed, 6))
+    tracker.track(placed, until=None, frames=4, at=6)
     end_the_step_soon(tracker)
     placed.dragging.begin(PAGE, FRONT, 0, "torso", (320.0, 240.0), frame=4)
     assert placed.state.frame == 4
@@ -305,9 +268,7 @@ def test_a_run_writes_no_more_often_than_it_should(placed, tracker, monkeypatch)
         real = getattr(AnnotationStore, name)
         monkeypatch.setattr(AnnotationStore, name, lambda *a, real=real, **k: written.append(1) or real(*a, **k))
     began = time.monotonic()
-    placed.tracking.start(backward=False, until=None)
-    tracker.let_go(47)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=None, frames=47)
     assert len(placed.stored_poses.timeline()) == 48
     assert len(written) <= 2 + (time.monotonic() - began) / 0.5
 
@@ -322,9 +283,7 @@ def test_an_impossible_run_has_a_sentence(tracker, controller):
 
 def test_a_tracker_that_fails_says_so_and_loses_nothing(placed, tracker):
     tracker.fails_at = 6
-    placed.tracking.start(backward=False, until=None)
-    tracker.let_go(4)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=None, frames=4)
     assert placed.state.track.message == "stopped, because the tracker failed: no light: 3 frames, 1 doubtful"
     assert placed.state.track.failed
     assert set(placed.stored_poses.timeline()) == {2, 3, 4, 5}
@@ -339,22 +298,17 @@ def test_an_edit_refused_by_a_full_disk_is_written_later(placed, tracker, monkey
 
     monkeypatch.setattr(AnnotationStore, "commit", full)
     monkeypatch.setattr("app.control.tracking.tracking._SAVE_S", 0.0)
-    placed.tracking.start(backward=False, until=6)
-    tracker.let_go(2)
-    wait_for(at(placed, 4))
+    tracker.track(placed, until=6, frames=2, at=4)
     assert placed.state.save_error == "the disk is full; make room"
     monkeypatch.setattr(AnnotationStore, "commit", real)
-    tracker.let_go(2)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 2)
     assert placed.state.save_error is None
     assert set(placed.stored_poses.timeline()) == {2, 3, 4, 5, 6}
 
 
 @pytest.mark.slow
 def test_a_run_survives_a_restart(placed, tracker, opened):
-    placed.tracking.start(backward=False, until=6)
-    tracker.let_go(4)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=6, frames=4)
     controller = opened()
     controller.navigation.seek(4)
     assert (controller.state.people[0].status, controller.state.people[0].remark) == ("doubtful", "left arm relocated")
@@ -375,12 +329,9 @@ def test_the_estimate_of_all_frames_takes_the_place_of_what_was_tracked(placed, 
     """The frame that is looked at shows its estimated pose, and one undo takes back all of the run."""
     seen = []
     placed.subscribe(lambda state: seen.append(state.track))
-    placed.tracking.start(backward=False, until=9)
-    tracker.let_go(7)
-    wait_for(at(placed, 9))
+    tracker.track(placed, until=9, frames=7, at=9)
     forward = dict(tracker.last)
-    tracker.let_go(7)
-    wait_for(lambda: placed.state.track.message)
+    tracker.go_on(placed, 7)
     assert tracker.seen == [*range(3, 10), *range(9, 2, -1)]
     stages = [(t.stage, t.done, t.total) for t in seen if t.stage != "tracking"]
     assert sorted(set(stages), key=stages.index) == [
@@ -408,9 +359,7 @@ def test_the_estimate_of_all_frames_takes_the_place_of_what_was_tracked(placed, 
 @pytest.mark.slow
 def test_the_estimate_of_all_frames_can_be_switched_off(placed, tracker, estimate):
     placed.search.set_settings(replace(placed.state.settings, whole_run=False))
-    placed.tracking.start(backward=False, until=9)
-    tracker.let_go(7)
-    wait_for(lambda: placed.state.track.message)
+    tracker.track(placed, until=9, frames=7)
     assert (estimate.asked, tracker.seen) == ([], [*range(3, 10)])
     assert placed.state.track.message == "done: 7 frames, 1 doubtful, 1 lost"
 
@@ -424,8 +373,7 @@ def test_a_run_that_is_over_leaves_nothing_to_the_collector_of_cycles(placed, tr
     try:
         placed.tracking.start(backward=False, until=4)
         run = weakref.ref(placed.tracking._run.session)
-        tracker.let_go(1)
-        wait_for(at(placed, 3))
+        tracker.go_on(placed, 1, at=3)
         if is_stopped:
             end_the_step_soon(tracker)
             placed.tracking.stop()

@@ -42,13 +42,19 @@ def problems(plan):
     return " | ".join(map(str, plan.problems))
 
 
+def accepted(session, path, **choices):
+    """Plan an import that has no problems."""
+    plan = planned(session, path, **choices)
+    assert not plan.problems, problems(plan)
+    return plan
+
+
 def in_space(session, observations):
     return observed_joints(observations, [c.camera for c in session.cameras]).joints_world
 
 
 def test_key_points_are_stored_and_triangulated(session, keypoints):
-    plan = planned(session, keypoints)
-    assert not plan.problems
+    plan = accepted(session, keypoints)
     store_import(session, plan)
     assert list_observations(session) == ["mp"]
     observations = load_observations(load_session(session.folder), "mp")
@@ -69,8 +75,7 @@ def test_several_people_are_told_apart(tmp_path):
     points = seen(session, motions)
     points[4:, 1] = points[4:, 1, ::-1]
     points[6, 2, 0] = (np.nan, np.nan, 0)
-    plan = planned(session, write_openpose(tmp_path / "k", session.camera_names, points))
-    assert not plan.problems
+    plan = accepted(session, write_openpose(tmp_path / "k", session.camera_names, points))
     found = in_space(session, plan.observations)
     order = [0, 1] if np.abs(found[0, 0] - motions[0][0]).max() < 0.01 else [1, 0]
     assert np.abs(found[:, order] - np.stack(motions, axis=1)).max() < 1e-3
@@ -100,8 +105,7 @@ def test_cameras_are_found_by_the_names_of_folders_and_files(session, keypoints,
                 file.rename(file.with_name(file.name.removeprefix(f"{name}_")))
         else:
             shutil.copytree(keypoints / name, other / "pose" / name)
-    plan = planned(session, other)
-    assert not plan.problems
+    plan = accepted(session, other)
     assert np.abs(in_space(session, plan.observations)[:, 0] - TRUTH).max() < 1e-4
 
 
@@ -141,8 +145,7 @@ def test_files_that_contradict_the_session_are_previewed_and_refused(session, tm
 def test_choices_accept_what_would_be_refused(session, tmp_path):
     points = seen(session, [TRUTH])
     halves = write_openpose(tmp_path / "half", session.camera_names, points[3:9] * [0.5, 0.5, 0])
-    plan = planned(session, halves, first_frame=3, confidence=1.0, picture_size=(320, 240))
-    assert not plan.problems
+    plan = accepted(session, halves, first_frame=3, confidence=1.0, picture_size=(320, 240))
     found = plan.observations.points
     assert np.flatnonzero(found.is_known.any(axis=(1, 2, 3))).tolist() == [*range(3, 9)]
     assert found.confidence.max() == 1.0
@@ -152,8 +155,7 @@ def test_choices_accept_what_would_be_refused(session, tmp_path):
 
 def test_missing_pictures_are_named_and_nothing_shifts(session, keypoints):
     (keypoints / "cam1" / "cam1_000000000004_keypoints.json").unlink()
-    plan = planned(session, keypoints)
-    assert not plan.problems
+    plan = accepted(session, keypoints)
     assert "camera 'cam1': no picture for frames 4; the points are absent there" in plan.observations.notes
     known = plan.observations.points.is_known.any(axis=(2, 3))
     assert np.argwhere(~known).tolist() == [[4, 1]]
@@ -168,8 +170,7 @@ def test_numbers_count_the_footage_from_0_or_1_and_offsets_are_taken_off(tmp_pat
         write_openpose(folder, ["cam0", "cam2", "cam3"], points[:, [0, 2, 3]], first)
         early = np.concatenate([points[:2, 1:2] * 0, points[:, 1:2]])
         write_openpose(folder, ["cam1"], early, first)
-        plan = planned(session, folder)
-        assert not plan.problems, problems(plan)
+        plan = accepted(session, folder)
         assert np.abs(in_space(session, plan.observations)[:, 0] - TRUTH).max() < 1e-4
         assert any("count pictures from 1" in n for n in plan.observations.notes) == bool(first)
 
@@ -180,8 +181,7 @@ def test_a_skeleton_without_names_can_be_listed_by_hand(session, tmp_path):
         'points = ["a", "b", "c"]\nleft_wrist = "b"\n[means]\nc = ["left_hip", "right_hip"]'
     )
     folder = write_openpose(tmp_path / "k", session.camera_names, points)
-    plan = planned(session, folder, joint_map=tmp_path / "map.toml")
-    assert not plan.problems
+    plan = accepted(session, folder, joint_map=tmp_path / "map.toml")
     assert plan.observations.counterparts == {"a": (), "b": ("left_wrist",), "c": ("left_hip", "right_hip")}
     (tmp_path / "map.toml").write_text('points = ["a", "b"]\nleft_wrist = "b"\n')
     assert "the 2 points that the joint map map.toml lists, found 3" in problems(
@@ -191,8 +191,7 @@ def test_a_skeleton_without_names_can_be_listed_by_hand(session, tmp_path):
 
 def test_points_in_space(session, tmp_path):
     write_trc(tmp_path / "a.trc", BODY_25.points, TRUTH, 30.0)
-    plan = planned(session, tmp_path / "a.trc")
-    assert not plan.problems
+    plan = accepted(session, tmp_path / "a.trc")
     store_import(session, plan)
     observations = load_observations(session, "mp")
     assert observations.points is None
@@ -225,15 +224,13 @@ def test_rows_that_are_missing_are_named(session, tmp_path):
 
 def test_rows_beyond_the_session_are_left_out_if_the_user_places_them(session, tmp_path):
     write_trc(tmp_path / "a.trc", BODY_25.points, np.concatenate([TRUTH, TRUTH]), 30.0)
-    plan = planned(session, tmp_path / "a.trc", first_frame=0)
-    assert not plan.problems
+    plan = accepted(session, tmp_path / "a.trc", first_frame=0)
     assert "a.trc: 12 rows lie outside of the session and were left out" in plan.observations.notes
 
 
 def test_another_rate_is_resampled_and_named(session, tmp_path):
     write_trc(tmp_path / "a.trc", BODY_25.points, np.repeat(TRUTH, 4, axis=0)[:45], 120.0)
-    plan = planned(session, tmp_path / "a.trc")
-    assert not plan.problems
+    plan = accepted(session, tmp_path / "a.trc")
     assert any("resampled from 120 to 30" in n for n in plan.observations.notes)
     assert np.allclose(plan.observations.row_frames, np.arange(45) / 4)
 
@@ -254,8 +251,7 @@ def test_one_file_for_each_person(tmp_path):
 def test_people_of_one_file_are_known_by_name(tmp_path, kind, names):
     session = make_session(tmp_path / "s", N, people=("BEN", "ann"))
     path = write_joints(kind, tmp_path, BODY_25.points, np.stack([TRUTH, TRUTH + 0.2]))
-    plan = planned(session, path)
-    assert not plan.problems
+    plan = accepted(session, path)
     ben, ann = np.moveaxis(plan.observations.joints.joints_world, 1, 0)
     assert np.abs(ann - TRUTH).max() < 1e-5
     assert np.abs(ben - TRUTH - 0.2).max() < 1e-5
@@ -302,8 +298,7 @@ def test_our_own_tables_of_motion_are_read_back(tmp_path):
 
 @pytest.mark.parametrize("kind", ["npy", "easymocap"])
 def test_joints_without_names_are_known_by_their_number(session, tmp_path, kind):
-    plan = planned(session, write_joints(kind, tmp_path, BODY_25.points, TRUTH[None]), unit_m=1.0)
-    assert not plan.problems
+    plan = accepted(session, write_joints(kind, tmp_path, BODY_25.points, TRUTH[None]), unit_m=1.0)
     assert plan.observations.joint_map.name == "BODY_25"
     assert plan.observations.point_names == BODY_25.points
     other = planned(session, write_joints(kind, tmp_path / "b", range(23), TRUTH[None, :, :23]), unit_m=1.0)
@@ -314,8 +309,7 @@ def test_numbered_points_that_appear_late_or_never(session, tmp_path):
     points = TRUTH.copy()
     points[:2, 0] = np.nan
     points[:, 20] = np.nan
-    plan = planned(session, write_joints("caliscope", tmp_path, BODY_25.points, points[None]), unit_m=1.0)
-    assert not plan.problems
+    plan = accepted(session, write_joints("caliscope", tmp_path, BODY_25.points, points[None]), unit_m=1.0)
     assert plan.observations.point_names == BODY_25.points
     assert np.nanmax(np.abs(plan.observations.joints.joints_world[:, 0] - points)) < 1e-5
 
@@ -328,8 +322,7 @@ def test_hands_after_a_body_without_names(session, tmp_path, kind):
     for joint, marker in body.markers.items():
         if joint in BODY_25.markers:
             points[:, body.points.index(marker)] = TRUTH[:, BODY_25.points.index(BODY_25.markers[joint])]
-    plan = planned(session, write_joints(kind, tmp_path, range(points.shape[1]), points[None]), unit_m=1.0)
-    assert not plan.problems
+    plan = accepted(session, write_joints(kind, tmp_path, range(points.shape[1]), points[None]), unit_m=1.0)
     assert plan.observations.point_names[:33] == body.points
     assert "120" in plan.observations.point_names
     wrist = plan.observations.point_names.index("left_wrist")

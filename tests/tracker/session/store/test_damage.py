@@ -1,12 +1,11 @@
 """What is wrong with a store is found when it is opened, and one sentence says what to do."""
 
 import shutil
-import sqlite3
 from contextlib import closing
-from pathlib import Path
 
 import numpy as np
 import pytest
+from damage import altered, old_store
 
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.session.store import backups
@@ -28,13 +27,6 @@ def path(tmp_path):
         store.undo()
         store.redo()
     return path
-
-
-def altered(path, statement, *parameters):
-    """Change a store as a disk does, without the program's checksums."""
-    with closing(sqlite3.connect(path)) as db:
-        db.execute(statement, parameters)
-        db.commit()
 
 
 @pytest.mark.slow
@@ -62,7 +54,7 @@ def altered(path, statement, *parameters):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_a_change_that_the_program_did_not_make_is_found(path, statement, parameters, read_only):
     AnnotationStore(path, read_only=read_only).close()  # as it was written
-    altered(path, statement, *parameters)
+    altered(path, statement, parameters=parameters)
     with pytest.raises(DamagedStoreError, match=r"annotations .*annotations\.sqlite are damaged: .*written"):
         AnnotationStore(path, read_only=read_only)
 
@@ -101,20 +93,15 @@ def test_a_truncated_file_is_damaged(path, size):
 
 def test_definitions_that_are_no_text(path):
     """SQLite quotes them in its message, which Python cannot decode."""
-    with closing(sqlite3.connect(path)) as db:
-        db.execute("PRAGMA writable_schema = ON")
-        db.execute("UPDATE sqlite_master SET name = CAST(x'7FEB16F4' AS TEXT), sql = 'CREATE' WHERE name = 'poses'")
-        db.commit()
+    named = "UPDATE sqlite_master SET name = CAST(x'7FEB16F4' AS TEXT), sql = 'CREATE' WHERE name = 'poses'"
+    altered(path, "PRAGMA writable_schema = ON", named)
     with pytest.raises(DamagedStoreError):
         AnnotationStore(path)
 
 
 def test_a_damaged_pose_of_an_older_version_is_found_before_the_upgrade(tmp_path):
-    path = tmp_path / "annotations.sqlite"
-    with closing(sqlite3.connect(path)) as db:
-        db.executescript(Path(__file__).with_name("store_version_3.sql").read_text("utf-8"))
-        db.execute("UPDATE pose_changes SET sources = x'FF00' WHERE frame = 3")
-        db.commit()
+    path = old_store(tmp_path / "annotations.sqlite", 3)
+    altered(path, "UPDATE pose_changes SET sources = x'FF00' WHERE frame = 3")
     before = path.read_bytes()
     for read_only in (True, False):
         with pytest.raises(DamagedStoreError, match="the pose of 'ann' in frame 3 cannot be read"):

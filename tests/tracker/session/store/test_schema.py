@@ -1,9 +1,9 @@
 import sqlite3
 from contextlib import closing
-from pathlib import Path
 
 import numpy as np
 import pytest
+from damage import altered, old_store
 
 from tracker.annotation.plan import decide, read_tasks
 from tracker.body.searches import Search
@@ -25,37 +25,36 @@ def xs(store):
     return {row.frame: store.pose("ann", row.frame).values[0] for row in store.frames("ann")}
 
 
-def written(path, script):
-    with closing(sqlite3.connect(path)) as db:
-        db.executescript(Path(__file__).with_name(script).read_text("utf-8"))
-    return path
-
-
 def upgraded(path, version, change):
     """Bring a store to the next version, as the program of that version did, and change it there."""
-    with closing(sqlite3.connect(path)) as db:
-        for statement in (*schema._UPGRADES[version], change, f"PRAGMA user_version = {version + 1}"):
-            db.execute(statement)
-        db.commit()
+    altered(path, *schema._UPGRADES[version], change, f"PRAGMA user_version = {version + 1}")
     return path
 
 
-@pytest.fixture
-def version_1(path):
-    """A store as its version 1 was written: four edits, one amended and the last undone."""
-    return written(path, "store_version_1.sql")
+def as_written(version):
+    return pytest.fixture(lambda path: old_store(path, version))
+
+
+version_1 = as_written(1)
+"""Four edits, one amended and the last undone."""
+version_3 = as_written(3)
+"""A keyframe, two tracked frames, one cleared and brought back by undo."""
+version_6 = as_written(6)
+"""With checksums: a keyframe and two tracked frames."""
+version_7 = as_written(7)
+"""With limbs: a keyframe and two tracked frames."""
+version_8 = as_written(8)
+"""With errors: a keyframe and two tracked frames."""
+version_9 = as_written(9)
+"""Four edits of two authors, one an audit and the last undone."""
+version_10 = as_written(10)
+"""A keyframe that was verified, and a task without a pose."""
 
 
 @pytest.fixture
 def version_2(version_1):
     """The same store as the program of version 2 has left it, its poses with their settings."""
     return upgraded(version_1, 1, "UPDATE pose_changes SET settings = '{\"step_deg\": 7}'")
-
-
-@pytest.fixture
-def version_3(path):
-    """A store as its version 3 was written: a keyframe, two tracked frames, one cleared and brought back by undo."""
-    return written(path, "store_version_3.sql")
 
 
 @pytest.fixture
@@ -69,36 +68,6 @@ def version_5(version_4):
     """The same store as the program of version 5 has left it, one pose with an alternative."""
     numbers = np.array([3.5, 2.0]).tobytes().hex()
     return upgraded(version_4, 4, f"INSERT INTO alternatives VALUES (3, 0, 1, X'{numbers}', 2.0)")
-
-
-@pytest.fixture
-def version_6(path):
-    """A store as its version 6 was written, with checksums: a keyframe and two tracked frames."""
-    return written(path, "store_version_6.sql")
-
-
-@pytest.fixture
-def version_7(path):
-    """A store as its version 7 was written, with limbs: a keyframe and two tracked frames."""
-    return written(path, "store_version_7.sql")
-
-
-@pytest.fixture
-def version_8(path):
-    """A store as its version 8 was written, with errors: a keyframe and two tracked frames."""
-    return written(path, "store_version_8.sql")
-
-
-@pytest.fixture
-def version_9(path):
-    """A store as its version 9 was written: four edits of two authors, one an audit and the last undone."""
-    return written(path, "store_version_9.sql")
-
-
-@pytest.fixture
-def version_10(path):
-    """A store as its version 10 was written: a keyframe that was verified, and a task without a pose."""
-    return written(path, "store_version_10.sql")
 
 
 @pytest.mark.parametrize("read_only", [False, True])
@@ -119,9 +88,7 @@ def test_a_store_of_version_10_takes_poses_of_decisions_and_is_still_checked(ver
     decide(store, ("ann", 1), "verified")
     assert len(store.tasks.states()[-1].pose) == 32
     store.close()
-    with closing(sqlite3.connect(version_10)) as db:
-        db.execute("UPDATE task_states SET pose = NULL")
-        db.commit()
+    altered(version_10, "UPDATE task_states SET pose = NULL")
     with pytest.raises(DamagedStoreError, match="rows of 'task_states'"):
         AnnotationStore(version_10)
 
@@ -244,9 +211,7 @@ def test_a_store_of_version_6_takes_limbs_and_is_still_checked(version_6):
 
 
 def test_damage_of_a_store_of_version_6_is_found_before_it_is_upgraded(version_6):
-    with closing(sqlite3.connect(version_6)) as db:
-        db.execute("UPDATE pose_changes SET keyframe = 1 - keyframe WHERE frame = 1")
-        db.commit()
+    altered(version_6, "UPDATE pose_changes SET keyframe = 1 - keyframe WHERE frame = 1")
     with pytest.raises(DamagedStoreError, match="ann, frame 1"):
         AnnotationStore(version_6)
 
@@ -408,8 +373,6 @@ def test_upgrade_is_whole_or_not_at_all(version_1, monkeypatch):
 
 def test_newer_version(path):
     AnnotationStore(path).close()
-    db = sqlite3.connect(path)
-    db.execute(f"PRAGMA user_version = {VERSION + 1}")
-    db.close()
+    altered(path, f"PRAGMA user_version = {VERSION + 1}")
     with pytest.raises(SessionError, match=f"version {VERSION + 1}.*upgrade"):
         AnnotationStore(path)

@@ -84,14 +84,27 @@ def store(session, bodies, edited=(EDITED,), joints=None, person="ann"):
 
 
 def imported(session, path, **choices):
-    plan = plan_import(session, ImportRequest("mp", (path,), ("ann",), **choices))
+    return stored_as_asked(session, ImportRequest("mp", (path,), ("ann",), **choices))
+
+
+def stored_as_asked(session, request):
+    plan = plan_import(session, request)
     assert not plan.problems, plan.problems
     store_import(session, plan)
     return load_observations(session, "mp")
 
 
+def sent_back(session, bodies, path, out, joints=None, **choices):
+    """Store poses beside imported observations, and export them as they came."""
+    observations = imported(session, path)
+    store(session, bodies, joints=joints)
+    return export_like(session, observations, out, **choices)
+
+
 def write_kind(kind, session, folder, truth):
     """Write observations of a format; return the path to import and the choices."""
+    if kind in NEEDS:
+        pytest.importorskip(NEEDS[kind])
     points = seen(session, [truth])
     if kind == "openpose":
         return write_openpose(folder / "k", session.camera_names, points), {}
@@ -103,14 +116,10 @@ def write_kind(kind, session, folder, truth):
         for v, name in enumerate(session.camera_names):
             write_deeplabcut(folder / "d" / name, BODY_25.points, points[:, v], kind.removeprefix("dlc "))
         return folder / "d", {}
-    if kind == "sleap":
+    if kind in ("sleap", "nwb"):
         for v, name in enumerate(session.camera_names):
-            write_sleap(folder / "sl" / f"{name}.slp", BODY_25.points, points[:, v])
-        return folder / "sl", {}
-    if kind == "nwb":
-        for v, name in enumerate(session.camera_names):
-            write_sleap(folder / "nwb" / f"{name}.nwb", BODY_25.points, points[:, v])
-        return folder / "nwb", {}
+            write_sleap(folder / kind / f"{name}{SUFFIXES[kind]}", BODY_25.points, points[:, v])
+        return folder / kind, {}
     if kind == "trc":
         write_trc(folder / "a.trc", BODY_25.points, truth, 30.0, units="mm")
         return folder / "a.trc", {}
@@ -147,8 +156,6 @@ def contents(folder):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_untouched_files_leave_as_they_came(session, tmp_path, kind):
-    if kind in NEEDS:
-        pytest.importorskip(NEEDS[kind])
     path, choices = write_kind(kind, session, tmp_path, observed(session, poses(session)))
     before = contents(path) if path.is_dir() else path.read_bytes()
     observations = imported(session, path, **choices)
@@ -160,15 +167,12 @@ def test_untouched_files_leave_as_they_came(session, tmp_path, kind):
 
 @pytest.mark.parametrize("kind", ["trc", "trc utf-16", "csv", "c3d"])
 def test_a_mended_frame_alone_differs_in_space(session, tmp_path, kind, bodies):
-    if kind in NEEDS:
-        pytest.importorskip(NEEDS[kind])
     truth = observed(session, bodies)
     wrong = truth.copy()
     wrong[EDITED] += 0.2
     path, _ = write_kind(kind, session, tmp_path, wrong)
-    store(session, bodies)
     out = tmp_path / f"back{path.suffix}"
-    done = export_like(session, imported(session, path), out)
+    done = sent_back(session, bodies, path, out)
     assert done.frames == (EDITED,)
     before, after = read_space(path), read_space(out)
     assert before.names == after.names
@@ -190,8 +194,8 @@ def test_a_mended_frame_alone_differs_in_space(session, tmp_path, kind, bodies):
 @pytest.mark.parametrize("kind", ["openpose", "trc"])
 def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind, bodies):
     path, _ = write_kind(kind, session, tmp_path, observed(session, bodies) + 0.2)
-    store(session, bodies, joints=("left_elbow", "right_hip"))
-    done = export_like(session, imported(session, path), tmp_path / f"back{path.suffix}", learn_offsets=False)
+    out, joints = tmp_path / f"back{path.suffix}", ("left_elbow", "right_hip")
+    done = sent_back(session, bodies, path, out, joints, learn_offsets=False)
     assert done.frames == (EDITED,)
     if kind == "trc":
         before, after = read_trc(path).points[EDITED], read_trc(done.paths[0]).points[EDITED]
@@ -206,8 +210,7 @@ def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind, bo
 def test_offsets_are_learnt_or_plain(session, tmp_path, learn, bodies):
     truth = observed(session, bodies)
     write_trc(tmp_path / "a.trc", BODY_25.points, truth, 30.0)
-    store(session, bodies)
-    export_like(session, imported(session, tmp_path / "a.trc"), tmp_path / "b.trc", learn_offsets=learn)
+    sent_back(session, bodies, tmp_path / "a.trc", tmp_path / "b.trc", learn_offsets=learn)
     knee = BODY_25.points.index("LKnee")
     off = np.linalg.norm(read_trc(tmp_path / "b.trc").points[EDITED, knee] - truth[EDITED, knee])
     assert off < 0.01 if learn else off == pytest.approx(0.03, abs=1e-4)
@@ -217,8 +220,7 @@ def test_offsets_are_learnt_or_plain(session, tmp_path, learn, bodies):
 def test_a_mended_frame_alone_differs_in_pictures(session, tmp_path, kind, bodies):
     truth = observed(session, bodies, np.zeros(3))
     path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
-    store(session, bodies)
-    done = export_like(session, imported(session, path), tmp_path / "back")
+    done = sent_back(session, bodies, path, tmp_path / "back")
     assert done.frames == (EDITED,)
     before, after = contents(path), contents(tmp_path / "back")
     knee = BODY_25.points.index("LKnee")
@@ -257,11 +259,9 @@ def numbers_of(path):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [*SUFFIXES])
 def test_mended_points_of_hdf5_alone_differ(session, tmp_path, kind, bodies):
-    pytest.importorskip(NEEDS[kind])
     truth = observed(session, bodies, np.zeros(3))
     path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
-    store(session, bodies, joints=("left_hip",))
-    done = export_like(session, imported(session, path), tmp_path / "back")
+    done = sent_back(session, bodies, path, tmp_path / "back", ("left_hip",))
     assert done.frames == (EDITED,)
     assert len(done.changed) == len(session.cameras)
     names, knee, suffix = BODY_25.points, BODY_25.points.index("LKnee"), SUFFIXES[kind]
@@ -371,8 +371,7 @@ def test_points_of_other_hdf5_files_are_not_replaced(tmp_path):
 def test_mended_points_of_coco_alone_differ(session, tmp_path, kind, bodies):
     truth = observed(session, bodies, np.zeros(3))
     path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
-    store(session, bodies, joints=("left_hip",))
-    done = export_like(session, imported(session, path), tmp_path / "back.json")
+    done = sent_back(session, bodies, path, tmp_path / "back.json", ("left_hip",))
     assert done.frames == (EDITED,)
     (one, before), (other, after) = numbers_of(path), numbers_of(tmp_path / "back.json")
     assert {k: v for k, v in one.items() if k != "annotations"} == {
@@ -396,8 +395,7 @@ def test_mended_points_of_coco_alone_differ(session, tmp_path, kind, bodies):
 
 def test_mended_points_of_alphapose_alone_differ(session, tmp_path, bodies):
     write_alphapose(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
-    store(session, bodies)
-    export_like(session, imported(session, tmp_path / "f"), tmp_path / "back")
+    sent_back(session, bodies, tmp_path / "f", tmp_path / "back")
     for camera in session.camera_names:
         name = f"{camera}/alphapose-results.json"
         before, after = (json.loads((tmp_path / folder / name).read_text()) for folder in ("f", "back"))
@@ -407,8 +405,7 @@ def test_mended_points_of_alphapose_alone_differ(session, tmp_path, bodies):
 
 def test_other_columns_of_a_table_stay(session, tmp_path, bodies):
     write_eks(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
-    store(session, bodies)
-    export_like(session, imported(session, tmp_path / "f"), tmp_path / "back")
+    sent_back(session, bodies, tmp_path / "f", tmp_path / "back")
     name = f"multicam_{session.camera_names[1]}_results.csv"
     before, after = ((tmp_path / folder / name).read_text().splitlines() for folder in ("f", "back"))
     assert [a == b for a, b in zip(before, after, strict=True)] == [k != EDITED + 3 for k in range(N + 3)]
@@ -421,9 +418,8 @@ def test_several_files_of_one_picture_are_not_sent_back(session, tmp_path, bodie
     write_openpose(tmp_path / "k", session.camera_names, seen(session, [observed(session, bodies)]))
     for path in [*(tmp_path / "k").rglob("*.json")]:
         path.with_name(path.name.replace("keypoints", "person2")).write_text('{"people": []}')
-    store(session, bodies)
     with pytest.raises(FormatError, match="expected files with one picture each, found several of one"):
-        export_like(session, imported(session, tmp_path / "k"), tmp_path / "back")
+        sent_back(session, bodies, tmp_path / "k", tmp_path / "back")
 
 
 def test_programs_to_which_nothing_is_sent_back(session, tmp_path, bodies):
@@ -443,8 +439,7 @@ def test_a_person_is_added_to_coco_and_read_again(session, tmp_path, kind, bodie
     missing = next(a for a in data["annotations"] if a["image_id"] == N + EDITED + 1)  # the second camera
     data["annotations"].remove(missing)
     path.write_text(json.dumps(data))
-    store(session, bodies)
-    export_like(session, imported(session, path), tmp_path / "back.json")
+    sent_back(session, bodies, path, tmp_path / "back.json")
     _, table = read_coco(tmp_path / "back.json")[1]
     assert table.is_found[EDITED, 0, BODY_25.points.index("LKnee")]
     added = json.loads((tmp_path / "back.json").read_text())["annotations"][-1]
@@ -459,43 +454,35 @@ def test_a_count_of_points_follows_those_that_are_gone(session, tmp_path, bodies
     for annotation in data["annotations"]:
         annotation["num_keypoints"] = 25
     path.write_text(json.dumps(data))
-    away = bodies[EDITED].values.copy()
-    away[:2] += 30 * session.cameras[1].camera.T_world_camera[:2, 0]  # far to the right of that camera
-    moved = PosedBody(session.people[0].model, away)
-    store(session, [moved if k == EDITED else b for k, b in enumerate(bodies)])
-    export_like(session, imported(session, path), tmp_path / "back.json")
+    sent_back(session, gone_right(session, bodies), path, tmp_path / "back.json")
     _, after = numbers_of(tmp_path / "back.json")
     gone = after["cam1", f"{EDITED:06d}.jpg"]
     assert gone["num_keypoints"] == sum(v > 0 for v in gone["keypoints"][2::3]) < 25
 
 
-def test_a_person_who_was_not_found_is_added(session, tmp_path, bodies):
-    points = seen(session, [observed(session, bodies, np.zeros(3))])
-    points[EDITED, 1] = (np.nan, np.nan, 0)
-    path = write_openpose(tmp_path / "k", session.camera_names, points)
-    store(session, bodies)
-    export_like(session, imported(session, path), tmp_path / "back")
-    (person,) = read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json")
-    assert len(person.points) == 25
-    assert np.isnan(person.points[0]).tolist() == [True, True, False]  # the nose is no joint of the body
-
-
-def test_nobody_is_added_who_is_not_in_the_picture(session, tmp_path, bodies):
-    points = seen(session, [observed(session, bodies, np.zeros(3))])
-    points[EDITED, 1] = (np.nan, np.nan, 0)
-    path = write_openpose(tmp_path / "k", session.camera_names, points)
-    model = session.people[0].model
+def gone_right(session, bodies):
+    """Return the bodies with that of the edited frame far to the right of the second camera."""
     away = bodies[EDITED].values.copy()
-    away[:2] += 30 * session.cameras[1].camera.T_world_camera[:2, 0]  # far to the right of that camera
-    store(session, [PosedBody(model, away) if k == EDITED else b for k, b in enumerate(bodies)])
-    export_like(session, imported(session, path), tmp_path / "back")
-    assert read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json") == []
+    away[:2] += 30 * session.cameras[1].camera.T_world_camera[:2, 0]
+    moved = PosedBody(session.people[0].model, away)
+    return [moved if k == EDITED else b for k, b in enumerate(bodies)]
+
+
+@pytest.mark.parametrize("is_seen", [True, False])
+def test_a_person_who_was_not_found_is_added_where_the_picture_shows_them(session, tmp_path, bodies, is_seen):
+    points = seen(session, [observed(session, bodies, np.zeros(3))])
+    points[EDITED, 1] = (np.nan, np.nan, 0)
+    path = write_openpose(tmp_path / "k", session.camera_names, points)
+    sent_back(session, bodies if is_seen else gone_right(session, bodies), path, tmp_path / "back")
+    people = read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json")
+    assert [len(person.points) for person in people] == [25] * is_seen
+    for person in people:
+        assert np.isnan(person.points[0]).tolist() == [True, True, False]  # the nose is no joint of the body
 
 
 def test_all_poses(session, tmp_path, bodies):
     write_trc(tmp_path / "a.trc", BODY_25.points, observed(session, bodies), 30.0)
-    store(session, bodies)
-    done = export_like(session, imported(session, tmp_path / "a.trc"), tmp_path / "b.trc", poses="all")
+    done = sent_back(session, bodies, tmp_path / "a.trc", tmp_path / "b.trc", poses="all")
     assert done.frames == tuple(range(N))
 
 
@@ -533,10 +520,7 @@ def test_folders_of_equal_names_stay_apart(session, tmp_path):
         if v == 0:
             (folder / f"{N - 1:06d}_keypoints.json").unlink()
     request = ImportRequest("mp", tuple(folders), ("ann",), first_frame=0)
-    plan = plan_import(session, request)
-    assert not plan.problems, plan.problems
-    store_import(session, plan)
-    found = stored_pictures(session, load_observations(session, "mp"))
+    found = stored_pictures(session, stored_as_asked(session, request))
     assert [(p.camera, len(p.files)) for p in found] == [
         (name, N - (v == 0)) for v, name in enumerate(session.camera_names)
     ]
@@ -547,9 +531,7 @@ def test_a_mark_of_the_byte_order_stays(session, tmp_path, encoding, bodies):
     path, _ = write_kind("openpose", session, tmp_path, observed(session, bodies))
     for file in path.rglob("*.json"):
         file.write_text(file.read_text(), encoding=encoding)
-    observations = imported(session, path)
-    store(session, bodies)
-    done = export_like(session, observations, tmp_path / "back", learn_offsets=False)
+    done = sent_back(session, bodies, path, tmp_path / "back", learn_offsets=False)
     assert done.frames == (EDITED,)
     (one, *_) = sorted((tmp_path / "back").rglob(f"*{EDITED:012d}*.json"))
     assert len(json.loads(one.read_text(encoding=encoding))["people"]) == 1
@@ -563,11 +545,9 @@ def test_each_person_has_the_rows_of_their_own_file(tmp_path):
     paths = (tmp_path / "ann.trc", tmp_path / "bob.trc")
     for path, first in zip(paths, (0, late), strict=True):
         write_trc(path, BODY_25.points, wrong[first:], session.fps, frames=np.arange(first, N))
-    plan = plan_import(session, ImportRequest("mp", paths, ("ann", "bob")))
-    assert not plan.problems, plan.problems
-    store_import(session, plan)
+    observations = stored_as_asked(session, ImportRequest("mp", paths, ("ann", "bob")))
     store(session, bodies, person="bob")
-    export_like(session, load_observations(session, "mp"), tmp_path / "out")
+    export_like(session, observations, tmp_path / "out")
     assert (tmp_path / "out" / "ann.trc").read_bytes() == paths[0].read_bytes()
     before, after = read_trc(paths[1]), read_trc(tmp_path / "out" / "bob.trc")
     moved = np.abs(before.points - after.points).max(axis=(1, 2))
