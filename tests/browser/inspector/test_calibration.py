@@ -1,7 +1,10 @@
 """The section of the calibration: a check, poses of an earlier calibration, and what it asks of the program."""
 
+import msgspec
 import pytest
 from page_driver import shows, until
+
+from app.messages.advice import Action, Advice, AdviceMessage
 
 SIGMA = {
     "rotation_deg": [0.03, 0.03, 0.2],
@@ -60,6 +63,19 @@ async def test_a_check_names_the_camera_and_what_mends_it(page, endpoint, sectio
     await endpoint.broadcast(CHECKED | {"refused": "expected other frames to fit better, found 2 of 11"})
     await shows(page, "document.querySelector('[data-section=calibration]').innerText.includes('found 2 of 11.')")
     assert await section.get_by_role("button", name="Apply").is_disabled()
+
+
+async def test_a_check_that_the_line_began_opens_its_result_in_sight(page, endpoint):
+    await page.set_viewport_size({"width": 1100, "height": 680})
+    doubt = Advice("camera_doubt", "LEFT seems turned.", (Action("check_cameras", "Check the cameras"),), "doubt")
+    await endpoint.broadcast(msgspec.to_builtins(AdviceMessage((doubt,))))
+    await page.locator("#advice [data-deed=check_cameras]").click()
+    await until(lambda: endpoint.received[-1] == {"type": "calibration_check", "action": "start"})
+    await endpoint.broadcast(CHECKED | {"is_checked": False, "cameras": [], "sentences": [], "running": True})
+    await endpoint.broadcast(CHECKED)
+    await shows(page, "document.querySelector('.calibration-cameras')")
+    table = await page.locator(".calibration-cameras").bounding_box()
+    assert (table["y"] >= 0, table["y"] + table["height"] <= 680) == (True, True)
 
 
 async def test_lost_frames_are_named_in_place_of_a_time(page, endpoint, section):
