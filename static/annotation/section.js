@@ -24,7 +24,7 @@ export function annotationSection(context, review, visits) {
   const leave = textButton("Withdraw", "Take this frame out of the plan", () => review.withdraw(), { id: "plan-withdraw" });
   const buttons = make("div", "plan-buttons", next, accept, refuse, leave);
   const here = make("p", "section-note");
-  const reason = lineForm("What is to be corrected", "Reject", (text) => {
+  const reason = lineForm("Correction to be made", "Reject", (text) => {
     reason.form.hidden = true;
     review.reject(text);
   });

@@ -50,7 +50,7 @@ export function importForm(store, paths, discard) {
   const take = textButton("Import", "Store these files with the session", () => void store_(), { className: "is-primary" });
   const cancel = textButton("Cancel", "Forget these files", () => reset());
   const result = make("div", { className: "import-result", role: "status" });
-  const further = make("details", {}, make("summary", { title: "First frame, offsets, size of the pictures, confidence, names, axes and unit" }, "Where the files do not tell"), first.label, late.label, size.label, confidence.label, skeleton.label, axes.label, units.label, unusual);
+  const further = make("details", {}, make("summary", { title: "First frame, offsets, size of the pictures, confidence, names, axes and unit" }, "Details that the files lack"), first.label, late.label, size.label, confidence.label, skeleton.label, axes.label, units.label, unusual);
   form.append(path.label, name.label, people, further, make("div", "acquisition-work", check, take, cancel), result);
   fold.append(head, form);
   paths.completes(path.input);

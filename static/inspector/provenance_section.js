@@ -100,7 +100,7 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
   return {
     id: "provenance",
     title: "Provenance",
-    hint: "Who or what made this pose and each joint; filter the timeline by it",
+    hint: "Origin of this pose and of each joint; filter the timeline by it",
     body,
     bindings(reveal) {
       const choice = (/** @type {string} */ label, /** @type {import("../model/provenance.js").Filter | null} */ wanted) =>

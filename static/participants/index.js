@@ -30,7 +30,7 @@ export function mount(context) {
     document.documentElement.dataset.place = String(session?.has_place ?? true);
   });
   const bindings = inArea("People", [
-    { keys: ["Alt E"], label: "Who is here, and your name", words: "join participants", run: () => here.toggle() },
+    { keys: ["Alt E"], label: "People on this session, and your name", words: "join participants", run: () => here.toggle() },
   ]);
   return { bindings };
 }

@@ -23,7 +23,7 @@ export function helpBindings({ actions, history, advice, palette, keyList, reaso
       run: () => actions.toggleBefore(),
     },
     { keys: ["H"], label: "History of edits", run: () => history.toggle() },
-    { keys: ["Shift H"], label: "What the line said before", words: "messages log", run: () => advice.log.toggle() },
+    { keys: ["Shift H"], label: "Earlier sentences of the line", words: "messages log", run: () => advice.log.toggle() },
     { keys: ["Shift Esc"], label: "Dismiss what the line says", words: "messages", run: () => void advice.dismiss() },
     { keys: ["?"], label: "Keyboard shortcuts", matches: (event) => event.key === "?", run: () => keyList.show() },
   ]);

@@ -144,7 +144,7 @@ async def test_reasons_and_comments_of_before_are_offered_latest_first(page, end
     again = [task(24 + k, "rejected", "anna", text, "rita") for k, text in enumerate(("toes", "left elbow too high"))]
     await opened(page, endpoint, PLAN | {"tasks": TASKS + again})
     offered = "(field) => [...field.list.options].map((option) => option.value)"
-    reason = section.get_by_label("What is to be corrected", exact=True)
+    reason = section.get_by_label("Correction to be made", exact=True)
     assert await reason.evaluate(offered) == ["left elbow too high", "toes"]
     assert await section.get_by_label("Comment", exact=True).evaluate(offered) == ["hidden"]
 

@@ -142,7 +142,7 @@ async def test_problems_of_files_forbid_the_import(fresh_page, endpoint):
     await check.click()
     await section.get_by_text("FRONT: 40 rows, points in frames 0 to 39, median confidence 0.90").wait_for()
     assert (asked[0]["paths"], asked[0]["offsets"]) == ("/a", {})
-    await section.get_by_text("Where the files do not tell").click()
+    await section.get_by_text("Details that the files lack").click()
     await page.fill("#import-offsets", "FRONT")
     await check.click()
     await section.locator(".is-failed", has_text="Expected offsets such as cam2=3, found “FRONT”.").wait_for()

@@ -111,7 +111,7 @@ async def test_the_next_step_suits_the_state(page, endpoint):
     await page.keyboard.press("Enter")
     await page.keyboard.press("Escape")
     await open_palette(page)
-    assert (await found(page))[:2] == ["What the line said before", "Pause or continue tracking"]
+    assert (await found(page))[:2] == ["Earlier sentences of the line", "Pause or continue tracking"]
 
 
 @pytest.mark.slow
