@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from doc_tables import Conditions, add_write_option, check_places, measured, show, table
+from doc_tables import Conditions, measured, parsed, show, table
 from true_starts import read_simulated, start_of
 
 from tracker.body.model import BodyModel
@@ -134,9 +134,7 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="+", default=[*VARIANTS], choices=[*VARIANTS], help="variants to print; the table stays"
     )
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = parsed(parser, TABLES)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         clips = simulated(folder, words.frames) + (recorded(words.data, folder) if words.data else [])

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 
 from tracker.session.session import load_session
 from tracker.session.store.stored_poses import read_stored_poses
@@ -223,9 +223,7 @@ def run(
     parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
     parser.add_argument("--scenes", type=Path, help="folder that keeps the simulated recordings")
     parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
-    add_write_option(parser)
-    words, rows = parser.parse_args(), list[RowT]()
-    check_places(words.write, [name])
+    words, rows = parsed(parser, [name]), list[RowT]()
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         for recording in chosen(words, folder):

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import RECORDED, quadrille
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 from joint_errors import processor_s, references_of
 from scipy.stats import spearmanr
 
@@ -149,9 +149,7 @@ def main() -> None:
     parser.add_argument("sessions", type=Path)
     parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
     parser.add_argument("--only", nargs="+", help="names of the recordings to measure")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = parsed(parser, TABLES)
     rows: dict[str, list[str]] = {}
     for name in (n for n in RECORDED if n in (given.only or RECORDED)):
         for row, cells in rows_of(given.sessions / name, references_of(name, given.data, None)).items():

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from acquisition import PLAYED, RECORDED, quadrille, recorded
-from doc_tables import add_write_option, check_places
+from doc_tables import parsed
 from status_model import LimbRows, Run, load_rows, save_rows
 from status_tables import write_results
 
@@ -305,9 +305,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
     parser.add_argument("--work", type=Path, help="folder that keeps scenes, bodies and features")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = parsed(parser, TABLES)
     with tempfile.TemporaryDirectory() as name:
         work = words.work or Path(name)
         workshop = Workshop(work)

@@ -20,7 +20,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from acquisition import N_FRAMES, Recording, quadrille, recorded
 from calibration_repair import off
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 from known_faults import fit_fault
 
 from tracker.calibration.check.fault_search import Fault
@@ -280,9 +280,7 @@ def main() -> None:
     parser.add_argument("--kept", action="store_true", help="show what --work keeps of an interrupted run, and end")
     parser.add_argument("--only", nargs="+", help="recordings to print, not to write")
     parser.add_argument("--bumps", type=int, default=len(TURNS), help="bumps of each recording, to print")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = parsed(parser, TABLES)
     if words.kept:
         names = [*FILMED, *(person for _, person in SIMULATED)]
         kept = [path for name in names for path in sorted((words.work / name).glob("*.json"))]

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from doc_tables import Conditions, add_write_option, check_places, measured, show, table
+from doc_tables import Conditions, measured, parsed, show, table
 from true_starts import read_simulated
 
 from tracker.body.model import BodyModel
@@ -135,9 +135,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--frames", type=int, default=30, help="frames of each scene")
     parser.add_argument("--scenes", type=Path, help="folder to keep the simulated scenes in, and to find them again")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = parsed(parser, TABLES)
     with tempfile.TemporaryDirectory() as name:
         folder = words.scenes or Path(name)
         scenes = [*(f"couple_{d}" for d in DISTANCES), "tango"]

@@ -94,6 +94,14 @@ def check_places(paths: Sequence[Path], names: Sequence[str]) -> None:
         document_of(paths, name)
 
 
+def parsed(parser: argparse.ArgumentParser, names: Sequence[str]) -> argparse.Namespace:
+    """Return the words of the command line, with `write` as the documents that shall hold the tables of these names."""
+    add_write_option(parser)
+    words = parser.parse_args()
+    check_places(words.write, names)
+    return words
+
+
 def document_of(paths: Sequence[Path], name: str) -> Path:
     """Return the document that holds the place of a table.
 

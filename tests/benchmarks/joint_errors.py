@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import RECORDED, quadrille
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 from scipy.stats import chi2, rankdata
 
 from tracker.evaluation.references import read_joints
@@ -203,9 +203,7 @@ def main() -> None:
     parser.add_argument("sessions", type=Path)
     parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
     parser.add_argument("--scenes", type=Path, help="folder of the simulated recordings")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = parsed(parser, TABLES)
     found: list[Compared] = []
     names: dict[str, list[str]] = {title: [] for title in GROUPS}
     for folder in sorted(p for p in given.sessions.iterdir() if (p / "session.toml").exists()):

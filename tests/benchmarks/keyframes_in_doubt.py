@@ -18,7 +18,7 @@ from zlib import crc32
 import numpy as np
 from acquisition import quadrille
 from between_keyframes import errors
-from doc_tables import add_write_option, check_places, show, table
+from doc_tables import parsed, show, table
 from unseen_people import CONDITIONS, SCENES, SPARSE, Scene, acquired
 
 from tracker.body.limbs import limbs
@@ -114,9 +114,7 @@ def main() -> None:
     """Measure all scenes, and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=Path, help="folder that keeps scenes and sessions")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = parsed(parser, TABLES)
     rows = {}
     with tempfile.TemporaryDirectory() as scratch:
         for title, scenes in (("25 or 15 frames/s", SCENES), ("8 frames/s", SPARSE)):

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from between_keyframes import LOST_MM, errors
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 from joint_errors import references_of
 
 from tracker.annotation.expected_error import contradicted_keyframes, joint_units
@@ -277,9 +277,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=Path, help="folder of the simulated recordings")
     parser.add_argument("--most", type=int, default=MAX_ACTIONS, help="actions; with fewer, no equal distances")
     parser.add_argument("--seed", type=int, default=0, help="of the hand that corrects the first session")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = parsed(parser, TABLES)
     rows: dict[str, list[str]] = {}
     for seed, folder in enumerate(given.sessions, given.seed):
         references = references_of(folder.name, given.data, given.scenes)

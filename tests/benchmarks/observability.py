@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import N_FRAMES, PLAYED
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 from scipy.stats import spearmanr
 
 from tracker.body.model import PosedBody
@@ -174,9 +174,7 @@ def main() -> None:
     """Measure and write the section."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=Path, help="folder of the recordings")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = parsed(parser, TABLES)
     with tempfile.TemporaryDirectory() as name:
         tracked = [track(words.scenes or Path(name), person) for person in PLAYED]
     people = {"calibrated on": tracked[::2], "checked on": tracked[1::2]}

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import new_session, quadrille, recorded
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 from scipy.stats import rankdata
 
 from tracker.estimation.acquisition.body_points import BodyPoints
@@ -191,9 +191,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with walk, fast_arms and balance_real")
     parser.add_argument("--only", nargs="+", default=NAMES, help="recordings to print; the tables stay")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = parsed(parser, TABLES)
     tracked_rows, judged_rows = dict[str, list[str]](), dict[str, list[str]]()
     with tempfile.TemporaryDirectory() as scratch:
         for name in words.only:

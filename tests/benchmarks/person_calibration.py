@@ -20,7 +20,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from board_rigs import rms_error_m
 from detected_people import acted, detected, filmed_couple
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 from filmed_people import aligned, blanks, dancing, observed, rig
 
 from tracker.calibration.check.point_problem import triangulate_all
@@ -228,10 +228,7 @@ def read_arguments(description: str | None, kinds: Sequence[str], tables: Sequen
     parser.add_argument("--data", type=Path, help="folder of the recordings; without it, simulated people only")
     parser.add_argument("--only", nargs="+", choices=kinds, default=kinds, help="tables to measure")
     parser.add_argument("--rigs", type=int, default=20, help="number of simulated rigs of each kind")
-    add_write_option(parser)
-    arguments = parser.parse_args()
-    check_places(arguments.write, tables)
-    return arguments
+    return parsed(parser, tables)
 
 
 def main():

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from acquisition import quadrille, recorded
 from calibrate_status import SECOND, SECOND_SEED
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.acquisition.from_joints import height_from_joints
@@ -184,9 +184,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, help="folder with walk and fast_arms")
     parser.add_argument("--work", type=Path, help="folder that keeps the sessions")
     parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
-    add_write_option(parser)
-    words = parser.parse_args()
-    check_places(words.write, TABLES)
+    words = parsed(parser, TABLES)
     with tempfile.TemporaryDirectory() as name:
         rows = dict[str, list[str]]()
         for dancer in dancers(words.work or Path(name), words.data):

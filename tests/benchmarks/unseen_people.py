@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from acquisition import Recording, new_session, quadrille
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 from joint_errors import HEADS, Compared, groups, measured, pooled
 
 from tracker.session.assemble import DEFAULT_MODEL
@@ -158,9 +158,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, help="folder that keeps scenes and sessions")
     names = [s.name for s in (*SCENES, *SPARSE)]
     parser.add_argument("--only", nargs="+", choices=names, help="scenes to print, not to write")
-    add_write_option(parser)
-    given = parser.parse_args()
-    check_places(given.write, TABLES)
+    given = parsed(parser, TABLES)
     for title, scenes, conditions in zip(TABLES[:2], (SCENES, SPARSE), (CONDITIONS, SPARSE_CONDITIONS), strict=True):
         chosen = [s for s in scenes if s.name in (given.only or names)]
         with tempfile.TemporaryDirectory() as scratch:

@@ -13,7 +13,7 @@ import numpy as np
 sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from board_rigs import calibrated, in_first_camera, rms_error_m, simulated_rig
-from doc_tables import Conditions, add_write_option, check_places, show, table
+from doc_tables import Conditions, parsed, show, table
 
 from tracker.errors import CalibrationError
 
@@ -26,9 +26,7 @@ def main():
     """Measure and print, or write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rigs", type=int, default=200, help="number of calibrated rigs")
-    add_write_option(parser)
-    arguments = parser.parse_args()
-    check_places(arguments.write, TABLES)
+    arguments = parsed(parser, TABLES)
     rows, refused, seed = [], 0, FIRST_SEED
     while len(rows) < arguments.rigs:
         rig, seed = simulated_rig(seed), seed + 1
