@@ -1,7 +1,7 @@
 """`quadrille export`: write stored poses to files of other programs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -216,18 +216,8 @@ def _send_back(arguments: ExportArguments) -> None:
     from tracker.interchange.observations.stored import load_observations
     from tracker.session.session import load_session
 
-    others = (
-        "format",
-        "person",
-        "frames",
-        "keyframes_only",
-        "reviewed_only",
-        "skip_lost",
-        "split",
-        "distinct_people",
-        "overwrite",
-        *OPTIONS,
-    )
+    own = {"sessions", "out", "like", "poses", "plain_joints", "exchange_sides", "provenance", "json"}
+    others = [f.name for f in fields(arguments) if f.name not in own]
     if given := [name.replace("_", "-") for name in others if getattr(arguments, name) not in (None, False, ())]:
         raise TrackerError(f"expected --like without --{given[0]}: the files stay as they came; leave it out")
     if len(arguments.sessions) > 1:

@@ -15,6 +15,14 @@ from tracker.evidence.voxels.voxel_grid import VoxelGrid, Voxels
 from tracker.geometry.ground_plane import GroundPlane
 
 UP = np.array([0.0, 0.0, 1.0])
+STANDING = [
+    {"arms_deg": arms, "legs_deg": legs, "turn_deg": turn}
+    for arms, legs, turn in (
+        (35, 12, 0), (45, 15, 30), (60, 10, 75), (30, 20, 120), (80, 12, 160),
+        (40, 14, 200), (55, 18, 250), (35, 10, 290), (70, 16, 310), (50, 12, 345),
+    )
+]  # fmt: skip
+"""Poses of the figure."""
 
 
 def joints_of(arms_deg=35.0, legs_deg=12.0, turn_deg=0.0):

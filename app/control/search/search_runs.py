@@ -68,7 +68,6 @@ class SearchRun:
 
     def __init__(
         self,
-        number: int,
         frame: int,
         models: Sequence[BodyModel],
         start: tuple[Array, ...],
@@ -80,7 +79,6 @@ class SearchRun:
         """Begin without steps.
 
         Args:
-            number: of the run, from 1, unique in the session.
             frame: index of the searched frame.
             models: the body of each person.
             start: pose of each person before the search, (n_values,) each.
@@ -89,7 +87,9 @@ class SearchRun:
             free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
             planned: stages of a fit of contours; None for those of a search.
         """
-        self.number, self.frame, self.start, self.settings = number, frame, start, settings
+        self.frame, self.start, self.settings = frame, start, settings
+        self.number = 0
+        """Unique in the session, from 1; `SearchRuns.add` gives it."""
         self.is_contour_fit = planned is not None
         """Whether the steps are iterations of a fit of contours."""
         self.stages = stages(models, settings.search, active_dofs=free) if planned is None else list(planned)
@@ -182,21 +182,11 @@ class SearchRuns:
         self.on_discard: Callable[[], None] = lambda: None
         """Called after runs were discarded."""
 
-    def begin(
-        self,
-        frame: int,
-        models: Sequence[BodyModel],
-        start: tuple[Array, ...],
-        start_px: float,
-        settings: TrackSettings,
-        free: Sequence[NDArray[np.bool_]] | None = None,
-        planned: Sequence[Stage] | None = None,
-    ) -> SearchRun:
-        """Add a run, in place of the oldest if there are too many. Arguments as for `SearchRun`."""
-        self._number += 1
-        run = SearchRun(self._number, frame, models, start, start_px, settings, free, planned)
-        of_frame = self._runs.pop(frame, [])
-        self._runs[frame] = [*of_frame, run][-_MAX_RUNS:]  # as the newest frame of the dict
+    def add(self, run: SearchRun) -> SearchRun:
+        """Add a run, in place of the oldest if there are too many, and return it with its number."""
+        self._number = run.number = self._number + 1
+        of_frame = self._runs.pop(run.frame, [])
+        self._runs[run.frame] = [*of_frame, run][-_MAX_RUNS:]  # as the newest frame of the dict
         while len(self._runs) > _MAX_FRAMES:
             del self._runs[next(iter(self._runs))]
         self.on_discard()

@@ -194,9 +194,8 @@ class SearchRunner:
             )
             plan = None if contours is None else FitPlan(models, free, contours == "chains")
             known_px = np.nan if plan is not None or costs["cost_px"] is None else costs["cost_px"]
-            run = self._runs.begin(
-                frame, models, poses, known_px, settings, free, None if plan is None else plan.stages
-            )
+            planned = None if plan is None else plan.stages
+            run = self._runs.add(SearchRun(frame, models, poses, known_px, settings, free, planned))
             subjects = Subjects.of(models, active_dofs=free)
 
             def steps() -> Iterator[SearchStep]:

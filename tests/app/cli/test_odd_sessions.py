@@ -42,16 +42,7 @@ def test_named_pipes_do_not_hang_a_command_that_reads(run, placed, name, expecte
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        "lock.json",
-        *(
-            pytest.param(n, marks=pytest.mark.slow)
-            for n in ("annotations.sqlite-journal", "backups/annotations-20260101T0Z.sqlite")
-        ),
-    ],
-)
+@pytest.mark.parametrize("name", ["lock.json", "annotations.sqlite-journal", "backups/annotations-20260101T0Z.sqlite"])
 def test_named_pipes_do_not_hang_a_command_that_writes(run, placed, name):
     replaced_by_a_pipe(placed / name)
     status, _, err = run("init", placed, *WITH_POSE, "--frame", "5")

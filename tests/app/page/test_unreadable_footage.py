@@ -52,10 +52,7 @@ def damages(page):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "damage",
-    ["truncated", pytest.param("removed", marks=pytest.mark.slow), pytest.param("emptied", marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize("damage", ["truncated", "removed", "emptied"])
 async def test_a_video_that_cannot_be_read_is_said_until_it_is_back(controller, session, damage):
     video = session / FRONT
     async with visiting(controller) as page:

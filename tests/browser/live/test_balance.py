@@ -110,7 +110,6 @@ async def place(page, sent, targets):
                 await drag(page, sent, view, name, targets[view][name])
 
 
-@pytest.mark.slow
 async def test_the_main_job(browser, balance, program, tmp_path):
     targets = balance[1]
     page, sent = await visit(browser, program.address)

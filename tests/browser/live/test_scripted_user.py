@@ -175,7 +175,6 @@ async def test_a_body_is_placed_by_drags(live, folder, record_property):
     assert fitted_mm < 45
 
 
-@pytest.mark.slow
 async def test_a_body_is_placed_by_torso_drags_and_sliders(live, folder, record_property):
     session = load_session(folder)
     model = session.people[0].model
@@ -268,7 +267,6 @@ async def place(hands, user, views):
                 await hands.drag(camera, name, user.aim_px(name, camera))
 
 
-@pytest.mark.slow
 async def test_two_people_in_a_close_hold_are_placed_and_searched_together(tango, record_property):
     page, folder = tango
     session = load_session(folder)

@@ -85,9 +85,7 @@ LENS = np.array([-0.1, 0.02, 0.001, -0.001])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "size", [(640, 480), (1023, 771), *(pytest.param(s, marks=pytest.mark.slow) for s in ((1920, 1080), (1080, 1920)))]
-)
+@pytest.mark.parametrize("size", [(640, 480), (1023, 771), (1920, 1080), (1080, 1920)])
 @pytest.mark.parametrize("lens", [np.zeros(0), LENS, None], ids=["pinhole", "lens", "fisheye"])
 def test_edges_stay_registered_through_undistortion_and_scaling(size, lens):
     camera = camera_at("c", (2.5, 0.7, 0.3), size=size, focal=0.8 * size[0])

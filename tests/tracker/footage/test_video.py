@@ -285,7 +285,7 @@ def test_time_stamps_out_of_order(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["cam01", *(pytest.param(f"cam0{i}", marks=pytest.mark.slow) for i in (2, 3, 4))])
+@pytest.mark.parametrize("name", ["cam01", "cam02", "cam03", "cam04"])
 def test_real_footage(data_folder, name):
     video = VideoFile(data_folder("balance_real") / f"{name}.mp4", name)
     assert (video.n_frames, video.fps, video.has_constant_rate) == (100, 60.0, True)

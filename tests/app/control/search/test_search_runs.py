@@ -20,7 +20,7 @@ def step_of(run, stage, px, best_px, evaluations, done=False, shift_m=0.0):
 
 
 def begun():
-    return SearchRun(1, 0, [MODEL], (START,), 9.0, TrackSettings())
+    return SearchRun(0, [MODEL], (START,), 9.0, TrackSettings())
 
 
 def test_long_searches_are_thinned_and_keep_what_matters(monkeypatch):
@@ -59,7 +59,7 @@ def test_few_runs_of_few_frames_are_kept():
     kept = SearchRuns()
     for frame in range(20):
         for _ in range(9):
-            kept.begin(frame, [MODEL], (START,), 1.0, TrackSettings())
+            kept.add(SearchRun(frame, [MODEL], (START,), 1.0, TrackSettings()))
     assert [r.number for r in kept.of_frame(19)] == [175, 176, 177, 178, 179, 180]
     assert kept.of_frame(3) == []
     assert kept.find(180) is kept.of_frame(19)[-1]

@@ -77,7 +77,7 @@ def girths(body):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stoutness", [1.2, pytest.param(0.85, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stoutness", [1.2, 0.85])
 def test_height_and_girths_of_a_person_are_found(stoutness):
     person, model = person_of(stoutness), load_model("gavrila22", 1.78)
     fit = fit_sizes_to_voxels(SizeParameters(model), frames_of(person, model, 4), VoxelSizeSettings())

@@ -39,7 +39,7 @@ def motions_of(body, kinematics, part, points, unit):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["gavrila22_cones", pytest.param("gavrila34", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["gavrila22_cones", "gavrila34"])
 def test_surface_points_move_as_their_derivatives_say(name):
     """Across the surface: along it a point with the same unit coordinates may slide."""
     parameters, sizes, pose = staged(name)

@@ -59,7 +59,7 @@ def lengths(body):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [pytest.param(3, marks=pytest.mark.slow), 4])
+@pytest.mark.parametrize("seed", [3, 4])
 def test_lengths_and_girths_of_another_body_are_found(seed, model):
     person = other_body(seed=seed)
     parameters = SizeParameters(model)

@@ -255,7 +255,7 @@ def test_fast_cost_against_the_oracle(real_frame, n_poses):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("preset", [pytest.param("gavrila22", marks=pytest.mark.slow), "gavrila22_cones"])
+@pytest.mark.parametrize("preset", ["gavrila22", "gavrila22_cones"])
 def test_samples_twice_as_dense_say_the_same(real_frame, preset):
     """At 4 px between samples the cost is within 1% of that at 2 px, and the best candidate is the same."""
     _, values, views = real_frame

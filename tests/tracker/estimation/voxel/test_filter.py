@@ -112,11 +112,8 @@ def test_derivative_of_measured_rotations():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("paper", "n_steps"),
-    [(False, 60), (True, 60), pytest.param(False, 3000, marks=pytest.mark.slow),
-     pytest.param(True, 3000, marks=pytest.mark.slow)],
-)  # fmt: skip
+@pytest.mark.parametrize("n_steps", [60, 3000])
+@pytest.mark.parametrize("paper", [False, True])
 def test_covariances_stay_positive_definite_over_thousands_of_steps(paper, n_steps):
     """Some steps measure nothing, some a single part, and some very precisely."""
     settings = VoxelSettings(sizes="always", turn_rates=not paper)

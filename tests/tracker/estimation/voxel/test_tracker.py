@@ -44,7 +44,7 @@ def tracked(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("model", ["gavrila34", pytest.param("mikic10", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("model", ["gavrila34", "mikic10"])
 def test_a_person_of_another_shape_is_followed(model):
     estimates, errors = tracked(model=model)
     assert errors.mean() < 0.05
@@ -90,7 +90,7 @@ def test_the_papers_version_runs():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stride", [1, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stride", [1, 3])
 def test_a_limb_of_a_child_that_is_off_is_called_lost(stride):
     """A large head and short limbs, tracked with the proportions of an adult of the same height."""
     estimates, errors = tracked(CHILD, 12, stride, height_m=1.15)

@@ -54,7 +54,7 @@ def test_poses_keep_the_limits_and_move_smoothly(performances, true_model):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", [s if s == "tango" else pytest.param(s, marks=pytest.mark.slow) for s in TOGETHER])
+@pytest.mark.parametrize("scene", TOGETHER)
 def test_people_together_keep_the_limits_and_their_distance_and_move_smoothly(scene):
     cast = cast_of(scene, 3)
     models = [altered_model(load_model("gavrila22", role.height_m), role.build.bone_factors) for role in cast]

@@ -9,9 +9,7 @@ from tracker.simulate.people.skin import make_skin
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["child_3", "heavy_man", *(pytest.param(n, marks=pytest.mark.slow) for n in POPULATION)]
-)
+@pytest.mark.parametrize("name", POPULATION)
 def test_a_person_is_as_tall_as_stated(name):
     height_m, build = individual(name)
     model = altered_model(load_model("gavrila22", height_m), build.bone_factors)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from figures import UP, cameras_about_a_figure, figure, scene_of, silhouettes_of_figure
+from figures import STANDING, UP, cameras_about_a_figure, figure, scene_of, silhouettes_of_figure
 
 from tracker.errors import TrackerError
 from tracker.estimation.initialization.generators.head_template import find_head
@@ -17,13 +17,7 @@ from tracker.geometry.ground_plane import GroundPlane
 
 CAMERAS = cameras_about_a_figure()
 MODEL = load_model("gavrila34")
-POSES = [
-    {"arms_deg": arms, "legs_deg": legs, "turn_deg": turn, "noise": 0.05}
-    for arms, legs, turn in (
-        (35, 12, 0), (45, 15, 30), (60, 10, 75), (30, 20, 120), (80, 12, 160),
-        (40, 14, 200), (55, 18, 250), (35, 10, 290), (70, 16, 310), (50, 12, 345),
-    )
-]  # fmt: skip
+POSES = [pose | {"noise": 0.05} for pose in STANDING]
 
 
 def scene(voxels, **changes):

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from figures import child, figure, parts_of
+from figures import STANDING, child, figure, parts_of
 
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
@@ -12,13 +12,7 @@ from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import PRESETS, load_model
 
-POSES = [
-    {"arms_deg": arms, "legs_deg": legs, "turn_deg": turn, "noise": 0.1}
-    for arms, legs, turn in (
-        (35, 12, 0), (45, 15, 30), (60, 10, 75), (30, 20, 120), (80, 12, 160),
-        (40, 14, 200), (55, 18, 250), (35, 10, 290), (70, 16, 310), (50, 12, 345),
-    )
-]  # fmt: skip
+POSES = [pose | {"noise": 0.1} for pose in STANDING]
 
 
 def errors_mm(model: BodyModel, pose, joints):
@@ -27,7 +21,7 @@ def errors_mm(model: BodyModel, pose, joints):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pose", [*POSES[:2], *(pytest.param(pose, marks=pytest.mark.slow) for pose in POSES[2:])])
+@pytest.mark.parametrize("pose", POSES)
 def test_all_parts_are_found(pose):
     voxels, joints = figure(**pose)
     parts = parts_of(voxels)
@@ -42,7 +36,7 @@ def test_all_parts_are_found(pose):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [n if n == "gavrila34" else pytest.param(n, marks=pytest.mark.slow) for n in PRESETS])
+@pytest.mark.parametrize("name", PRESETS)
 def test_any_body_takes_the_start(name):
     voxels, joints = figure(turn_deg=40)
     model, parts = load_model(name), parts_of(voxels)
