@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from tracker.calibration.boards.board_calibration import BoardCalibration, calibrate_rig
@@ -12,10 +13,12 @@ from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_diagnosis import found_instead
 from tracker.calibration.boards.board_footage import BoardViews, every_frame, read_corners
 from tracker.calibration.boards.view_choice import posed_views
+from tracker.calibration.check.reprojection import OUTLIER_SIGMAS
 from tracker.compute.progress import Report, part_of
 from tracker.errors import CalibrationError
 from tracker.footage.video import Footage, open_footage
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Mask
 from tracker.geometry.cameras import Camera
 from tracker.session.matching import camera_name, common_length, match_footage
 
@@ -55,6 +58,22 @@ class FilmedCalibration:
     found: BoardCalibration
     """Its cameras are in the world of the first one."""
     views: BoardViews
+
+    @property
+    def is_gross(self) -> Mask:
+        """Whether the adjustment took each corner of `views` for a gross error, (N,); not if it left out the frame."""
+        seen, rig = self.views.seen, self.found.rig
+        errors_px = np.zeros(len(seen.px))
+        errors_px[np.isin(seen.frames, rig.frames)] = np.linalg.norm(rig.fit.errors_px, axis=1)
+        return ~(errors_px <= OUTLIER_SIGMAS * rig.fit.sigmas_px[seen.cameras])
+
+    def covered_share(self, camera: int) -> float:
+        """Return the share of a camera's picture that lies between corners of the board in some view, 0 to 1."""
+        seen = self.views.seen.of_camera(camera)
+        covered = np.zeros(self.cameras[camera].size[::-1], np.uint8)
+        for px in np.split(seen.px, np.flatnonzero(np.diff(seen.frames)) + 1):
+            cv2.fillConvexPoly(covered, cv2.convexHull(px.round().astype(np.int32)), 1)
+        return float(covered.mean())
 
 
 def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
