@@ -95,7 +95,7 @@ async def test_real_cameras_are_calibrated_by_a_board_in_the_page(page, tmp_path
     await page.fill("#board-footage", str(filmed))
     await page.fill("#board-file", str(filmed / "charuco.toml"))
     await page.click("#calibrate")
-    await page.locator("#use-calibration:focus").wait_for(timeout=120_000)
+    await page.locator("#use-calibration:focus").wait_for(timeout=300_000)
     assert await page.locator("#board-cameras path.corners").count() == 8
     await page.click("#use-calibration")
     await shows(page, "document.querySelectorAll('#rig .rig-camera').length === 8")
