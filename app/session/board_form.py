@@ -58,8 +58,8 @@ def calibrate_cameras(form: BoardForm, report: Report) -> None:
 
     try:
         out = typed_path(form.out)
-        check_out(out)
         filmed = _filmed(form)
+        check_out(out)
         found = calibrate_footage(filmed, advance)
         check_out(out)
         write_cameras(out, found.cameras)

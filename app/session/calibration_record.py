@@ -1,7 +1,10 @@
 """The record of a calibration by a board, for the command line and the page, and the file that is written."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,14 +29,16 @@ def check_out(out: Path, overwrite: bool = False) -> None:
         overwrite: whether a file that exists is replaced.
 
     Raises:
-        TrackerError: there is something already, or no folder for it.
+        TrackerError: there is something already, or no folder for it that may be written to.
     """
-    if out.is_dir():
+    if os.path.isdir(out):
         raise TrackerError(f"expected {out} not to exist, found a folder", Remedy("another_file"))
-    if out.exists() and not overwrite:
+    if os.path.exists(out) and not overwrite:
         raise TrackerError(f"expected {out} not to exist, found a file", Remedy("another_file_or_overwrite"))
-    if not out.parent.is_dir():
+    if not os.path.isdir(out.parent):
         raise TrackerError(f"expected {out} in a folder that exists, found none; make it first")
+    with _writing(out):
+        NamedTemporaryFile(prefix=f".{out.name}.", dir=out.parent).close()
 
 
 def write_cameras(out: Path, cameras: Sequence[Camera], layout: str = "quadrille") -> None:
@@ -42,11 +47,17 @@ def write_cameras(out: Path, cameras: Sequence[Camera], layout: str = "quadrille
     Raises:
         TrackerError: the file cannot be written.
     """
-    try:
+    with _writing(out):
         if layout == "quadrille":
             write_calibration(out, cameras)
         else:
             write_layout(out, layout, cameras)
+
+
+@contextmanager
+def _writing(out: Path) -> Generator[None, None, None]:
+    try:
+        yield
     except OSError as error:
         reason = error.strerror or str(error)
         raise TrackerError(f"cannot write {out}: {reason}; choose a folder that you may write to") from error

@@ -141,6 +141,8 @@ async def test_a_calibration_by_a_board_fails_before_footage_is_read(folders, se
     for change, why in (
         ({"out": str(walk / "calibration.toml")}, "not to exist, found a file; choose another file"),
         ({"out": str(walk / "none" / "a.toml")}, "in a folder that exists, found none"),
+        ({"out": str(walk / f"{'a' * 250}.toml")}, "cannot write"),
+        ({"out": str(walk / "none" / "a.toml"), "footage": str(walk / "none")}, "expected a folder of videos"),
         ({"footage": str(walk / "models")}, "expected videos"),
         ({"board": str(walk / "gone.toml")}, "gone.toml"),
         ({"board": BOARD | {"square_mm": 0.1}}, "use the command line if it is right"),
