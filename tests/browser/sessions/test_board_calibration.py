@@ -1,21 +1,16 @@
 """The form of a calibration by a board: from footage to the form of a new session."""
 
-import asyncio
-
 import pytest
 from page_driver import shows, until
 
+SEEN = {"size": [640, 480], "views": 12, "covered_share": 0.31, "corners": [10, 20, 300, 400], "gross": [50, 60]}
 CAMERAS = [
-    {
-        "name": name, "footage": f"/data/videos/{name}.mp4", "size": [640, 480], "views": 12, "covered_share": 0.31,
-        "held_out_px": error, "corners": [10, 20, 300, 400], "gross": [50, 60],
-    }
+    SEEN | {"name": name, "footage": f"/data/videos/{name}.mp4", "held_out_px": error}
     for name, error in (("FRONT", 0.416), ("LEFT", None))
-]  # fmt: skip
-CALIBRATED = {
-    "out": "/data/videos/calibration.toml", "up": "-y", "sentence": "Expected error in the volume: 0.33 mm.",
-    "doubts": ["Camera 'LEFT': film the board nearer."], "cameras": CAMERAS,
-}  # fmt: skip
+]
+FOUND = {"out": "/data/videos/calibration.toml", "up": "-y", "sentence": "Expected error in the volume: 0.33 mm."}
+CALIBRATED = FOUND | {"doubts": ["Camera 'LEFT': film the board nearer."], "cameras": CAMERAS}
+BOARD = {"inverted": False, "columns": 4, "rows": 5, "square_mm": 54}
 PROGRESS = {"progress": {"share": 0.4, "text": "Corners: 40%, 9 s left"}}
 FORM = "#board-calibration"
 
@@ -37,14 +32,10 @@ async def test_a_calibration_is_shown_and_taken_into_the_form_of_a_new_session(f
     await page.fill("#board-fisheye", "LEFT")
     await page.click("#calibrate")
     await page.locator("#use-calibration:focus").wait_for()
-    assert program.posted == [{
-        "footage": "/data/videos", "out": "/data/videos/calibration.toml", "fisheye": ["LEFT"],
-        "offsets": {"FRONT": 3, "LEFT": -2}, "common_frames": False, "floor_frame": None,
-        "board": {
-            "kind": "charuco", "inverted": True, "columns": 4, "rows": 5, "square_mm": 54, "dictionary": "DICT_4X4_50",
-            "legacy_pattern": False,
-        },
-    }]  # fmt: skip
+    sent = {"footage": "/data/videos", "out": CALIBRATED["out"], "common_frames": False, "floor_frame": None}
+    charuco = {"kind": "charuco", "dictionary": "DICT_4X4_50", "legacy_pattern": False, "inverted": True}
+    chosen = {"board": BOARD | charuco, "fisheye": ["LEFT"], "offsets": {"FRONT": 3, "LEFT": -2}}
+    assert program.posted == [sent | chosen]
     words = [CALIBRATED["sentence"], f"The calibration is in {CALIBRATED['out']}.", *CALIBRATED["doubts"]]
     assert await page.locator(f"{FORM}-checks li").all_inner_texts() == words
     cards = page.locator("#board-cameras li")
@@ -72,13 +63,11 @@ async def test_a_calibration_that_is_stopped_or_closed_ends_its_request(form, ho
         await until(lambda: program.posted)
         assert await page.locator("#board-fields").get_attribute("inert") is not None
         await page.click(how)
-    board = {"kind": "checkerboard", "inverted": False, "columns": 4, "rows": 5, "square_mm": 54}
-    assert program.posted[0]["board"] == board
+    assert program.posted[0]["board"] == BOARD | {"kind": "checkerboard"}
     await shows(page, "document.querySelector('#stop-calibration').hidden")
     if how == "#stop-calibration":
         assert await page.locator(f"{FORM}-checks .is-failed").inner_text() == "Stopped: nothing was written."
     program.may_answer.set()
-    await asyncio.sleep(0)
 
 
 async def test_a_file_takes_the_place_of_a_description_and_a_failure_can_be_mended(form):
