@@ -22,8 +22,9 @@ from tracker.geometry.arrays import Mask
 from tracker.geometry.cameras import Camera
 from tracker.session.matching import camera_name, common_length, match_footage
 
-_READING_SHARE = 0.9
-"""Share of the time that reading the footage takes, for the time that is left."""
+_SOLVING_FRAMES = 50
+"""Number of frames that are read in the time of lenses and adjustment, for the time that is left. The 48 frames of four
+real cameras (board_real) have 41; longer footage has more, up to the `MAX_FRAMES` of the adjustment."""
 _TURNED = np.diag([1.0, -1.0, -1.0, 1.0])
 """From a board's axes (y down, z into the board) to those of a floor: x as before, z up."""
 
@@ -101,12 +102,13 @@ def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
                 )
             # The frame must be among those that are looked at.
             frames = range(filmed.floor_frame % frames.step, n_frames, frames.step)
-        views = read_corners(filmed.board, footage, filmed.offsets, frames, part_of(report, 0.0, _READING_SHARE))
+        read_share = len(frames) / (len(frames) + _SOLVING_FRAMES)
+        views = read_corners(filmed.board, footage, filmed.offsets, frames, part_of(report, 0.0, read_share))
         sizes = [f.size for f in footage.values()]
     _check_found(filmed.board, views, list(paths))
     fisheye = [name in filmed.fisheye for name in paths]
     found = calibrate_rig(
-        filmed.board, views.seen, list(paths), sizes, fisheye, filmed.floor_frame, part_of(report, _READING_SHARE, 1.0)
+        filmed.board, views.seen, list(paths), sizes, fisheye, filmed.floor_frame, part_of(report, read_share, 1.0)
     )
     cameras = found.rig.cameras
     if filmed.floor_frame is not None:
