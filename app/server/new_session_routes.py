@@ -112,7 +112,7 @@ async def _work_in_lines(
         HTTPConflict: the lock is held.
     """
     if lock.locked():
-        raise web.HTTPConflict(text=f"Another {rival}; wait for it.")
+        raise web.HTTPConflict(text=f"Another {rival}, or is about to stop; wait for it.")
     async with lock:
         connections.keep_open(request)
         response = web.StreamResponse(headers={"Content-Type": "application/x-ndjson"})
