@@ -1,10 +1,13 @@
-"""Serve the form of a new session: folders, small pictures of footage, a survey, and the session itself.
+"""Serve the form of a new session: folders, pictures of footage, a survey, a calibration, and the session itself.
 
 A page names paths of this machine. `SessionRoutes` says where such requests are answered.
 """
 
 import asyncio
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -13,10 +16,12 @@ from aiohttp import web
 from app.remedies import page_text
 from app.server import connections
 from app.server.page_requests import read_body, require_page
+from app.session.board_form import BoardForm, calibrate_cameras
 from app.session.footage_preview import preview
-from app.session.new_session import NewSessionForm, make_session
+from app.session.new_session import NewSessionForm, Report, make_session
 from app.session.path_choice import folder_contents, typed_path
 from app.session.survey import SurveyForm, survey
+from tracker.calibration.boards.board_description import DICTIONARIES
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import PRESETS
 from tracker.session.assemble import DEFAULT_MODEL
@@ -36,7 +41,7 @@ class NewSessionRoutes:
             refusal: why no session can be made; None if one can.
         """
         self._refusal = refusal
-        self._making = asyncio.Lock()
+        self._making, self._calibrating = asyncio.Lock(), asyncio.Lock()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="previews")
         self._n_waiting = 0
 
@@ -47,6 +52,7 @@ class NewSessionRoutes:
         app.router.add_get("/sessions/preview", self._preview)
         app.router.add_post("/sessions/survey", self._survey)
         app.router.add_post("/sessions/new", self._make)
+        app.router.add_post("/sessions/calibrate", self._calibrate)
         app.on_cleanup.append(self._close)
 
     async def _close(self, _: web.Application) -> None:
@@ -54,7 +60,7 @@ class NewSessionRoutes:
 
     async def _models(self, request: web.Request) -> web.Response:
         require_page(request, self._refusal)
-        return web.json_response({"models": PRESETS, "default": DEFAULT_MODEL})
+        return web.json_response({"models": PRESETS, "default": DEFAULT_MODEL, "dictionaries": DICTIONARIES})
 
     async def _list(self, request: web.Request) -> web.Response:
         require_page(request, self._refusal)
@@ -82,24 +88,49 @@ class NewSessionRoutes:
         return web.Response(body=msgspec.json.encode(found), content_type="application/json")
 
     async def _make(self, request: web.Request) -> web.StreamResponse:
-        """Make a session. The answer has one JSON object per line: each check that has passed, then the outcome."""
         form = await read_body(request, NewSessionForm, self._refusal)
-        if self._making.locked():
-            raise web.HTTPConflict(text="Another session is being made; wait for it.")
-        async with self._making:
-            connections.keep_open(request)
-            response = web.StreamResponse(headers={"Content-Type": "application/x-ndjson"})
-            await response.prepare(request)
-            lines: asyncio.Queue[dict[str, Any] | None] = asyncio.Queue()
-            loop = asyncio.get_running_loop()
+        return await _work_in_lines(request, self._making, "session is being made", partial(make_session, form))
 
-            def report(kind: str, what: Any) -> None:
-                loop.call_soon_threadsafe(lines.put_nowait, {kind: what})
+    async def _calibrate(self, request: web.Request) -> web.StreamResponse:
+        form = await read_body(request, BoardForm, self._refusal)
+        work = partial(calibrate_cameras, form)
+        return await _work_in_lines(request, self._calibrating, "calibration is being made", work)
 
-            work = asyncio.ensure_future(asyncio.to_thread(make_session, form, report))
-            work.add_done_callback(lambda _: lines.put_nowait(None))
+
+async def _work_in_lines(
+    request: web.Request, lock: asyncio.Lock, rival: str, work: Callable[[Report], None]
+) -> web.StreamResponse:
+    """Do work in a thread. The answer has one JSON object per line: each step, then the outcome.
+
+    Args:
+        request: the request; the work ends at its next step once the page that sent it is gone.
+        lock: held meanwhile.
+        rival: work that holds it, in words.
+        work: given a function that takes each line.
+
+    Raises:
+        HTTPConflict: the lock is held.
+    """
+    if lock.locked():
+        raise web.HTTPConflict(text=f"Another {rival}, or is about to stop; wait for it.")
+    async with lock:
+        connections.keep_open(request)
+        response = web.StreamResponse(headers={"Content-Type": "application/x-ndjson"})
+        await response.prepare(request)
+        lines: asyncio.Queue[dict[str, Any] | None] = asyncio.Queue()
+        loop = asyncio.get_running_loop()
+
+        def report(kind: str, what: Any) -> None:
+            if request.transport is None:
+                raise ConnectionResetError
+            loop.call_soon_threadsafe(lines.put_nowait, {kind: what})
+
+        task = asyncio.ensure_future(asyncio.to_thread(work, report))
+        task.add_done_callback(lambda _: lines.put_nowait(None))
+        with suppress(ConnectionResetError):
             while (line := await lines.get()) is not None:
                 await response.write(msgspec.json.encode(line) + b"\n")
-            await work
             await response.write_eof()
-            return response
+        with suppress(ConnectionResetError):
+            await task
+        return response

@@ -20,18 +20,15 @@ const STATES = /** @type {const} */ (["done", "failed", "running", "waiting"]);
  * @param {(folder: string, at: {frame: number, person: string}) => void} open opens a session at its worst frame
  */
 export function batchTable({ name, totals, recordings }, open) {
-  const box = make("details", "batch");
-  const summary = make("summary");
   const counts = STATES.filter((state) => totals[state]).map((state) => `${totals[state]} ${state}`);
   const verified = `${Math.round(100 * totals.share_verified)}% verified, ${totals.hours.toFixed(1)} hours of workers`;
-  summary.append(make("b", {}, name), ` ${counts.join(", ")}; ${verified}`);
+  const summary = make("summary", {}, make("b", {}, name), ` ${counts.join(", ")}; ${verified}`);
   const table = make("table");
   const head = table.createTHead().insertRow();
   for (const text of HEADS) head.append(make("th", { scope: "col" }, text));
   const body = table.createTBody();
   for (const row of recordings) addRow(body.insertRow(), row, open);
-  box.append(summary, table);
-  return box;
+  return make("details", "batch", summary, table);
 }
 
 /**
@@ -42,21 +39,14 @@ export function batchTable({ name, totals, recordings }, open) {
 function addRow(line, row, open) {
   const first = line.insertCell();
   if (row.state === "done") {
-    const button = make("button");
     const at = { frame: row.worst_frame ?? 0, person: row.worst_person };
-    Object.assign(button, { type: "button", textContent: row.name });
-    button.title = `Close this session and open ${row.name} at frame ${at.frame}, where it is worst`;
-    button.addEventListener("click", () => open(row.session, at));
-    first.append(button);
+    const title = `Close this session and open ${row.name} at frame ${at.frame}, where it is worst`;
+    first.append(make("button", { type: "button", title, onclick: () => open(row.session, at) }, row.name));
   } else {
     first.append(row.name);
   }
   const note = row.error || row.contradiction || (row.joined ?? "");
-  if (note) {
-    const small = make("small", {}, note);
-    small.classList.toggle("is-failed", row.error !== "");
-    first.append(small);
-  }
+  if (note) first.append(make("small", row.error && "is-failed", note));
   const isTracked = row.poses > 0;
   const cells = [
     row.expected_error_mm === null ? row.state.replace("done", "") : row.expected_error_mm.toFixed(1),

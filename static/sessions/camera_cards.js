@@ -95,17 +95,16 @@ export class CameraCards {
   #card(name, choice, index) {
     const card = make("li", { draggable: true });
     card.classList.toggle("is-left-out", !choice.footage);
-    const picture = choice.footage ? firstFrame(name, choice.footage) : noPicture("No footage");
-    const title = make("b", "is-clipped", name);
-    const offset = make("input");
-    Object.assign(offset, { id: `new-offset-${index}`, type: "number", step: "any", placeholder: "auto", value: String(choice.offset ?? ""), className: "query-field" });
-    offset.title = `Offset of ${name}: number of frames that it began earlier than the others, such as 2 or 2.4. Empty: by the clocks of the footage, else 0`;
-    offset.setAttribute("aria-label", `Offset of ${name} in frames`);
+    const picture = choice.footage ? firstFrame(name, choice.footage) : make("div", "no-picture", "No footage");
+    const value = String(choice.offset ?? "");
+    const title = `Offset of ${name}: number of frames that it began earlier than the others, such as 2 or 2.4. Empty: by the clocks of the footage, else 0`;
+    const kind = { id: `new-offset-${index}`, type: "number", step: "any", placeholder: "auto", className: "query-field" };
+    const offset = make("input", { ...kind, value, title, "aria-label": `Offset of ${name} in frames` });
     offset.addEventListener("change", () => {
       choice.offset = offset.value === "" ? null : Number(offset.value);
       this.#changed();
     });
-    card.append(picture, title, this.#menu(name, choice, index), make("span", "with-unit", "Offset", offset, "frames"));
+    card.append(picture, make("b", "is-clipped", name), this.#menu(name, choice, index), make("span", "with-unit", "Offset", offset, "frames"));
     this.#listenToDrags(card, name);
     return card;
   }
@@ -182,11 +181,6 @@ function listed(names) {
  */
 function firstFrame(camera, footage) {
   const picture = make("img", { alt: `First frame of ${camera}`, src: previewOf(footage), draggable: false, title: "Drag onto another camera to exchange their footage" });
-  picture.addEventListener("error", () => picture.replaceWith(noPicture("Cannot be read")));
+  picture.addEventListener("error", () => picture.replaceWith(make("div", "no-picture", "Cannot be read")));
   return picture;
-}
-
-/** @param {string} why */
-function noPicture(why) {
-  return make("div", "no-picture", why);
 }

@@ -1,5 +1,5 @@
 /**
- * Sessions: open another one, or make one of videos and a calibration.
+ * Sessions: open another one, make one of videos and a calibration, or calibrate its cameras by a board.
  *
  * The room imports `widgets` and types of `model`.
  */
@@ -26,6 +26,7 @@ export function mount({ store, notify }) {
       run: () => sessions.toggle(),
     },
     { keys: [], label: "New session from videos and a calibration", words: "new session… create recording footage form cameras", run: showNew },
+    { keys: [], label: "Calibrate cameras by a board", words: "calibration… checkerboard charuco corners lenses", run: () => void sessions.showBoard() },
   ]);
-  return { bindings, showNew, completes: (/** @type {HTMLInputElement} */ input) => sessions.completes(input) };
+  return { bindings, showNew, completes: sessions.completes };
 }

@@ -5,8 +5,7 @@
 
 import { button, byId, make } from "../widgets/elements.js";
 import { CameraCards } from "./camera_cards.js";
-import { makePathField } from "./path_field.js";
-import { PathPicker } from "./path_picker.js";
+import { DialogForm } from "./dialog_form.js";
 import { drawRig } from "./rig_drawing.js";
 import { postJson } from "./session_requests.js";
 
@@ -22,56 +21,43 @@ const PAUSE_MS = 250;
 /** Fields on which the survey depends. */
 const SURVEYED = ["footage", "calibration", "up", "units", "poses"];
 
-export class NewSession {
-  #dialog = byId("new-session", HTMLDialogElement);
-  #form = byId("new-session-form", HTMLFormElement);
-  #checks = byId("new-session-checks", HTMLElement);
+export class NewSession extends DialogForm {
   #make = byId("make-session", HTMLButtonElement);
   #openIt = byId("open-made-session", HTMLButtonElement);
   #rig = byId("rig", HTMLElement);
-  #picker = new PathPicker();
-  #cards = new CameraCards(
-    () => this.#begin(),
-    (from, take) => this.#picker.show("footage", from || this.#value("footage"), take),
-  );
+  #cards;
   /** Folder of the session that was made; empty before. */
   #made = "";
-  /** Values that the form proposed, by the name of the field. @type {Record<string, string>} */
-  #proposed = {};
   /** Footage and calibration of the cards. */
   #surveyed = "";
   #nSurveys = 0;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   #timer;
 
-  /** @param {(folder: string) => void} open opens a session */
-  constructor(open) {
-    this.#form.addEventListener("submit", (event) => {
+  /**
+   * @param {import("./path_picker.js").PathPicker} picker
+   * @param {(folder: string) => void} open opens a session
+   */
+  constructor(picker, open) {
+    super("new-session", picker);
+    this.#cards = new CameraCards(
+      () => this.#begin(),
+      (from, take) => picker.show("footage", from || this.value("footage"), take),
+    );
+    this.form.addEventListener("submit", (event) => {
       event.preventDefault();
       void this.#run(false);
     });
-    this.#form.addEventListener("input", (event) => this.#onInput(event.target));
-    button("cancel-new-session", () => this.#dialog.close());
+    this.form.addEventListener("input", (event) => this.#onInput(event.target));
+    button("cancel-new-session", () => this.dialog.close());
     this.#openIt.addEventListener("click", () => {
-      this.#dialog.close();
+      this.dialog.close();
       open(this.#made);
     });
-    for (const input of /** @type {NodeListOf<HTMLInputElement>} */ (this.#form.querySelectorAll(".path-field input"))) {
-      makePathField(input, () => this.#browse(input));
-    }
-  }
-
-  /**
-   * Complete a field of another form that takes files or folders, and give it the path picker.
-   *
-   * @param {HTMLInputElement} input
-   */
-  completes(input) {
-    makePathField(input, () => this.#browse(input));
   }
 
   show() {
-    this.#dialog.showModal();
+    this.dialog.showModal();
     this.#begin();
     void this.#fillModels();
     void this.#survey();
@@ -85,13 +71,17 @@ export class NewSession {
     byId("new-model", HTMLInputElement).placeholder = usual;
   }
 
-  /** @param {HTMLInputElement} field */
-  #browse(field) {
-    const wanted = field.dataset.takes === "files" ? "files" : "folder";
-    this.#picker.show(wanted, field.value || this.#value("footage") || this.#value("calibration"), (path) => {
-      field.value = path;
-      field.dispatchEvent(new Event("input", { bubbles: true }));
-    });
+  /**
+   * Show the form with a calibration.
+   *
+   * @param {string} calibration its file
+   * @param {string} up axis that points up
+   */
+  showWith(calibration, up) {
+    if (!this.dialog.open) this.show();
+    this.field("up").value = up;
+    this.field("calibration").value = calibration;
+    this.field("calibration").dispatchEvent(new Event("input", { bubbles: true }));
   }
 
   /** @param {EventTarget | null} target */
@@ -106,13 +96,13 @@ export class NewSession {
 
   /** Look at footage and calibration, and show the cameras. */
   async #survey() {
-    const [footage, calibration] = [this.#value("footage"), this.#value("calibration")];
+    const [footage, calibration] = [this.value("footage"), this.value("calibration")];
     const number = ++this.#nSurveys;
     /** @type {Survey} */
     let found = { cameras: [], footage: [], assigned: {}, rig: null, beside: {}, problems: [] };
     if (footage || calibration) {
-      const [up, units, poses] = ["up", "units", "poses"].map((name) => this.#value(name) || null);
-      const chosen = calibration === this.#proposed.calibration ? null : calibration || null;
+      const [up, units, poses] = ["up", "units", "poses"].map((name) => this.value(name) || null);
+      const chosen = calibration === this.proposed.calibration ? null : calibration || null;
       const form = { footage: footage || null, calibration: chosen, up, units, poses };
       try {
         await postJson("sessions/survey", form, (line) => (found = JSON.parse(line)));
@@ -123,24 +113,12 @@ export class NewSession {
     if (number !== this.#nSurveys) return;
     if (found.footage.length) {
       const folder = `${footage.replace(/\/+$/, "")}_session`;
-      Object.entries({ folder, calibration: "", background: "", masks: "", ...found.beside }).forEach(([name, value]) => this.#propose(name, value));
+      Object.entries({ folder, calibration: "", background: "", masks: "", ...found.beside }).forEach(([name, value]) => this.propose(name, value));
     }
     this.#cards.show(found.cameras, found.footage, found.assigned, this.#files === this.#surveyed);
     this.#surveyed = this.#files;
     this.#showRig(found.rig);
-    if (!this.#checks.children.length) found.problems.forEach((problem) => this.#add("is-failed", problem));
-  }
-
-  /**
-   * Fill in a field unless the user has.
-   *
-   * @param {string} name
-   * @param {string} value
-   */
-  #propose(name, value) {
-    const field = this.#field(name);
-    if (field.value && field.value !== this.#proposed[name]) return;
-    field.value = this.#proposed[name] = value;
+    if (!this.checks.children.length) found.problems.forEach((problem) => this.add("is-failed", problem));
   }
 
   /** @param {Survey["rig"]} rig */
@@ -148,7 +126,7 @@ export class NewSession {
     this.#rig.hidden = rig === null;
     if (!rig) return;
     const [top, side] = this.#rig.querySelectorAll("svg");
-    drawRig(top, side, rig, this.#value("up"));
+    drawRig(top, side, rig, this.value("up"));
     const doubts = rig.doubts.map((doubt) => make("p", "is-warning", doubt));
     byId("rig-text", HTMLElement).replaceChildren(make("p", {}, rig.sentence), ...doubts);
   }
@@ -157,7 +135,7 @@ export class NewSession {
   #begin() {
     this.#made = "";
     this.#showButtons();
-    this.#checks.replaceChildren();
+    this.checks.replaceChildren();
   }
 
   /** @param {boolean} keepsAssignment whether the footage stays as assigned even if cameras seem exchanged */
@@ -167,11 +145,7 @@ export class NewSession {
     clearTimeout(this.#timer);
     if (this.#files !== this.#surveyed) await this.#survey(); // else the cameras would be those of other files
     this.#begin();
-    try {
-      await postJson("sessions/new", this.#request(keepsAssignment), (line) => this.#showLine(JSON.parse(line)));
-    } catch (error) {
-      this.#add("is-failed", error instanceof Error ? error.message : String(error));
-    }
+    await this.post("sessions/new", this.#request(keepsAssignment), (line) => this.#showLine(line));
     this.#make.disabled = false;
     this.#showButtons();
     if (this.#made) this.#openIt.focus();
@@ -186,22 +160,21 @@ export class NewSession {
 
   /** @param {boolean} keepsAssignment */
   #request(keepsAssignment) {
-    const optional = (/** @type {string} */ name) => this.#value(name) || null;
-    const list = (/** @type {string} */ name) => this.#value(name).split(",").map((part) => part.trim()).filter(Boolean); // prettier-ignore
+    const optional = (/** @type {string} */ name) => this.value(name) || null;
     return {
-      folder: this.#value("folder"),
-      calibration: this.#value("calibration"),
-      footage: this.#value("footage"),
+      folder: this.value("folder"),
+      calibration: this.value("calibration"),
+      footage: this.value("footage"),
       cameras: this.#cards.chosen,
-      people: list("people"),
-      heights: list("heights").map(Number),
-      models: list("models"),
-      up: this.#value("up"),
+      people: this.list("people"),
+      heights: this.list("heights").map(Number),
+      models: this.list("models"),
+      up: this.value("up"),
       units: optional("units"),
       poses: optional("poses"),
-      rescale: this.#field("rescale").checked,
-      common_frames: this.#field("common_frames").checked,
-      fps: this.#value("fps") ? Number(this.#value("fps")) : null,
+      rescale: this.field("rescale").checked,
+      common_frames: this.field("common_frames").checked,
+      fps: this.number("fps"),
       background: optional("background"),
       masks: optional("masks"),
       keep_assignment: keepsAssignment,
@@ -210,18 +183,18 @@ export class NewSession {
 
   /** @param {Line} line */
   #showLine({ passed, warning, failed, exchanged, made }) {
-    if (passed) this.#add("is-passed", passed);
-    if (warning) this.#add("is-warning", warning);
-    if (failed) this.#add("is-failed", failed);
+    if (passed) this.add("is-passed", passed);
+    if (warning) this.add("is-warning", warning);
+    if (failed) this.add("is-failed", failed);
     if (exchanged) this.#offerExchange(exchanged);
     if (!made) return;
     this.#made = made;
-    this.#add("is-passed", `The session is in ${made}.`);
+    this.add("is-passed", `The session is in ${made}.`);
   }
 
   /** @param {Exchanged} exchanged */
   #offerExchange({ cameras: [first, second], with_backgrounds: withSide, text }) {
-    const item = this.#add("is-warning", `${text[0].toUpperCase()}${text.slice(1)}. Nothing has been made yet.`);
+    const item = this.add("is-warning", `${text[0].toUpperCase()}${text.slice(1)}. Nothing has been made yet.`);
     const offer = (/** @type {string} */ label, /** @type {string} */ title, /** @type {() => void} */ run) => {
       const choice = make("button", { type: "button", title, onclick: run }, label);
       item.append(choice);
@@ -237,29 +210,8 @@ export class NewSession {
     exchange.focus();
   }
 
-  /**
-   * @param {string} kind
-   * @param {string} text
-   */
-  #add(kind, text) {
-    const item = make("li", kind, make("span", {}, text));
-    this.#checks.append(item);
-    item.scrollIntoView({ block: "nearest" });
-    return item;
-  }
-
   /** Footage and calibration in one text. */
   get #files() {
-    return JSON.stringify([this.#value("footage"), this.#value("calibration")]);
-  }
-
-  /** @param {string} name */
-  #field(name) {
-    return /** @type {HTMLInputElement} */ (this.#form.elements.namedItem(name));
-  }
-
-  /** @param {string} name */
-  #value(name) {
-    return this.#field(name).value.trim();
+    return JSON.stringify([this.value("footage"), this.value("calibration")]);
   }
 }

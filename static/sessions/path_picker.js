@@ -92,7 +92,6 @@ export class PathPicker {
   #row(entry) {
     const { name, path, kind } = entry;
     const isFolder = kind === "folder" || kind === "session";
-    const item = make("li");
     const open = make("button", { type: "button", className: `is-${kind}`, title: isFolder ? `Open the folder ${name}` : `Choose ${name}` });
     // Files are listed where a folder is wanted, so that it can be recognized.
     open.disabled = !isFolder && (this.#wanted === "folder" || (this.#wanted === "footage" && kind !== "video"));
@@ -110,8 +109,7 @@ export class PathPicker {
       if (isFolder) void this.#go(path);
       else if (!(event.ctrlKey || event.metaKey) || !this.#mark(open)) this.#finish(path);
     });
-    item.append(open);
-    return item;
+    return make("li", {}, open);
   }
 
   /**

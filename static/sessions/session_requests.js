@@ -1,5 +1,7 @@
 /** Requests about sessions: complete a path, and send JSON whose answer is read line by line. */
 
+import { make } from "../widgets/elements.js";
+
 /** Wait for a pause in typing before paths are completed. */
 const PAUSE_MS = 120;
 
@@ -19,13 +21,9 @@ export function completePaths(field, list) {
       try {
         const found = await (await fetch(`sessions/paths?text=${encodeURIComponent(text)}`)).json();
         if (field.value !== text) return;
-        list.replaceChildren(
-          ...found.map((/** @type {{path: string, is_session: boolean}} */ { path, is_session }) => {
-            const option = new Option("", path);
-            if (is_session) option.label = "session";
-            return option;
-          }),
-        );
+        const option = (/** @type {{path: string, is_session: boolean}} */ { path, is_session }) =>
+          make("option", { value: path, label: is_session ? "session" : "" });
+        list.replaceChildren(...found.map(option));
       } catch {
         // Completion is a convenience; opening says what is wrong.
       }
@@ -39,14 +37,16 @@ export function completePaths(field, list) {
  * @param {string} address
  * @param {unknown} body
  * @param {(line: string) => void} take called with each line of the answer as it arrives
- * @throws {Error} with the reason of the program, if it refuses
+ * @param {AbortSignal} [signal] ends the request
+ * @throws {Error} with the reason of the program, if it refuses; with that of the signal, if it ends the request
  */
-export async function postJson(address, body, take) {
+export async function postJson(address, body, take, signal) {
   const headers = { "Content-Type": "application/json" };
   let answer;
   try {
-    answer = await fetch(address, { method: "POST", headers, body: JSON.stringify(body) });
+    answer = await fetch(address, { method: "POST", headers, body: JSON.stringify(body), signal });
   } catch {
+    signal?.throwIfAborted();
     throw new Error("The program does not answer.");
   }
   if (!answer.ok || !answer.body) throw new Error(await answer.text());

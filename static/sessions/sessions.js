@@ -3,7 +3,10 @@
 import { byId, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { batchTable } from "./batch_table.js";
+import { BoardCalibration } from "./board_calibration.js";
 import { NewSession } from "./new_session.js";
+import { makePathField } from "./path_field.js";
+import { PathPicker } from "./path_picker.js";
 import { completePaths, postJson } from "./session_requests.js";
 
 const POLL_MS = 300;
@@ -25,7 +28,9 @@ export class Sessions {
   #form = byId("open-session", HTMLFormElement);
 
   #store;
+  #picker = new PathPicker();
   #create;
+  #board;
   /** Folder of the open session. */
   #present = "";
 
@@ -43,11 +48,13 @@ export class Sessions {
       event.preventDefault();
       void this.#choose(this.#folder.value);
     });
-    this.#create = new NewSession((folder) => {
+    this.#create = new NewSession(this.#picker, (folder) => {
       this.toggle();
       void this.#choose(folder);
     });
+    this.#board = new BoardCalibration(this.#picker, (out, up) => this.#create.showWith(out, up));
     byId("show-new-session", HTMLButtonElement).addEventListener("click", () => void this.showNew());
+    byId("show-board-calibration", HTMLButtonElement).addEventListener("click", () => void this.showBoard());
     completePaths(this.#folder, byId("session-folders", HTMLDataListElement));
     /** @type {string | undefined} */
     let first;
@@ -63,9 +70,7 @@ export class Sessions {
    *
    * @param {HTMLInputElement} input
    */
-  completes(input) {
-    this.#create.completes(input);
-  }
+  completes = (input) => makePathField(input, this.#picker);
 
   toggle() {
     togglePopover(this.#panel, this.#open);
@@ -76,15 +81,28 @@ export class Sessions {
   }
 
   /** Show the form of a new session, or why there is none. */
-  async showNew() {
+  showNew() {
+    return this.#showForm(this.#create, "session");
+  }
+
+  /** Show the form of a calibration by a board, or why there is none. */
+  showBoard() {
+    return this.#showForm(this.#board, "calibration");
+  }
+
+  /**
+   * @param {{show: () => void}} form
+   * @param {string} result
+   */
+  async #showForm(form, result) {
     const { refusal, folder } = await listed();
     if (refusal) {
-      this.#notify({ type: "notice", level: "error", text: `No session can be made here: ${refusal}` });
+      this.#notify({ type: "notice", level: "error", text: `No ${result} can be made here: ${refusal}` });
       return;
     }
     this.#present = folder;
     if (this.#panel.matches(":popover-open")) this.#panel.hidePopover();
-    this.#create.show();
+    form.show();
   }
 
   async #fill() {
@@ -112,14 +130,11 @@ export class Sessions {
 
   /** @param {Recent} session */
   #row({ folder, name, opened }) {
-    const item = make("li");
-    const open = make("button", { type: "button" });
-    open.title = `Close this session and open ${folder}`;
+    const title = `Close this session and open ${folder}`;
+    const open = make("button", { type: "button", title, onclick: () => void this.#choose(folder) });
     const when = make("time", { dateTime: opened }, new Date(opened).toLocaleDateString([], { day: "numeric", month: "short" }));
     open.append(make("b", {}, name), when, make("small", "is-clipped", make("bdi", {}, folder)));
-    open.addEventListener("click", () => void this.#choose(folder));
-    item.append(open);
-    return item;
+    return make("li", {}, open);
   }
 
   /**

@@ -29,7 +29,7 @@ class Page:
     """A page of the program, which has its cookie."""
 
     def __init__(self, session, origin):
-        self.session, self._origin = session, origin
+        self.session, self.origin = session, origin
 
     async def get(self, path, **headers):
         """See `answer`."""
@@ -37,7 +37,7 @@ class Page:
 
     async def post(self, path, body, **headers):
         """Post JSON, or bytes as they are; return status and text of the answer."""
-        headers = {"Origin": self._origin, "Content-Type": "application/json"} | headers
+        headers = {"Origin": self.origin, "Content-Type": "application/json"} | headers
         data = body if isinstance(body, bytes) else json.dumps(body).encode()
         async with self.session.post(path, data=data, headers=headers) as response:
             return response.status, await response.text()

@@ -20,12 +20,11 @@ from app.cli.arguments import (
 )
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
-from tracker.errors import Remedy, TrackerError
+from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tracker.calibration.boards.footage_calibration import FilmedCalibration
     from tracker.compute.progress import Report
     from tracker.geometry.cameras import Camera
 
@@ -86,15 +85,19 @@ def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) ->
 
     The board may be a ChArUco board, also partly visible, or a checkerboard. Ctrl+C stops it and writes nothing.
     """
+    from app.session.calibration_record import check_out, write_cameras
+
     _check(arguments)
+    check_out(arguments.out, arguments.overwrite)
     calibrate = _by_board if arguments.board is not None else _by_person
     with Reporter(silent=arguments.json).share("calibrating") as advance:
         cameras, record, text = calibrate(arguments, lambda stage, share, text="", /: advance(share))
-    _write(arguments, cameras)
+    write_cameras(arguments.out, cameras, arguments.layout)
     print(format_json(record) if arguments.json else text)
 
 
 def _by_board(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
+    from app.session.calibration_record import board_record
     from tracker.calibration.boards.board_description import read_board
     from tracker.calibration.boards.footage_calibration import FilmedBoard, calibrate_footage
 
@@ -110,7 +113,7 @@ def _by_board(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
         arguments.floor_frame,
     )
     found = calibrate_footage(filmed, report)
-    record = _record(arguments, found)
+    record = {"out": str(arguments.out), "layout": arguments.layout, **board_record(found)}
     return found.cameras, record, _format(record, arguments)
 
 
@@ -151,61 +154,11 @@ def _check(arguments: CalibrateArguments) -> None:
             raise TrackerError(f"expected {option} together with {source}, found it without; leave it out")
     if arguments.every is not None and arguments.every < 1:
         raise TrackerError(f"expected --every of at least 1, found {arguments.every}; correct it")
-    out = arguments.out
-    if out.is_dir():
-        raise TrackerError(f"expected {out} not to exist, found a folder", Remedy("another_file"))
-    if out.exists() and not arguments.overwrite:
-        raise TrackerError(f"expected {out} not to exist, found a file", Remedy("another_file_or_overwrite"))
-    if not out.parent.is_dir():
-        raise TrackerError(f"expected --out in a folder that exists, found none at {out.parent}; make it first")
-
-
-def _write(arguments: CalibrateArguments, cameras: "Sequence[Camera]") -> None:
-    from tracker.formats.anipose import write_calibration
-    from tracker.formats.calibrations.writing import write_layout
-
-    try:
-        if arguments.layout == "quadrille":
-            write_calibration(arguments.out, cameras)
-        else:
-            write_layout(arguments.out, arguments.layout, cameras)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise TrackerError(f"cannot write {arguments.out}: {reason}; choose a folder that you may write to") from error
-
-
-def _record(arguments: CalibrateArguments, found: "FilmedCalibration") -> dict[str, Any]:
-    """Return the result as plain data; docs/calibration.md lists its keys."""
-    import numpy as np
-
-    from app.cli.calibration.person_report import shared_record
-
-    board, rig = found.found, found.found.rig
-    cameras = [
-        {
-            "depth_ratio": lens.depth_ratio,
-            "views": np.unique(found.views.seen.frames[found.views.seen.cameras == i]).size,
-            "noise_px": float(rig.fit.sigmas_px[i]),
-        }
-        for i, lens in enumerate(board.lenses)
-    ]
-    shared = shared_record(cameras, rig.fit, board.held_out, rig.volume, rig.points_world)
-    return {
-        "out": str(arguments.out),
-        "layout": arguments.layout,
-        "frames": found.views.n_frames,
-        "views": found.views.n_views,
-        "views_from_behind": found.views.n_from_behind,
-        "corners": len(found.views.seen.px),
-        "adjusted_frames": len(rig.frames),
-        "held_out_frames": board.held_out.frames.tolist(),
-        "notes": list(board.notes),
-        **shared,
-    }
 
 
 def _format(record: dict[str, Any], arguments: CalibrateArguments) -> str:
-    low, high = record["interval_mm"]
+    from app.session.calibration_record import error_words
+
     behind = f", {record['views_from_behind']} of them from behind" if record["views_from_behind"] else ""
     lines = [
         f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['corners']} corners in "
@@ -218,11 +171,7 @@ def _format(record: dict[str, Any], arguments: CalibrateArguments) -> str:
             f"  {c['name']:{width}}  {c['views']:4} views, focal length {c['focal_px'][0]:7.1f} px "
             f"+- {c['focal_sigma_percent']:.1f}%, noise {c['noise_px']:.2f} px, {off}"
         )
-    size = " x ".join(f"{side:.1f}" for side in record["volume_m"])
-    lines.append(
-        f"expected error in the volume of the board ({size} m): {record['expected_error_mm']:.2f} mm, with 90% between "
-        f"{low:.2f} and {high:.2f} mm"
-    )
+    lines.append(error_words(record))
     lines += [f"note: {note}" for note in record["notes"]]
     if arguments.floor_frame is None:
         first = record["cameras"][0]["name"]

@@ -1,14 +1,12 @@
-"""The report of `quadrille calibrate --people`, and what that of `--board` shares with it."""
+"""The report of `quadrille calibrate --people`."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.session.calibration_record import shared_record
+
 if TYPE_CHECKING:
-    from tracker.calibration.boards.expected_error import VolumeError
-    from tracker.calibration.check.held_out import HeldOut
-    from tracker.calibration.check.reprojection import RigFit
     from tracker.calibration.self_calibration.person_calibration import PersonCalibration
 
 
@@ -32,38 +30,6 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
         "scale_sigma_percent": 100 * found.scale_sigma,
         "notes": list(found.notes),
         **shared_record(cameras, adjusted.fit, found.held_out, found.volume, joints),
-    }
-
-
-def shared_record(
-    rows: Sequence[dict[str, Any]], fit: "RigFit", held_out: "HeldOut", volume: "VolumeError", points_world: np.ndarray
-) -> dict[str, Any]:  # fmt: skip
-    """Return the entries that calibrations by boards and by people share.
-
-    Args:
-        rows: further entries of each camera.
-        fit: of all cameras.
-        held_out: errors on frames held out.
-        volume: error in the volume.
-        points_world: points in it, (P, 3), metres.
-    """
-    return {
-        "cameras": [
-            {
-                "name": c.name,
-                "size": list(c.size),
-                "focal_px": [float(c.K[0, 0]), float(c.K[1, 1])],
-                "focal_sigma_percent": 100 * float(sigma),
-                **row,
-                "held_out_px": held_out.rms_px(i),
-            }
-            for i, (c, row, sigma) in enumerate(zip(fit.rig.cameras, rows, fit.focal_sigmas, strict=True))
-        ],
-        "held_out_px": held_out.rms_px(),
-        "held_out_median_px": float(np.median(held_out.px)) if len(held_out.px) else None,
-        "volume_m": np.ptp(points_world, axis=0).tolist(),
-        "expected_error_mm": 1000 * volume.expected_m,
-        "interval_mm": [1000 * volume.low_m, 1000 * volume.high_m],
     }
 
 

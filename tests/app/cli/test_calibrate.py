@@ -76,7 +76,7 @@ def test_a_layout_is_written_and_the_report_is_read_by_people(run, footage, tmp_
 def test_the_right_description_is_named_where_none_is_found(run, footage, tmp_path, change, found):
     (tmp_path / "wrong.toml").write_text(TOML.replace(*change))
     result = run(*words(footage, tmp_path / "c.toml", board=tmp_path / "wrong.toml"))
-    assert_refused(result, ["no view in 14 frames of 3 cameras shows six corners", found, "correct the board file"])
+    assert_refused(result, ["no view in 14 frames of 3 cameras shows six corners", found, "correct the description"])
     assert not (tmp_path / "c.toml").exists()
 
 

@@ -1,15 +1,23 @@
 """What the form of a new session asks for: folders, small pictures, a survey of the files, exchanged cameras."""
 
+import asyncio
 import json
 import os
 import shutil
+import time
 
 import cv2
 import numpy as np
 import pytest
+from drawn_boards import arc, carried, filmed_folders
 from unreadable_folders import refuse_folders
 
+from tracker.calibration.boards import footage_calibration
+from tracker.calibration.boards.board_description import Board
+from tracker.formats.anipose import read_calibration
 from tracker.session.session import load_session
+
+BOARD = {"kind": "charuco", "columns": 4, "rows": 5, "square_mm": 100, "dictionary": "DICT_4X4_50"}
 
 
 @pytest.fixture
@@ -125,6 +133,76 @@ async def test_an_offset_of_0_is_given_on_purpose(folders, serve, form):
     cameras[1]["offset"] = 0
     lines = await client.make(form | {"cameras": cameras, "fps": 30})
     assert "made" in lines[-1], lines
+
+
+async def test_a_calibration_by_a_board_fails_before_footage_is_read(folders, serve):
+    client, walk = await serve(), folders[0]
+    form = {"footage": str(walk), "board": BOARD, "out": str(walk / "new.toml")}
+    for change, why in (
+        ({"out": str(walk / "calibration.toml")}, "not to exist, found a file; choose another file"),
+        ({"out": str(walk / "none" / "a.toml")}, "in a folder that exists, found none"),
+        ({"out": str(walk / f"{'a' * 250}.toml")}, "cannot write"),
+        ({"out": str(walk / "none" / "a.toml"), "footage": str(walk / "none")}, "expected a folder of videos"),
+        ({"footage": str(walk / "models")}, "expected videos"),
+        ({"board": str(walk / "gone.toml")}, "gone.toml"),
+        ({"board": BOARD | {"square_mm": 0.1}}, "use the command line if it is right"),
+        ({"board": {k: v for k, v in BOARD.items() if k != "dictionary"}}, "expected the set of markers"),
+        ({"fisheye": ["eve"]}, "expected a fisheye lens for one of"),
+        ({"out": "relative.toml"}, "expected a path from the root"),
+    ):
+        status, text = await client.open(form | change, "/sessions/calibrate")
+        assert (status, why in json.loads(text)["failed"]) == (200, True), text
+    assert (await client.open(form | {"board": 3}, "/sessions/calibrate"))[0] == 400
+    assert (await (await serve(why="no")).open(form, "/sessions/calibrate"))[0] == 403
+    assert not (walk / "new.toml").exists()
+
+
+async def test_a_page_that_is_gone_ends_a_calibration(folders, serve, monkeypatch):
+    client, walk, ended = await serve(), folders[0], []
+
+    def calibrate(_, report):
+        try:
+            for _ in range(1000):  # not for ever, so that the test ends if the work does not
+                report("corners", 0.5)
+                time.sleep(0.01)
+        except ConnectionResetError as error:
+            ended.append(error)
+            raise
+
+    monkeypatch.setattr(footage_calibration, "calibrate_footage", calibrate)
+    form = {"footage": str(walk), "board": BOARD, "out": str(walk / "new.toml")}
+    origin = {"Origin": client.origin}
+    async with client.session.post("/sessions/calibrate", json=form, headers=origin) as response:
+        line = json.loads(await response.content.readline())
+        assert line["progress"]["text"].startswith("Corners: 50%")
+        assert (await client.open(form, "/sessions/calibrate"))[0] == 409
+        response.close()
+    async with asyncio.timeout(20):
+        while not ended:
+            await asyncio.sleep(0.01)
+    assert not (walk / "new.toml").exists()
+
+
+@pytest.mark.slow
+async def test_a_calibration_by_a_board_is_written_beside_its_footage(serve, tmp_path):
+    board, client = Board("charuco", 4, 5, 0.1), await serve()
+    filmed_folders(tmp_path / "board", board, arc(), carried(board, 13))
+    out = tmp_path / "board" / "calibration.toml"
+    form = {"footage": str(tmp_path / "board"), "board": BOARD, "out": str(out)}
+    status, text = await client.open(form, "/sessions/calibrate")
+    *progress, last = [json.loads(line) for line in text.splitlines()]
+    assert all(one["progress"]["share"] <= 1 for one in progress)
+    found = last["calibrated"]
+    assert (status, found["out"], found["up"]) == (200, str(out), "-y")
+    assert "with 90% between" in found["sentence"]
+    names = [camera.name for camera in read_calibration(out)]
+    assert [(c["name"], c["footage"]) for c in found["cameras"]] == [(n, str(tmp_path / "board" / n)) for n in names]
+    for camera in found["cameras"]:
+        assert 5 <= camera["views"] <= 13
+        assert 0.01 < camera["covered_share"] < 0.6
+        assert camera["held_out_px"] < 0.5
+        assert len(camera["corners"]) > 2 * 12 * 5 > len(camera["gross"])
+        assert 0 <= min(camera["corners"]) <= max(camera["corners"]) <= 640
 
 
 @pytest.mark.slow

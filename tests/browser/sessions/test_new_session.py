@@ -1,92 +1,8 @@
 """The form of a new session: files, cameras, their places, and what happens when two seem to be exchanged."""
 
-import base64
-import json
-import re
-from urllib.parse import parse_qs, urlparse
-
 import pytest
-import pytest_asyncio
+from form_program import DOUBT, NAMES, PASSED, RIG, SURVEY
 from page_driver import shows, until
-
-LISTED = {"refusal": None, "folder": "/data/here", "recent": [], "batches": []}
-STARTED = {"steps": [], "at": 0, "folder": "/data/new"}
-NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
-FOLDERS = {
-    "/data": [("videos", "folder"), ("walk", "session"), ("cameras.toml", "file"), ("notes.txt", "file")],
-    "/data/videos": [*((f"{name}.mp4", "video") for name in NAMES), ("gopro7.mp4", "video")],
-}
-DOUBT = "The upper sides of the pictures point along y, not z: check which axis points up."
-RIG = {
-    "names": list(NAMES), "centers": [[3, 3, 2], [-3, 3, 2], [-3, -3, 2.5], [3, -3, 2]],
-    "axes": [[-0.7, -0.7, -0.2], [0.7, -0.7, -0.2], [0.7, 0.7, -0.3], [-0.7, 0.7, -0.2]], "point": [0, 0, 1],
-    "distances_m": [4.36, 4.36, 4.5, 4.36], "heights_m": [2, 2, 2.5, 2],
-    "sentence": "The cameras stand 4.36 to 4.50 m from the point at which they look.", "doubts": [DOUBT],
-}  # fmt: skip
-FOOTAGE = [{"path": f"/data/videos/{n}.mp4", "name": f"{n}.mp4"} for n in (*NAMES, "gopro7")]
-SURVEY = {
-    "cameras": list(NAMES), "footage": FOOTAGE, "assigned": {n: f"/data/videos/{n}.mp4" for n in NAMES[:3]},
-    "rig": RIG, "beside": {}, "problems": [],
-}  # fmt: skip
-PASSED = {"passed": "The calibration has 4 cameras."}
-EXCHANGED = {
-    "exchanged": {"cameras": ["FRONT", "BACK"], "with_backgrounds": True, "text": "these seem to be exchanged"}
-}
-PIXEL = base64.b64decode(
-    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
-)
-
-
-class Program:
-    """Answers what the form asks for."""
-
-    def __init__(self):
-        self.posted, self.surveyed, self.previews = [], [], set()
-        self.outcomes = [[PASSED, EXCHANGED], [PASSED, {"made": "/data/new"}]]
-        self.survey = SURVEY
-
-    async def answer(self, route):
-        url = urlparse(route.request.url)
-        what, query = url.path.partition("/sessions")[2], parse_qs(url.query)
-        if what == "/folder":
-            folder = query.get("path", ["/data"])[0].rstrip("/")
-            folder = folder.rpartition("/")[0] if "." in folder else folder  # that of a file
-            if folder not in FOLDERS:
-                await route.fulfill(status=400, body=f"expected a folder that can be read, found {folder}")
-                return
-            entries = [{"name": n, "path": f"{folder}/{n}", "kind": kind} for n, kind in FOLDERS[folder]]
-            parent = "/data" if folder != "/data" else None
-            await route.fulfill(json={"folder": folder, "parent": parent, "entries": entries, "is_cut_off": False})
-        elif what == "/preview":
-            self.previews.add(query["path"][0])
-            await route.fulfill(body=PIXEL, content_type="image/png")
-        elif what == "/models":
-            await route.fulfill(json={"models": ["gavrila22", "gavrila34"], "default": "gavrila34"})
-        elif what == "/survey":
-            self.surveyed.append(json.loads(route.request.post_data))
-            await route.fulfill(json=self.survey)
-        elif what == "/new":
-            self.posted.append(json.loads(route.request.post_data))
-            await route.fulfill(body="\n".join(map(json.dumps, self.outcomes[len(self.posted) - 1])))
-        elif what == "/open":
-            self.posted.append(json.loads(route.request.post_data))
-            await route.fulfill(json={"name": "new"})
-        else:
-            await route.fulfill(json=[] if what == "/paths" else LISTED)
-
-
-@pytest_asyncio.fixture(loop_scope="session")
-async def form(fresh_page):
-    """The page with the open form, and the program behind it."""
-    page, program = fresh_page, Program()
-    await page.route(re.compile(r"/sessions(/|[?]|$)"), program.answer)
-    await page.route("**/starting.json", lambda route: route.fulfill(json=STARTED))
-    await page.set_viewport_size({"width": 1280, "height": 720})
-    await page.keyboard.press("Control+k")
-    await page.keyboard.type("new session")
-    await page.keyboard.press("Enter")
-    await page.locator("#new-session[open]").wait_for()
-    return page, program
 
 
 async def choose_files(page):
@@ -214,7 +130,7 @@ async def test_footage_is_given_to_cameras_by_menu_drag_and_hand(form):
     await menus.nth(2).select_option("")
     await page.select_option("#new-poses", "camera-to-world")
     await page.check("#new-rescale")
-    await page.get_by_label("Common frames").check()
+    await page.check("#new-common-frames")
     await page.select_option("#new-units", "mm")  # the choices stay
     await shows(page, "document.querySelectorAll('#new-cameras li.is-left-out').length === 1")
     for field, value in {

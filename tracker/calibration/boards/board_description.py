@@ -173,7 +173,20 @@ def read_board(path: str | Path, any_size: bool = False) -> Board:
     Raises:
         CalibrationError: the file is missing or malformed, or the orientation of the board is ambiguous.
     """
-    data, where = read_toml(Path(path), KIND), f"board {path}"
+    return described_board(read_toml(Path(path), KIND), f"board {path}", any_size)
+
+
+def described_board(data: dict[str, Any], where: str = "board", any_size: bool = False) -> Board:
+    """Return the board of a description.
+
+    Args:
+        data: content of a file of one of the three forms.
+        where: names the description in messages.
+        any_size: whether to take squares of an unusual size.
+
+    Raises:
+        CalibrationError: the description is malformed, or the orientation of the board is ambiguous.
+    """
     declared, section = _form_of(data)
     found: Board = check(section, declared, where, CalibrationError).board()
     if not any_size:

@@ -43,8 +43,8 @@ def found_instead(board: Board, samples: Sequence[NDArray[np.uint8]]) -> str:
             break
     if most:
         return (
-            f"a {best.words} would be found in {most} of {len(samples)} pictures; correct the board file if it is "
-            "that one"
+            f"a {best.words} would be found in {most} of {len(samples)} pictures; correct the description "
+            "of the board if it is that one"
         )
     return (
         f"{n_tried} other descriptions (black and white exchanged, other sets of markers and numbers of squares) "

@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from tracker.calibration.boards.board_calibration import BoardCalibration, calibrate_rig
@@ -12,15 +13,18 @@ from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_diagnosis import found_instead
 from tracker.calibration.boards.board_footage import BoardViews, every_frame, read_corners
 from tracker.calibration.boards.view_choice import posed_views
+from tracker.calibration.check.reprojection import OUTLIER_SIGMAS
 from tracker.compute.progress import Report, part_of
 from tracker.errors import CalibrationError
 from tracker.footage.video import Footage, open_footage
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Mask
 from tracker.geometry.cameras import Camera
 from tracker.session.matching import camera_name, common_length, match_footage
 
-_READING_SHARE = 0.9
-"""Share of the time that reading the footage takes, for the time that is left."""
+_SOLVING_FRAMES = 50
+"""Number of frames that are read in the time of lenses and adjustment, for the time that is left. The 48 frames of four
+real cameras (board_real) have 41; longer footage has more, up to the `MAX_FRAMES` of the adjustment."""
 _TURNED = np.diag([1.0, -1.0, -1.0, 1.0])
 """From a board's axes (y down, z into the board) to those of a floor: x as before, z up."""
 
@@ -56,6 +60,22 @@ class FilmedCalibration:
     """Its cameras are in the world of the first one."""
     views: BoardViews
 
+    @property
+    def is_gross(self) -> Mask:
+        """Whether the adjustment took each corner of `views` for a gross error, (N,); not if it left out the frame."""
+        seen, rig = self.views.seen, self.found.rig
+        errors_px = np.zeros(len(seen.px))
+        errors_px[np.isin(seen.frames, rig.frames)] = np.linalg.norm(rig.fit.errors_px, axis=1)
+        return ~(errors_px <= OUTLIER_SIGMAS * rig.fit.sigmas_px[seen.cameras])
+
+    def covered_share(self, camera: int) -> float:
+        """Return the share of a camera's picture that lies between corners of the board in some view, 0 to 1."""
+        seen = self.views.seen.of_camera(camera)
+        covered = np.zeros(self.cameras[camera].size[::-1], np.uint8)
+        for px in np.split(seen.px, np.flatnonzero(np.diff(seen.frames)) + 1):
+            cv2.fillConvexPoly(covered, cv2.convexHull(px.round().astype(np.int32)), 1)
+        return float(covered.mean())
+
 
 def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
     """Calibrate the cameras that have filmed a board.
@@ -82,12 +102,13 @@ def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
                 )
             # The frame must be among those that are looked at.
             frames = range(filmed.floor_frame % frames.step, n_frames, frames.step)
-        views = read_corners(filmed.board, footage, filmed.offsets, frames, part_of(report, 0.0, _READING_SHARE))
+        read_share = len(frames) / (len(frames) + _SOLVING_FRAMES)
+        views = read_corners(filmed.board, footage, filmed.offsets, frames, part_of(report, 0.0, read_share))
         sizes = [f.size for f in footage.values()]
     _check_found(filmed.board, views, list(paths))
     fisheye = [name in filmed.fisheye for name in paths]
     found = calibrate_rig(
-        filmed.board, views.seen, list(paths), sizes, fisheye, filmed.floor_frame, part_of(report, _READING_SHARE, 1.0)
+        filmed.board, views.seen, list(paths), sizes, fisheye, filmed.floor_frame, part_of(report, read_share, 1.0)
     )
     cameras = found.rig.cameras
     if filmed.floor_frame is not None:
