@@ -218,8 +218,7 @@ def _usual_sizes(_: State, stored: StoredWork) -> Iterator[Advice]:
 
 def _done(_: State, stored: StoredWork) -> Iterator[Advice]:
     if stored.is_tracked and not stored.unplaced and not any(p.n_unsure for p in stored.people):
-        text = f"All {stored.n_poses:,} poses are good or looked at."
-        yield Advice("done", text, (Action("export", "Export…"),))
+        yield Advice("done", f"All {stored.n_poses:,} poses are good or looked at.", (Action("export", "Export…"),))
 
 
 SITUATIONS: Sequence[_Situation] = (

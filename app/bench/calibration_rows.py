@@ -28,8 +28,7 @@ def adjustment(yardstick: Yardstick) -> list[Row]:
     fit, timed = solve(), yardstick.beside(solve, 7)
     theirs = yardstick.beside(partial(_by_scipy, problem, start), 1)
     what = f"{_N_CAMERAS} cameras and {_N_POINTS} points adjusted"
-    ratio = theirs.work_us / timed.work_us
-    note = f"{fit.evaluations} evaluations; {ratio:.0f} times faster than scipy"
+    note = f"{fit.evaluations} evaluations; {theirs.work_us / timed.work_us:.0f} times faster than scipy"
     must = min(in_yardsticks(100), theirs.work_us / theirs.yardstick_us / 8)
     rows = [Row("adjust_points", what, *timed, must, must / 2, note)]
     found = _by_scipy(problem, start)
@@ -80,8 +79,7 @@ def _by_scipy(problem: PointProblem, start: Rig) -> Rig:
         return np.concatenate([reprojection.ravel(), offsets * np.sqrt(problem.precision)])
 
     rows = np.arange(2 * len(seen.px)).reshape(-1, 2)
-    width = int(problem.ends[1])
-    of_camera = problem.ends[seen.cameras][:, None] + np.arange(width)
+    of_camera = problem.ends[seen.cameras][:, None] + np.arange(int(problem.ends[1]))
     of_point = n + 3 * seen.groups[:, None] + np.arange(3)
     columns = np.concatenate([of_camera, of_point], axis=1)
     at = (

@@ -103,8 +103,7 @@ def _compile_posing(session: Session) -> list[PosedBody]:
     """Compile the kernels that place and drag a body; return the people in their default poses."""
     cameras = [c.camera for c in session.cameras]
     bodies = [PosedBody(p.model, default_pose(p.model, cameras, np.eye(3), 0.0)) for p in session.people]
-    held = grab(bodies[0].model, bodies[0].values, cameras[0], "left_wrist", np.zeros(2))
-    drag(held, np.ones(2), bodies[0].values)
+    drag(grab(bodies[0].model, bodies[0].values, cameras[0], "left_wrist", np.zeros(2)), np.ones(2), bodies[0].values)
     record_stage("posing")
     return bodies
 
@@ -189,8 +188,7 @@ def _track(
     from tracker.estimation.tracking.tracker import TrackingRun
 
     with Recording(cameras) as recording:
-        frames = range(_FRAME, _FRAME + _FRAMES)
-        run = TrackingRun(Observer(cameras, recording), Subjects.of(models), start, frames)
+        run = TrackingRun(Observer(cameras, recording), Subjects.of(models), start, range(_FRAME, _FRAME + _FRAMES))
         for _ in ChamferTracker(settings).estimates(run):
             pass
 

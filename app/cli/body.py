@@ -32,8 +32,7 @@ def command(arguments: Annotated[BodyArguments, tyro.conf.arg(name="")]) -> None
     joints in space; tracked poses keep the former body until they are tracked again. One entry of the history: the page
     undoes it.
     """
-    at = load_target(arguments.session, arguments.person, several=False)
-    found = move_to(at, arguments.to)
+    found = move_to(load_target(arguments.session, arguments.person, several=False), arguments.to)
     print(format_json(found) if arguments.json else _format(found))
 
 

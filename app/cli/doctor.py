@@ -118,8 +118,7 @@ def _folder(name: str, path: Path, otherwise: str) -> Finding:
     if not os.access(there, os.W_OK):
         return Finding(name, "warning", f"not writable: {otherwise}; give the account the right to write there")
     free = shutil.disk_usage(there).free
-    state = "ok" if free >= _LITTLE_BYTES else "warning"
-    return Finding(name, state, f"writable, {free / 1e9:.1f} GB free")
+    return Finding(name, "ok" if free >= _LITTLE_BYTES else "warning", f"writable, {free / 1e9:.1f} GB free")
 
 
 def _kernels() -> Finding:

@@ -120,12 +120,8 @@ def _format(found: dict[str, Any]) -> str:
         errors = found["per_part_axis_deg"].items()
         lines += [f"  {part.replace('_', ' '):16} {error:6.2f} deg" for part, error in errors]
     lines += [f"note: {note}" for note in found["notes"]]
-    lines[1:1] = [f"  {_metric(name, value)}" for name, value in found["metrics"].items()]
+    lines[1:1] = [f"  {metrics()[n].title} {v:.4g} {metrics()[n].unit}".rstrip() for n, v in found["metrics"].items()]
     return "\n".join(lines)
-
-
-def _metric(name: str, value: float) -> str:
-    return f"{metrics()[name].title} {value:.4g} {metrics()[name].unit}".rstrip()
 
 
 def _lost(found: dict[str, Any]) -> str:

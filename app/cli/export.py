@@ -144,8 +144,7 @@ def _export_dataset(arguments: ExportArguments) -> None:
         raise TrackerError(f"expected --frames with one session, found {len(sessions)}: their frames differ")
     choice, names = parse_splits(arguments.split, "--split"), recording_names(sessions)
     targets = [load_target(folder, arguments.person, several=True) for folder in sessions]
-    given = {name: getattr(arguments, name) for name in OPTIONS}
-    options = check_options(chosen, targets[0].session, given)
+    options = check_options(chosen, targets[0].session, {name: getattr(arguments, name) for name in OPTIONS})
 
     def read(at: Target) -> "ExportedMotion":
         frames = parse_frame_list(arguments.frames, at.session.n_frames, "--frames") if arguments.frames else None

@@ -153,8 +153,7 @@ def _masks(session: "Session", name: str) -> dict[str, Any]:
 
 
 def _format(summary: dict[str, Any]) -> str:
-    head = f"{summary['name']}: {summary['frames']} frames at {summary['fps']:g} per second, up is {summary['up']}"
-    lines = [head]
+    lines = [f"{summary['name']}: {summary['frames']} frames at {summary['fps']:g} per second, up is {summary['up']}"]
     for c in summary["cameras"]:
         extras = "".join(f", {name}" for name in ("background", "masks") if c[name])
         shift = f", offset {c['offset']}" if c["offset"] else ""

@@ -79,8 +79,7 @@ def observability(at: Target, frame: int | None, frames: str | None, another_cam
     from tracker.geometry.ground_plane import up_rotation
 
     session, (index,) = at
-    wanted = range(frame, frame + 1) if frame is not None else parse_frames(frames, session)
-    scenes = _scenes(at, wanted)
+    scenes = _scenes(at, range(frame, frame + 1) if frame is not None else parse_frames(frames, session))
     if not scenes:
         where = f"frame {frame}" if frame is not None else "the frames" if frames else "the session"
         raise SessionError(

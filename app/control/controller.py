@@ -140,8 +140,7 @@ class Controller:
         """Changes and estimates the clocks of the cameras."""
         self.observing: Observing = host.observing if host else Observing(session_state, activities, self.finding)
         """Shows, judges and imports observations of other programs."""
-        reader = None if host is None else host.annotating
-        self.annotating: Annotating = Annotating(session_state, activities, reader)
+        self.annotating: Annotating = Annotating(session_state, activities, None if host is None else host.annotating)
         """Plans tasks, decides on them, and comments."""
         self.proposing = Proposing(session_state)
         """Proposes the next best click."""

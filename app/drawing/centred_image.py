@@ -60,5 +60,4 @@ def _reach(camera: Camera) -> Array:
     """Return the largest distance of the image from the optical axis along x and y, (2,), at depth 1."""
     w, h = camera.size
     corners = np.array([[-0.5, -0.5], [w - 0.5, -0.5], [-0.5, h - 0.5], [w - 0.5, h - 0.5]])
-    homogeneous = np.column_stack([corners, np.ones(4)])
-    return np.abs(np.linalg.solve(camera.K, homogeneous.T)[:2]).max(axis=1)
+    return np.abs(np.linalg.solve(camera.K, np.column_stack([corners, np.ones(4)]).T)[:2]).max(axis=1)

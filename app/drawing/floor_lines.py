@@ -28,7 +28,8 @@ def floor_lines(session: Session, state: State) -> list[Path]:
     out = []
     for index, view in enumerate(views):
         if picking.plane is not None:
-            grid = _grid(picking.plane, up_rotation(state.floor.up, picking.plane), _middle(picking))
+            middle = np.mean([p.point_world for p in picking.picks if p.point_world is not None], axis=0)
+            grid = _grid(picking.plane, up_rotation(state.floor.up, picking.plane), middle)
             out.append(Path(index, 0, "floor", KIND_COLORS["floor"], _seen(view, grid)))
         out.append(Path(index, 0, "floor", KIND_COLORS["floor"], _marks(picking, index, view)))
         lines = _lines_of_sight(picking, index, views)
@@ -39,15 +40,10 @@ def floor_lines(session: Session, state: State) -> list[Path]:
     return out
 
 
-def _middle(picking: Picking) -> Array:
-    return np.mean([p.point_world for p in picking.picks if p.point_world is not None], axis=0)
-
-
 def _grid(plane: GroundPlane, R: Array, middle: Array) -> Array:
     """Return pieces of the lines of a square grid in a plane, (N, 2, 3), metres."""
     along = np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _PIECE_M)
-    across = np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _STEP_M)
-    x, y = np.meshgrid(along, across)
+    x, y = np.meshgrid(along, np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _STEP_M))
     origin = middle - (plane.normal @ middle - plane.offset_m) * plane.normal
     lines = np.concatenate([np.stack([x, y], -1), np.stack([y, x], -1)])  # (lines, pieces, 2)
     points = origin + lines @ R[:, :2].T
@@ -57,8 +53,7 @@ def _grid(plane: GroundPlane, R: Array, middle: Array) -> Array:
 def _seen(view: Camera, pieces: Array) -> np.ndarray:
     """Project pieces of lines into a view: x0, y0, x1, y1, (N, 4), undistorted px."""
     ends = view.project(pieces).reshape(-1, 4)
-    inside = np.all(np.isfinite(ends) & (np.abs(ends) < 4 * max(view.size)), axis=1)
-    return ends[inside].astype(np.float32)
+    return ends[np.all(np.isfinite(ends) & (np.abs(ends) < 4 * max(view.size)), axis=1)].astype(np.float32)
 
 
 def _marks(picking: Picking, index: int, view: Camera) -> np.ndarray:

@@ -109,8 +109,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         out += _found(state, bodies, camera, index, view)
         for kind, poses in outlined:
             if poses is not None:
-                outlined_then = ahead(bodies_in(session, state, poses), times[index])
-                out += _outlined(outlined_then, camera, index, kind)
+                out += _outlined(ahead(bodies_in(session, state, poses), times[index]), camera, index, kind)
         if index in edges:
             out.append(Path(index, 0, "part_edge", KIND_COLORS["part_edge"], edges[index]))
         if views is not None:

@@ -93,8 +93,7 @@ def thumbnail(
     people = np.repeat(np.arange(len(bodies)), [len(b.model.parts) for b in bodies])
     shown = ~contour.occluded
     for person, color in enumerate(colors):
-        pieces = contour.pieces_px[shown & (people == person)[contour.parts]]
-        draw_lines(drawn, pieces, overlay_colors.rgb(color), 2)
+        draw_lines(drawn, contour.pieces_px[shown & (people == person)[contour.parts]], overlay_colors.rgb(color), 2)
     # The limb also where it is occluded: that is often why it is lost.
     draw_lines(drawn, contour.pieces_px[limb[contour.parts]], overlay_colors.rgb(overlay_colors.NEUTRAL), 2)
     return pictures.footage(drawn, (SIZE_PX, SIZE_PX))

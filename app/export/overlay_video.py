@@ -69,8 +69,7 @@ def write_overlay_video(
                 if cast is not None:
                     view = np.hstack([view, draw_bodies(cast.bodies(frame), camera)])
                 _label(view, f"{camera.name}  {frame}" if len(shown) > 1 else str(frame))
-                at = (k % columns * tile[0], k // columns * tile[1])
-                _place(picture, view, at, tile)
+                _place(picture, view, (k % columns * tile[0], k // columns * tile[1]), tile)
             writer.write(picture)
             tick()
 

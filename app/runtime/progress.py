@@ -137,8 +137,7 @@ def pace_text(pace: Pace, left: int) -> str:
     """Return the rate, and the time that `left` items will take, such as `, 4.1/s, 12 s left`; empty if unknown."""
     if pace.item_s is None:
         return ""
-    seconds = left * pace.item_s
-    return f", {1 / pace.item_s:.1f}/s" + (f", {duration_text(seconds)} left" if left else "")
+    return f", {1 / pace.item_s:.1f}/s" + (f", {duration_text(left * pace.item_s)} left" if left else "")
 
 
 class _PaceColumn(ProgressColumn):

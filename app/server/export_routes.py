@@ -20,6 +20,7 @@ from aiohttp import web
 from app.runtime.jobs import StoppedError
 from app.runtime.temporary_folder import TemporaryFolder
 from app.server import connections
+from app.server.page_requests import require_page
 from tracker.errors import TrackerError
 from tracker.interchange.exports.export_format import ExportFormat
 from tracker.interchange.exports.formats import FORMATS, OPTIONS
@@ -94,9 +95,7 @@ class ExportRoutes:
 
     async def _answer(self, request: web.Request, make: Callable[[Path], Path]) -> web.StreamResponse:
         """Send the file that `make` returns; it is made in a temporary folder."""
-        # Without a token, an image in a foreign page could start the work, though never read the result.
-        if request.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
-            raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")
+        require_page(request, None)
         if self._busy.locked():
             raise web.HTTPConflict(text="Another export is in progress; wait for it to finish.")
         async with self._busy:

@@ -83,8 +83,7 @@ class NewSessionRoutes:
         return web.Response(body=made, content_type="image/jpeg")
 
     async def _survey(self, request: web.Request) -> web.Response:
-        form = await read_body(request, SurveyForm, self._refusal)
-        found = await asyncio.to_thread(survey, form)
+        found = await asyncio.to_thread(survey, await read_body(request, SurveyForm, self._refusal))
         return web.Response(body=msgspec.json.encode(found), content_type="application/json")
 
     async def _make(self, request: web.Request) -> web.StreamResponse:

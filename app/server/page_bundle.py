@@ -89,8 +89,7 @@ class _Bundle:
             self._n_modules += 1
             self._names[path] = name = f"$module{self._n_modules}"
             if path in self._separate:
-                relative = posixpath.relpath(path, self._folder or ".")
-                self.parts.append(f'import * as {name} from "./{relative}";\n')
+                self.parts.append(f'import * as {name} from "./{posixpath.relpath(path, self._folder or ".")}";\n')
             else:
                 self.add(path, name)
         bound = found["whole"] or "{" + re.sub(r"(\w+) as (\w+)", r"\1: \2", found["names"]) + "}"

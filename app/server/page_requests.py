@@ -28,7 +28,7 @@ def require_page(request: web.Request, refusal: str | None) -> None:
     if refusal is not None:
         raise web.HTTPForbidden(text=refusal)
     # Without a token, an image in a foreign page could start work, though never read the result.
-    if request.headers.get("Sec-Fetch-Site", "same-origin") != "same-origin":
+    if request.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
         raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")
 
 

@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from aiohttp import web
 
 from app.remedies import page_text
+from app.server.page_requests import require_page
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
@@ -51,9 +52,7 @@ class ThumbnailRoutes:
         """Make a picture in the thread of the thumbnails."""
         person, frame = _number(request.match_info["person"]), _number(request.match_info["frame"])
         limb = _number(request.query["limb"]) if "limb" in request.query else None
-        # Without a token, an image in a foreign page could start the work, though never read the result.
-        if request.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
-            raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")
+        require_page(request, None)
         if self._n_waiting >= _MAX_WAITING or self._is_busy():
             raise web.HTTPServiceUnavailable(text="No thumbnail can be made now; try again later.")
 

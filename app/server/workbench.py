@@ -22,6 +22,7 @@ from app.server.access import is_loopback
 from app.server.copy_routes import CopyRoutes
 from app.server.doorway import Doorway
 from app.server.export_routes import ExportRoutes
+from app.server.key_routes import KeyRoutes
 from app.server.observation_routes import ObservationRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever
@@ -127,6 +128,7 @@ def open_session(
             no_paths = refusal(is_private, serving.token)
             others = SessionRoutes(session.folder, tokens, no_paths, lambda: controller.state.save_error)
             others.add_to(app)
+            KeyRoutes(tokens, serving.token).add_to(app)
             ObservationRoutes(controller, no_paths).add_to(app)
             CopyRoutes(controller, no_paths).add_to(app)
             ThumbnailRoutes(thumbnails.jpeg, lambda: not _can_draw(controller)).add_to(app)

@@ -72,7 +72,7 @@ class FrameCache:
         self._images = ByteBoundedCache(self._undistorted, _IMAGE_BYTES)
         self._pictures = ByteBoundedCache(self._picture, _PICTURE_BYTES)
         self._resamplers = lru_cache(_SIZES)(self._resampler)
-        self._evidence = ByteBoundedCache(self._compute_evidence, _EVIDENCE_BYTES)
+        self._evidence = ByteBoundedCache(lambda key: self.observer.evidence(key[0]), _EVIDENCE_BYTES)
 
     def images(self, frame: int) -> tuple[Image | None, ...]:
         """Return the undistorted images of all views, shared by all callers; None for a damaged or unreadable one."""
@@ -251,9 +251,6 @@ class FrameCache:
         frame, camera, _ = key
         image = self._read(frame, camera)
         return None if image is None else self.observer.cameras[camera].camera.undistort_image(image)
-
-    def _compute_evidence(self, key: tuple[int, ...]) -> tuple[ViewEvidence, ...]:
-        return self.observer.evidence(key[0])
 
     def _versions(self, frame: int) -> tuple[int, ...]:
         """Return a frame and the version of each camera's footage, which its evidence depends on."""

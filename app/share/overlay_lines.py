@@ -69,8 +69,7 @@ def polylines(segments_px: FloatArray, scale: float, tolerance_px: float) -> lis
     for run in np.split(segments_px, np.flatnonzero(gaps) + 1):
         line = np.vstack([run[:, :2], run[-1:, 2:]]) * scale + 0.5 * (scale - 1)  # pixel centres lie at integers
         kept = cv2.approxPolyDP(line.astype(np.float32), tolerance_px, False).reshape(-1, 2)
-        units = np.round(kept * UNITS_PER_PX).astype(int)
-        out.append(np.diff(units, axis=0, prepend=0).ravel().tolist())
+        out.append(np.diff(np.round(kept * UNITS_PER_PX).astype(int), axis=0, prepend=0).ravel().tolist())
     return out
 
 

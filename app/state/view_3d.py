@@ -55,8 +55,7 @@ def restored(data: object) -> View3d:
     if not isinstance(data, Mapping):
         return default
     are_switches = [f.name for f in fields(View3d) if isinstance(getattr(default, f.name), bool)]
-    switches = {name: data[name] for name in are_switches if isinstance(data.get(name), bool)}
-    view = replace(default, **switches)
+    view = replace(default, **{name: data[name] for name in are_switches if isinstance(data.get(name), bool)})
     if data.get("colors") in ("parts", "people"):
         view = replace(view, colors=data["colors"])
     if data.get("character") in PRESETS:

@@ -106,8 +106,7 @@ def write_rescue(path: Path, rescue: Rescue) -> None:
     """
     edits = [_Edit(e.label, [_encoded(c) for c in e.changes], *e[2:]) for e in rescue.edits]
     text = msgspec.json.encode(_Content(_VERSION, *rescue[:-1], edits))
-    checksum = hashlib.sha256(text).hexdigest()
-    write_text_atomic(path, f"{checksum}\n{text.decode()}\n", 0o600)
+    write_text_atomic(path, f"{hashlib.sha256(text).hexdigest()}\n{text.decode()}\n", 0o600)
 
 
 def read_rescue(path: Path) -> Rescue:
@@ -147,13 +146,9 @@ def _check_version(path: Path, text: bytes) -> None:
 
 
 def _encoded(change: Change) -> _Change:
+    # Numbers of numpy are encoded exactly, as those of Python.
     kind: Any = _NAMES[type(change)]
-    return _Change(kind, msgspec.Raw(msgspec.json.encode(change, enc_hook=_listed)))
-
-
-def _listed(values: Any) -> Any:
-    """Encode an array of numbers exactly; numbers and text of numpy as those of Python."""
-    return values.tolist()
+    return _Change(kind, msgspec.Raw(msgspec.json.encode(change, enc_hook=lambda values: values.tolist())))
 
 
 def _decoded(change: _Change, named: dict[int, Model], models: dict[int, BodyModel]) -> Change:

@@ -38,8 +38,7 @@ class ModelRevisions:
     def body(self, revision: int) -> BodyModel:
         """Return the body model of a revision: always the same object, so that its cached values are kept."""
         if revision not in self._bodies:
-            text = self._store.model_revision(revision).toml
-            body = parse_model(text, f"of the store, revision {revision}")
+            body = parse_model(self._store.model_revision(revision).toml, f"of the store, revision {revision}")
             self._store.require_fit(revision, len(body.value_names), self._value_counts)
             self._bodies[revision] = body
         return self._bodies[revision]

@@ -12,12 +12,11 @@ export function annotationBindings(section, review, reveal) {
   const noVerdict = () => review.whyNoVerdict;
   const words = "dataset plan annotation task";
   return inArea("Annotation", [
-    { keys: ["Alt U"], label: "Plan, tasks and comments", words, run: () => reveal() },
+    { label: "Plan, tasks and comments", words, run: () => reveal() },
     { keys: ["Alt T"], label: "Next task", words, why: noTask, run: () => review.step(1) },
-    { keys: [], label: "Previous task", words, why: noTask, run: () => review.step(-1) },
+    { label: "Previous task", words, why: noTask, run: () => review.step(-1) },
     { keys: ["Alt K"], label: "Accept the planned pose", words: `${words} verify reviewer next`, why: noVerdict, run: () => review.accept() },
     {
-      keys: ["Alt R"],
       label: "Reject the planned pose",
       words: `${words} reviewer comment`,
       why: noVerdict,
@@ -28,7 +27,6 @@ export function annotationBindings(section, review, reveal) {
       },
     },
     {
-      keys: ["Alt C"],
       label: "Next best click",
       words: `${words} propose where a correction lowers the expected error most`,
       why: section.click.why,
@@ -38,7 +36,6 @@ export function annotationBindings(section, review, reveal) {
       },
     },
     {
-      keys: ["Alt M"],
       label: "Comment on the selected limb",
       words: `${words} remark`,
       run: () => {
@@ -47,7 +44,6 @@ export function annotationBindings(section, review, reveal) {
       },
     },
     {
-      keys: [],
       label: "Plan frames to annotate",
       words: `${words} assign every diverse doubted`,
       run: () => {

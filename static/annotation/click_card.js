@@ -20,7 +20,7 @@ export function clickCard({ store, send }, visits) {
     send({ type: "annotation", action: "next_click" });
     show();
   };
-  const button = textButton("Next best click", "Go to the frame and limb where a correction lowers the expected error most (Alt+C)", ask);
+  const button = textButton("Next best click", "Go to the frame and limb where a correction lowers the expected error most", ask);
   const again = textButton("Show it", "Go to the proposed limb again", () => visit());
   const buttons = make("div", "plan-buttons click-card", button, again);
   const text = make("p", { className: "section-note click-card", role: "status" });
@@ -69,6 +69,5 @@ export function describe({ message, click, error_mm, interval_mm, after_mm }, vi
  */
 function gained(before, after) {
   const fall = before - after;
-  const words = fall < 0.005 ? "no gain yet" : `${fall.toFixed(2)} mm gained`;
-  return ` Now ${after.toFixed(1)} mm expected: ${words}.`;
+  return ` Now ${after.toFixed(1)} mm expected: ${fall < 0.005 ? "no gain yet" : `${fall.toFixed(2)} mm gained`}.`;
 }

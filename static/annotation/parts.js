@@ -21,16 +21,12 @@ export function fold(title, hint, ...content) {
  * @param {(text: string) => void} send
  */
 export function lineForm(name, action, send) {
-  const form = make("form", "plan-line");
   const input = make("input", { className: "query-field", type: "text", placeholder: name, autocomplete: "off", maxLength: 2000, "aria-label": name });
   const button = make("button", { type: "submit", title: `${action}: ${name}` }, action);
-  const offered = make("datalist");
-  offered.id = `offered-${action.toLowerCase()}`;
+  const offered = make("datalist", { id: `offered-${action.toLowerCase()}` });
   input.setAttribute("list", offered.id);
-  form.append(input, button, offered);
-  const enable = () => {
-    button.disabled = !input.value.trim();
-  };
+  const form = make("form", "plan-line", input, button, offered);
+  const enable = () => (button.disabled = !input.value.trim());
   enable();
   input.addEventListener("input", enable);
   form.addEventListener("submit", (event) => {

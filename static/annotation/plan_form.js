@@ -14,7 +14,6 @@ const WAYS = [
 
 /** @param {import("../model/index.js").Context} context */
 export function planForm({ store, send, say }) {
-  const form = make("form", "plan-form");
   const way = select("Frames", WAYS);
   const number = field("N", "15", "Distance of the frames, or number of poses");
   const frames = field("List", "0,40,100:110", "Frames and ranges; the end of a range is not included");
@@ -23,7 +22,7 @@ export function planForm({ store, send, say }) {
   const each = make("input", { type: "checkbox" });
   const eachLabel = make("label", { className: "plan-check", title: "Give all frames to each annotator instead" }, each, "all frames to each");
   const plan = make("button", { className: "is-primary", type: "submit", title: "Add these frames to the plan; tasks that are there already stay" }, "Plan");
-  form.append(way.label, number.label, frames.label, person.label, to.label, eachLabel, plan);
+  const form = make("form", "plan-form", way.label, number.label, frames.label, person.label, to.label, eachLabel, plan);
   number.input.inputMode = "numeric";
 
   const names = () => to.input.value.split(",").map((name) => name.trim()).filter(Boolean); // prettier-ignore

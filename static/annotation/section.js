@@ -20,7 +20,7 @@ export function annotationSection(context, review, visits) {
   const tasks = taskList(store, review, visits);
   const next = textButton("Next task", "Go to the next listed task (Alt+T)", () => review.step(1));
   const accept = textButton("Accept", "Verify the pose of the active person here (Alt+K)", () => review.accept());
-  const refuse = textButton("Reject …", "Reject the pose here, and say what is to be corrected (Alt+R)", () => askReason());
+  const refuse = textButton("Reject …", "Reject the pose here, and say what is to be corrected", () => askReason());
   const leave = textButton("Withdraw", "Take this frame out of the plan", () => review.withdraw(), { id: "plan-withdraw" });
   const buttons = make("div", "plan-buttons", next, accept, refuse, leave);
   const here = make("p", "section-note");

@@ -38,8 +38,8 @@ const NUMBERS = {
  */
 export function calibrationSection({ store, send }) {
   const act = (/** @type {Action} */ action) => send({ type: "calibration_check", action });
-  const start = textButton("Check the cameras", "Compare contours of the tracked people with the calibration; changes nothing", () => act("start"));
-  start.className = "is-primary";
+  const title = "Compare contours of the tracked people with the calibration; changes nothing";
+  const start = textButton("Check the cameras", title, () => act("start"), { className: "is-primary" });
   const work = workRow("Stop the check; nothing is changed", () => act("stop"));
   const result = make("div");
   const preview = textButton("Preview", "Show the people and cameras as corrected, on the shown frame", () =>
@@ -171,8 +171,7 @@ function describe(found) {
     const lines = mended(camera);
     cell.replaceChildren(...lines.map(({ text, title }) => make("div", { title }, text)));
   }
-  const used = sectionNote(`Frames used: ${found.frames.join(", ")}`);
-  return [...notes, table, used];
+  return [...notes, table, sectionNote(`Frames used: ${found.frames.join(", ")}`)];
 }
 
 /**
@@ -221,6 +220,5 @@ function signed(value, digits) {
 /** @param {string} text */
 function capital(text) {
   if (!text) return "";
-  const end = text.endsWith(".") ? "" : ".";
-  return `${text[0].toUpperCase()}${text.slice(1)}${end}`;
+  return `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
 }

@@ -2,7 +2,7 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
-import { command, group, workRow } from "./parts.js";
+import { command, workRow } from "./parts.js";
 import { choiceRow, sectionNote } from "./rows.js";
 
 /**
@@ -59,8 +59,7 @@ export function clocksSection({ store, send, navigation }) {
   const work = workRow("Stop; nothing is changed", () => use("stop"));
   const estimates = make("ul", "find-notes");
   const notes = sectionNote();
-  const nudging = group(...buttons);
-  nudging.classList.add("clock-nudges");
+  const nudging = make("div", "acquisition-work clock-nudges", ...buttons);
   const body = make("div", "acquisition", table, choice.element, nudging, beside.element, find, pictures, source, ways.element, start);
   body.append(work.element, work.status, estimates, notes);
 

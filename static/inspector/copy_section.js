@@ -1,6 +1,7 @@
 /** Other copy: the poses of another annotator's copy of the session beside the own ones, and the choice between them. */
 
 import { make, textButton } from "../widgets/elements.js";
+import { postJson } from "../widgets/post_json.js";
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
 import { command, frameRow, group, labelled, longList } from "./parts.js";
@@ -27,13 +28,12 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
     if (state) send({ type: "other_copy", action, person: state.person, frame: state.frame });
   };
   const leaveCopy = () => send({ type: "other_copy", action: "leave", person: 0, frame: 0 });
-  const form = make("form", "copy-form");
   const input = make("input", { type: "text", className: "query-field", name: "copy", id: "copy-folder", "data-takes": "folder" });
   const title = "Folder of another annotator's copy of this session, on the machine of the program";
   const label = labelled("import-field", "Folder", title, make("span", "path-field", input));
   const open = make("button", { type: "submit", title: "Read the poses of this copy, and show where both differ; nothing is changed" }, "Compare");
   const answer = make("p", { className: "section-note", role: "status" });
-  form.append(label, open);
+  const form = make("form", "copy-form", label, open);
   paths.completes(input);
 
   const summary = sectionNote();
@@ -52,10 +52,9 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
   const take = textButton("Take theirs", "Take the pose of the other copy as a keyframe; can be undone", () => decide("take"));
   const mean = textButton("Mean", "Take the mean of both poses as a keyframe: angles the shorter way round; can be undone", () => decide("mean"));
   const buttons = group(keep, take, mean);
-  const previous = textButton("Previous", "Previous frame where the copies differ (Alt+Shift+C)", () => step(-1));
-  const next = textButton("Next", "Next frame where the copies differ (Alt+S)", () => step(1));
-  const leave = textButton("End", "End the comparison; nothing is changed", leaveCopy);
-  const ways = group(previous, next, leave);
+  const previous = textButton("Previous", "Previous frame where the copies differ", () => step(-1));
+  const next = textButton("Next", "Next frame where the copies differ", () => step(1));
+  const ways = group(previous, next, textButton("End", "End the comparison; nothing is changed", leaveCopy));
   const worst = make("ol", { className: "observed-worst", "aria-label": "Differences, largest first" });
   const differences = longList(worst, FEW_LISTED, "List smaller differences too", (/** @type {Difference} */ one) => {
     const { frame, person, joint, distance_mm } = one;
@@ -80,10 +79,9 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
     refuse("");
     show();
     try {
-      const found = await fetch("copies/open", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ folder: input.value.trim() }) });
-      if (!found.ok) refuse(await found.text());
-    } catch {
-      refuse("The program does not answer.");
+      await postJson("copies/open", { folder: input.value.trim() });
+    } catch (error) {
+      refuse(String(/** @type {Error} */ (error).message));
     }
     isBusy = false;
     show();

@@ -2,6 +2,7 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { capital, count } from "../widgets/text.js";
+import { postJson } from "../widgets/post_json.js";
 import { labelled } from "./parts.js";
 
 /**
@@ -75,18 +76,7 @@ export function importForm(store, paths, discard) {
     fold.open = false;
   };
   const refuse = (/** @type {unknown} */ error) => {
-    const text = error instanceof TypeError ? "The program does not answer." : String(/** @type {Error} */ (error).message);
-    result.replaceChildren(line(text, "is-failed"));
-  };
-
-  /**
-   * @param {string} address
-   * @param {unknown} request
-   */
-  const ask = async (address, request) => {
-    const answer = await fetch(address, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(request) });
-    if (!answer.ok) throw new Error(await answer.text());
-    return answer.json();
+    result.replaceChildren(line(String(/** @type {Error} */ (error).message), "is-failed"));
   };
 
   const read = async () => {
@@ -99,22 +89,20 @@ export function importForm(store, paths, discard) {
     const pixels = /^\s*(\d+)\s*x\s*(\d+)\s*$/.exec(size.input.value);
     try {
       if (size.input.value.trim() && !pixels) throw new Error(`Expected a picture size such as 1920x1080, found “${size.input.value}”.`);
-      plan = /** @type {Plan} */ (
-        await ask("observations/plan", {
-          paths: path.input.value.trim(),
-          name: name.input.value.trim(),
-          people: person.value ? [person.value] : every,
-          first_frame: number ? Number(number) : null,
-          offsets: offsetsOf(late.input.value),
-          confidence: sure ? Number(sure) : null,
-          picture_size: pixels ? [Number(pixels[1]), Number(pixels[2])] : null,
-          names_of_points: skeleton.input.value.trim() || null,
-          axes: axes.input.value.trim() || "x,y,z",
-          units: units.input.value.trim() || null,
-          unusual: keep.checked,
-        })
-      );
-      result.replaceChildren(...describe(plan));
+      const request = {
+        paths: path.input.value.trim(),
+        name: name.input.value.trim(),
+        people: person.value ? [person.value] : every,
+        first_frame: number ? Number(number) : null,
+        offsets: offsetsOf(late.input.value),
+        confidence: sure ? Number(sure) : null,
+        picture_size: pixels ? [Number(pixels[1]), Number(pixels[2])] : null,
+        names_of_points: skeleton.input.value.trim() || null,
+        axes: axes.input.value.trim() || "x,y,z",
+        units: units.input.value.trim() || null,
+        unusual: keep.checked,
+      };
+      await postJson("observations/plan", request, (text) => result.replaceChildren(...describe((plan = JSON.parse(text)))));
     } catch (error) {
       refuse(error);
     }
@@ -125,7 +113,7 @@ export function importForm(store, paths, discard) {
     isBusy = true;
     enable();
     try {
-      await ask("observations/import", {});
+      await postJson("observations/import", {});
       plan = null;
       reset();
     } catch (error) {

@@ -70,17 +70,9 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
   };
   button("show-reason", () => inspector.reveal("reason"));
   const bindings = inArea("Inspector", [
+    { label: "Inspector: sizes, settings (toggle)", words: "body", run: () => inspector.toggle() },
     {
-      keys: ["Alt I"],
-      label: "Inspector: sizes, settings (toggle)",
-      area: "Views", // an area of one key would take two lines of the key list
-      words: "body",
-      run: () => inspector.toggle(),
-    },
-    {
-      keys: ["Alt W"],
       label: "Why this pose is in doubt",
-      area: "Views",
       words: "reason explain evidence colours outside silhouette contour nats parts views",
       run: () => inspector.reveal("reason"),
     },

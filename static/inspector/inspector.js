@@ -72,9 +72,8 @@ export class Inspector {
    */
   add(section, before) {
     const fold = make("details", { className: "section", "data-section": section.id, open: this.#stored.sections.includes(section.id) });
-    const head = make("summary", { title: section.hint }, section.title);
     section.body.classList.add("section-body");
-    fold.append(head, section.body);
+    fold.append(make("summary", { title: section.hint }, section.title), section.body);
     fold.addEventListener("toggle", () => this.#keep());
     this.#column.insertBefore(fold, (before && this.#sections.get(before)?.fold) || null);
     this.#sections.set(section.id, { section, fold });

@@ -79,8 +79,7 @@ export function observationsSection({ store, send, say, navigation, actions, lay
    */
   const save = async (address, what) => {
     try {
-      const name = await download(address);
-      say(`Saved ${name}.`);
+      say(`Saved ${await download(address)}.`);
     } catch (error) {
       const reason = error instanceof TypeError ? "the program cannot be reached" : String(/** @type {Error} */ (error).message);
       say(`${what} failed: ${reason}`, "error");
@@ -171,15 +170,9 @@ export function observationsSection({ store, send, say, navigation, actions, lay
       const own = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
         command(label, `${words} observations imported detector`, () => (reveal(), run()), why);
       return [
-        {
-          keys: ["Alt J"],
-          label: "Observations of other programs",
-          area: "Views",
-          words: "imported key points joints openpose trc judge detector",
-          run: reveal,
-        },
-        { keys: ["Alt Shift ↓"], label: "Next imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(1) },
-        { keys: ["Alt Shift ↑"], label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(-1) },
+        { label: "Observations of other programs", words: "imported key points joints openpose trc judge detector", run: reveal },
+        { label: "Next imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(1) },
+        { label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(-1) },
         own("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
         own("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
         own("Take the observations as poses", "store mend correct", busy, () => act("take", current())),

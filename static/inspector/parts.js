@@ -112,5 +112,5 @@ export function labelled(kind, text, title, field) {
  * @returns {import("../widgets/key_matching.js").Command}
  */
 export function command(label, words, run, why) {
-  return { keys: [], label, words, run, why };
+  return { label, words, run, why };
 }

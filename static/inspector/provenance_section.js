@@ -24,8 +24,8 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
     change: (value) => choose(chosen(value)),
   });
   const step = (/** @type {1 | -1} */ way) => jumps.go("chosen", way);
-  const previous = textButton("Previous", "Go to the previous frame of this kind (Alt+Shift+Q)", () => step(-1));
-  const next = textButton("Next", "Go to the next frame of this kind (Alt+Q)", () => step(1));
+  const previous = textButton("Previous", "Go to the previous frame of this kind", () => step(-1));
+  const next = textButton("Next", "Go to the next frame of this kind", () => step(1));
   const number = make("span", "section-note");
   const steps = group(previous, next, number);
   const pose = make("div");

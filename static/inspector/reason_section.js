@@ -94,7 +94,7 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
   return {
     id: "reason",
     title: "Reason",
-    hint: "Why this pose is in doubt: what each view shows of each part (Alt+W)",
+    hint: "Why this pose is in doubt: what each view shows of each part",
     body,
   };
 }
@@ -107,7 +107,7 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
 function alternativeRow({ nats, limbs }, rank, take) {
   const where = limbs.length ? `${limbs.join(", ")} elsewhere` : "body elsewhere";
   const cost = `${Math.abs(nats).toFixed(Math.abs(nats) < 10 ? 1 : 0)} nats ${nats < 0 ? "better" : "worse"}`;
-  const title = `Take this pose, drawn blue with the number ${rank + 1} (Alt+${rank + 1}). Can be undone`;
+  const title = `Take this pose, drawn blue with the number ${rank + 1}. Can be undone`;
   return make("li", {}, textButton(`Take ${rank + 1}`, title, take), make("span", {}, `${where}: ${cost}`));
 }
 

@@ -179,10 +179,8 @@ export function tidy(value) {
  * @param {string} title
  */
 function row(kind, label, title) {
-  const element = make(kind, { className: "row", title });
   const head = make("span", "row-label is-clipped", label);
-  element.append(head);
-  return { element, head };
+  return { element: make(kind, { className: "row", title }, head), head };
 }
 
 /**

@@ -96,7 +96,7 @@ export function searchSection({ store, send, say: refuse }) {
     const { settings } = store.facts;
     if (settings) set(settings.search_default);
   });
-  const note = make("p", "section-note", "The search drawer (B) has bounds and steps of single stages.");
+  const note = make("p", "section-note", "The search drawer has bounds and steps of single stages.");
   const body = make("div", {}, ...numbers.map(({ row }) => row.element), passes.element, theta.element, outliers.element, apart.element, note, reset);
 
   const show = () => {
@@ -114,7 +114,7 @@ export function searchSection({ store, send, say: refuse }) {
   return {
     id: "search",
     title: "Search settings",
-    hint: "How the search of a frame (F) chooses the poses that it tries",
+    hint: "How the search of a frame chooses the poses that it tries",
     body,
   };
 }

@@ -76,7 +76,7 @@ export function trackSection({ store, send, say: refuse }) {
   return {
     id: "track",
     title: "Track settings",
-    hint: "How the tracker (T) finds the pose of each frame",
+    hint: "How the tracker finds the pose of each frame",
     body,
   };
 }

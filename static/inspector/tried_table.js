@@ -9,10 +9,9 @@ const COSTS = "Costs in nats, comparable within a line: 3 nats less are 20 times
 
 /** @returns {{element: HTMLElement, show: (tried: readonly TriedSearch[] | null | undefined) => void}} */
 export function triedTable() {
-  const element = make("div", "tried");
   const sentence = make("p", "section-note");
   const table = make("table", "tried-table");
-  element.append(make("h4", {}, "Searched by the tracker on this frame"), sentence, table);
+  const element = make("div", "tried", make("h4", {}, "Searched by the tracker on this frame"), sentence, table);
   let shown = "";
   return {
     element,

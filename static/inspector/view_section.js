@@ -44,7 +44,7 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
   });
   const link = checkRow({
     label: "Link zoom",
-    title: "All camera views show the place that one is zoomed to, at the same size of the people (Alt+0)",
+    title: "All camera views show the place that one is zoomed to, at the same size of the people",
     change: () => panes.grid.toggleLink(),
   });
   const ellipses = checkRow({
@@ -90,7 +90,7 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
   });
   const prediction = sectionNote();
   const floorText = sectionNote();
-  const setFloor = textButton("Set floor…", "Click three points of the floor in the views (Shift+Y)", () => floor.toggle());
+  const setFloor = textButton("Set floor…", "Click three points of the floor in the views", () => floor.toggle());
   const fromFeet = textButton("From feet", "Set the floor to the plane under the feet in all poses", () => floor.setFromFeet());
   const formerFloor = textButton("Previous floor", "Restore the floor before the last change", () => floor.revert());
   const trails = sliderRow({

@@ -143,8 +143,7 @@ export function movedShares({ index, sizes, min }, size) {
 function bordersOf(of, spans, min, boxOfGap, isVertical) {
   const sizes = spans.map(({ size }) => size);
   return spans.slice(0, -1).map(({ start, size }, index) => {
-    const box = boxOfGap({ start: start + size, size: GAP });
-    return { of, index, isVertical, box, sizes, min };
+    return { of, index, isVertical, box: boxOfGap({ start: start + size, size: GAP }), sizes, min };
   });
 }
 
@@ -213,8 +212,7 @@ function sharesOf(tracks, length, depth) {
   const usable = tracks.map((ratios) => length / sum(ratios));
   const depths = tracks.map(() => 0);
   let rest = depth;
-  const shallowFirst = tracks.map((_, index) => index).sort((a, b) => usable[a] - usable[b]);
-  shallowFirst.forEach((track, rank) => {
+  tracks.map((_, index) => index).sort((a, b) => usable[a] - usable[b]).forEach((track, rank) => {
     depths[track] = Math.min(usable[track], rest / (tracks.length - rank));
     rest -= depths[track];
   });
@@ -243,8 +241,7 @@ function equalShares(counts) {
 function shownArea(tracks, shares, length, depth) {
   const areas = tracks.flatMap((ratios, track) =>
     ratios.map((ratio, pane) => {
-      const shown = Math.min(shares.tracks[track] * depth, (shares.panes[track][pane] * length) / ratio);
-      return ratio * shown ** 2;
+      return ratio * Math.min(shares.tracks[track] * depth, (shares.panes[track][pane] * length) / ratio) ** 2;
     }),
   );
   const most = MAX_UNEVENNESS * Math.min(...areas);

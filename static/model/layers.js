@@ -53,7 +53,7 @@ export const LAYERS = [
   },
   {
     id: "alternatives", group: "Model", label: "Alternatives", shown: true, opacity: 1,
-    title: "Other poses that fit about as well, numbered where the reason of the pose is shown (Alt+W)",
+    title: "Other poses that fit about as well, numbered where the reason of the pose is shown",
   },
   {
     id: "epipolar", group: "Model", label: "Epipolar lines", shown: true, opacity: 0.9,
@@ -71,11 +71,6 @@ export const LAYERS = [
 
 /** Layers that are images, in painting order. */
 export const PICTURE_LAYERS = /** @type {const} */ (["image", "distance", "silhouette", "parts"]);
-
-/** Layers by key: Shift+1 toggles the first, and so on. The order matches the menu. */
-export const BY_KEY = /** @type {Layer[]} */ ([
-  "image", "distance", "silhouette", "accepted", "rejected", "contours", "hidden", "parts", "skeleton",
-]); // prettier-ignore
 
 const STORED = "quadrille.layers.";
 

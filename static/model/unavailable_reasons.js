@@ -23,9 +23,9 @@ export function unavailableReasons(store) {
     search: here(() => (facts().state?.job.running ? "A search is already running. Stop it first (Esc)." : null)),
     stopSearch: here(() => (hasSearch(facts().state) ? null : "No search is running.")),
     track: here(() => (facts().state?.track.running ? "Tracking is already running. Stop it first (Esc)." : null)),
-    tracking: here(() => (hasTrack(facts().state) ? null : "Nothing is being tracked. Press T to start.")),
-    range: here(() => (facts().range ? null : "No range is marked. Press [ and ] to mark its ends.")),
-    compared: here(() => (facts().state?.compared ? null : "No fit or search result is shown. Press G or F for one.")),
+    tracking: here(() => (hasTrack(facts().state) ? null : "Nothing is being tracked. Track forward or backward first.")),
+    range: here(() => (facts().range ? null : "No range is marked. Drag over the timeline with Shift to mark one.")),
+    compared: here(() => (facts().state?.compared ? null : "No fit or search result is shown. Fit or search first.")),
     people: here(() => ((facts().session?.people.length ?? 0) > 1 ? null : "This session has only one person.")),
   };
 }

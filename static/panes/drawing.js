@@ -316,8 +316,7 @@ export function drawOutOfReach(context, view, outOfReach, handle, color, paneWid
   const wanted = view.toScreen(outOfReach.u, outOfReach.v);
   const reached = view.toScreen(outOfReach.point_u, outOfReach.point_v);
   stroke(context, addLine(new Path2D(), wanted, reached), imageColor("off"), 1.75, true, OFF_DASH);
-  const outline = handleOutline(handle ?? { point: "", side: "" }, wanted.x, wanted.y, 1.5);
-  stroke(context, outline, color, 2.25);
+  stroke(context, handleOutline(handle ?? { point: "", side: "" }, wanted.x, wanted.y, 1.5), color, 2.25);
   drawLabel(context, [`out of reach by ${Math.round(100 * outOfReach.distance_m)} cm`], { x: wanted.x, y: Math.max(wanted.y, CORNERS_PX) }, paneWidth);
 }
 

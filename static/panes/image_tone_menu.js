@@ -45,8 +45,7 @@ export class ImageToneMenu {
    */
   toggle(camera, button) {
     // The press on the button has already closed the popover: this click must not open it again.
-    const isClosing = camera === this.#camera && performance.now() - this.#closedAt < 250;
-    if (isClosing) return;
+    if (camera === this.#camera && performance.now() - this.#closedAt < 250) return;
     if (this.#panel.matches(":popover-open") && camera !== this.#camera) this.#panel.hidePopover();
     this.#camera = camera;
     this.#title.textContent = this.#store.facts.session?.cameras[camera].name ?? "";

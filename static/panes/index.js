@@ -30,5 +30,5 @@ export function mount({ store, send, say, latency, layers, imageTones, recentIma
   showPlaceholders(store, recentImages);
   requestViews(store, send);
   mountPoseLegend(store);
-  return { grid, gestures, bindings: paneBindings({ store, grid, gestures, layers, layersMenu, say }) };
+  return { grid, gestures, bindings: paneBindings({ store, grid, gestures, layersMenu, say }) };
 }

@@ -17,7 +17,7 @@ export function jointLabel({ handle }, overlapping, people) {
   const notes = [turns && "turns the body", !handle.visible && `hidden${by}`, handle.held && "held"].filter(Boolean);
   const first = named(handle, overlapping, people) + (notes.length ? ` (${notes.join(", ")})` : "");
   const others = overlapping.filter((one) => one.handle !== handle);
-  return [first, ...others.map((one) => `Alt+O or click: ${named(one.handle, overlapping, people)}`)];
+  return [first, ...others.map((one) => `Click: ${named(one.handle, overlapping, people)}`)];
 }
 
 /**

@@ -1,7 +1,7 @@
 /** Popover of all layers, and switches of the most important ones in the top bar. */
 
 import { byId, checkbox, make, onChange } from "../widgets/elements.js";
-import { BY_KEY, LAYERS } from "../model/layers.js";
+import { LAYERS } from "../model/layers.js";
 import { opensPopover, slider, togglePopover } from "../widgets/popovers.js";
 
 /** @typedef {import("../model/protocol.js").Layer} Layer */
@@ -73,8 +73,6 @@ export class LayersMenu {
     element.className = "popover-check";
     input.dataset.layer = id;
     input.addEventListener("change", () => this.#layers.toggle([id], input.checked));
-    const number = BY_KEY.indexOf(id) + 1;
-    const key = make("kbd", { title: number ? `Shift+${number}` : "" }, number ? `⇧${number}` : "");
     const opacity = slider({
       label: `Opacity of ${label.toLowerCase()}`,
       title: `Opacity of ${label.toLowerCase()}`,
@@ -92,7 +90,7 @@ export class LayersMenu {
       opacity.input.disabled = !layers.shown[id];
       opacity.value.classList.toggle("is-off", !layers.shown[id]);
     });
-    return [element, key, opacity.input, opacity.value];
+    return [element, opacity.input, opacity.value];
   }
 
   #colors() {

@@ -43,7 +43,7 @@ export class PaneCorner {
     this.#scale.append("0", make("i"), this.#limit);
     this.#fit = textButton("Whole", "Show the whole image (0)", reset, { className: "pane-reset", "aria-label": `Show the whole image of ${name}` });
     const adjust = "Brightness and contrast";
-    this.#tone = make("button", { type: "button", className: "pane-tone", title: `${adjust} (I)`, "aria-label": `${adjust} of ${name}` }, "◐");
+    this.#tone = make("button", { type: "button", className: "pane-tone", title: adjust, "aria-label": `${adjust} of ${name}` }, "◐");
     this.#tone.addEventListener("click", () => openToneMenu(this.#tone));
     this.#tools.append(this.#scale, this.#tone, this.#fit);
   }

@@ -330,8 +330,7 @@ export class PaneGrid {
     if (!this.#isOpening || !overlay || !state) return;
     this.#isOpening = false;
     if (!state.people.some(({ source }) => source !== null)) return;
-    const isNew = this.panes.every(({ view }) => view.isReset);
-    if (isNew && this.#isFirst) return this.framePeople();
+    if (this.panes.every(({ view }) => view.isReset) && this.#isFirst) return this.framePeople();
     this.panes.forEach((pane, camera) => {
       const box = this.#boxIn(camera);
       if (box && !pane.view.isReset && (pane.view.isFramed || !pane.view.shows(box))) {

@@ -37,8 +37,7 @@ export function showPlaceholders(store, recent) {
     const { shown, reductions } = store.facts;
     const target = awaited;
     if (target === null) return;
-    const cameras = [...reductions.keys()].filter((camera) => reductions[camera] > 0);
-    const nearest = recent.nearest(target, cameras);
+    const nearest = recent.nearest(target, [...reductions.keys()].filter((camera) => reductions[camera] > 0));
     const isNearer = nearest !== null && shown && Math.abs(nearest - target) < Math.abs(shown.frame - target);
     if (isNearer) store.set({ placeholder: { frame: nearest, target, pictures: recent.of(nearest) } });
     else store.set({ placeholder: { frame: shown?.frame ?? 0, target, pictures: null } });

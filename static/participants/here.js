@@ -44,7 +44,7 @@ export class Here {
     this.#chips.replaceChildren(...chips);
     this.#showButton();
     const names = others.map((person) => `${nameOf(person)} on frame ${person.frame}`);
-    this.#button.title = `${names.length ? `Here: ${names.join(", ")}` : "Nobody else is here"} (Alt+E)`;
+    this.#button.title = names.length ? `Here: ${names.join(", ")}` : "Nobody else is here";
     this.#button.setAttribute("aria-label", names.length ? `Who is here: ${names.length} others` : "Who is here: nobody else");
     this.#list.replaceChildren(...people.map((person, index) => this.#row(person, index)));
   }

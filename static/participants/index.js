@@ -29,8 +29,5 @@ export function mount(context) {
     bar.hidden = !presence || !session || session.has_place;
     document.documentElement.dataset.place = String(session?.has_place ?? true);
   });
-  const bindings = inArea("People", [
-    { keys: ["Alt E"], label: "People on this session, and your name", words: "join participants", run: () => here.toggle() },
-  ]);
-  return { bindings };
+  return { bindings: inArea("People", [{ label: "People on this session, and your name", words: "join participants", run: () => here.toggle() }]) };
 }

@@ -9,12 +9,11 @@ const DOES = { host: "annotate", annotate: "annotate", review: "review", look: "
  * @param {string} place of the form in the page, which makes its field's id unique
  */
 export function joinForm({ store, joinAs }, place) {
-  const form = make("form", "join-form");
   const input = make("input", { type: "text", id: `join-name-${place}`, name: "name", maxLength: 60, required: true, autocomplete: "name", className: "query-field" }); // prettier-ignore
   const label = make("label", { htmlFor: input.id });
   const join = make("button", { type: "submit", title: "Work under this name, on a frame of your own (Enter)" }, "Join");
   const refusal = make("output", "join-refusal");
-  form.append(label, input, join, refusal);
+  const form = make("form", "join-form", label, input, join, refusal);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     joinAs(input.value.trim());

@@ -5,7 +5,7 @@ import { byId } from "../widgets/elements.js";
 const TEXTS = {
   annotate: ["Annotate", "Your own frame and undo. The host's page changes bodies, cameras, the floor and the 3-D view"],
   look: ["Look only", "This page shows the session. It changes nothing"],
-  review: ["Review", "This page marks poses as reviewed (E), verifies (Alt+K) and rejects (Alt+R) tasks. It changes no pose"],
+  review: ["Review", "This page marks poses as reviewed, verifies and rejects tasks. It changes no pose"],
 };
 
 /** @param {import("../model/store.js").Store} store */

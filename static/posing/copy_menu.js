@@ -28,8 +28,8 @@ export function mountCopyMenu(store, posing) {
     const others = [...session.people.entries()].filter(([person]) => person !== (state?.person ?? 0));
     const items = [
       ...others.map(([person, { name }]) => ofPerson(name, person)),
-      item("Previous frame", "Alt+,", here - 1, cells.has(here - 1)),
-      item("Next frame", "Alt+.", here + 1, cells.has(here + 1)),
+      item("Previous frame", "", here - 1, cells.has(here - 1)),
+      item("Next frame", "", here + 1, cells.has(here + 1)),
       ...keyframes.map((frame) => item(`Keyframe ${frame}`, away(frame - here), frame, true)),
     ];
     const note = keyframes.length ? undefined : "No other keyframes. A frame becomes a keyframe when you edit its pose.";

@@ -86,7 +86,7 @@ export class CurveEdits {
   }
 
   /** Why the chosen curves cannot be edited; null if they can. */
-  why = () => (this.chosen.length > 0 ? null : "No curve is chosen. Press C, then click a point of a curve of an angle.");
+  why = () => (this.chosen.length > 0 ? null : "No curve is chosen. Open the curves, then click a point of a curve of an angle.");
 
   /** Why no range of the chosen curves can be edited; null if one can. */
   whyNoRange = () => this.why() ?? (this.#store.facts.range ? null : "No range is marked. Press [ and ] to mark its ends.");

@@ -37,7 +37,7 @@ export function mountFrameCard(store, posing) {
     statusBadge.className = `status-badge is-${doubt ? "doubtful" : status}`;
     statusBadge.textContent = doubt ? "check" : state.is_checked ? "being assessed" : status || "not assessed";
     remarkText.textContent = doubt
-      ? `This keyframe disagrees ${contradictions(doubt, session).join("; ")}. Correct it, or keep it (Alt+Enter).`
+      ? `This keyframe disagrees ${contradictions(doubt, session).join("; ")}. Correct it, or accept it.`
       : [remark, reasonOf(store.facts)].filter(Boolean).join(" · ");
     why.hidden = status !== "doubtful" && status !== "lost" && !doubt;
     if (card.hidden || !card.open) return;
@@ -74,6 +74,5 @@ function gap() {
 function row(name, cost) {
   const label = make("span", {}, displayName(name));
   const bar = make("i", { "--filled": `${Math.min(100, (100 * (cost ?? 0)) / FULL_PX)}%` });
-  const value = make("output", {}, cost === null ? "not visible" : px(cost));
-  return [label, bar, value];
+  return [label, bar, make("output", {}, cost === null ? "not visible" : px(cost))];
 }

@@ -32,6 +32,5 @@ export function mount({ store, send, say, reasons }, { grid }) {
   mountFrameCard(store, posing);
   mountPinBar(store, pinning);
   const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...epipolarBindings(epipolar, reasons.away), ...depthBindings(store, grid, reasons.away)];
-  const curveEdits = new CurveEdits(store, posing, send);
-  return { posing, curveEdits, pinning, epipolar, bindings };
+  return { posing, curveEdits: new CurveEdits(store, posing, send), pinning, epipolar, bindings };
 }

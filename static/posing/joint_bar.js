@@ -105,9 +105,9 @@ export class JointBar {
     this.#joint.value = point;
     this.#joint.classList.toggle("is-nothing", state.point === null);
     for (const field of this.#fields) this.#fill(field, person.dofs[field.dof], state, field.dof === selected);
-    showLock(this.#lock, this.#posing.isLocked(dofs), `${displayName(point)} (O), the whole limb (Shift+O)`);
+    showLock(this.#lock, this.#posing.isLocked(dofs), displayName(point), " (O)");
     this.#lock.disabled = dofs.length === 0;
-    this.#reset.title = `Reset ${limb.name} to the neutral pose (R)`;
+    this.#reset.title = `Reset ${limb.name} to the neutral pose`;
     this.#reset.setAttribute("aria-label", `Reset ${limb.name}`);
   }
 
@@ -125,7 +125,7 @@ export class JointBar {
    */
   #field(info, dof, point) {
     const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
-    const hint = "Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.";
+    const hint = "Drag the name sideways to change it (Shift: fine steps).";
     const effect = meaning(info);
     const title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}, ${range(info)}. ${hint}`;
     const label = make("span", "dof-name is-clipped", make("span", "is-whole", name), make("span", "is-brief", shortName(info.name)));
@@ -203,12 +203,13 @@ function range({ low, high, unit }) {
  * @param {HTMLButtonElement} lock
  * @param {boolean} isLocked
  * @param {string} what
+ * @param {string} [key] that locks it
  */
-function showLock(lock, isLocked, what) {
+function showLock(lock, isLocked, what, key = "") {
   lock.setAttribute("aria-pressed", String(isLocked));
   const title = `${isLocked ? "Unlock" : "Lock"} ${what}`;
-  if (lock.title === title) return;
-  lock.title = title;
+  if (lock.ariaLabel === title) return;
+  lock.title = title + key;
   lock.setAttribute("aria-label", title);
   lock.replaceChildren(icon(isLocked ? LOCK : UNLOCKED));
 }

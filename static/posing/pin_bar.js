@@ -49,14 +49,13 @@ export function mountPinBar(store, pinning) {
     if (!state || !session) return [];
     const { limb } = pinning;
     const name = session.people[state.person].name;
-    const isOne = store.facts.scope === "one" || session.people.length < 2;
-    const everybody = { text: "All placed people", note: isOne ? "" : "G", title: "Fit everybody who is placed on this frame", run: () => pinning.fit(null) };
+    const everybody = { text: "All placed people", note: "", title: "Fit everybody who is placed on this frame", run: () => pinning.fit(null) };
     return [
       ...(session.people.length > 1 ? [everybody] : []),
-      { text: `Only ${name}`, note: isOne ? "G" : "", title: `Fit ${name} to pins and edges; the others stay`, run: () => pinning.fit(state.person) },
+      { text: `Only ${name}`, note: "", title: `Fit ${name} to pins and edges; the others stay`, run: () => pinning.fit(state.person) },
       {
         text: limb ? `Only the ${limb}` : "Only a limb",
-        note: limb ? "Alt+G" : "select a joint",
+        note: limb ? "" : "select a joint",
         title: limb ? `Fit the ${limb} to pins and edges; the rest of the body stays` : "Select a joint of the limb first",
         isDisabled: limb === null,
         run: () => pinning.fitLimb(),

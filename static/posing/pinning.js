@@ -42,7 +42,7 @@ export class Pinning {
   /** Toggle the mode in which each click pins the selected joint. */
   toggle() {
     const { pinning, state } = this.#store.facts;
-    if (!pinning && !state?.point) this.#say("Select a joint first: click it in a view, then press X.");
+    if (!pinning && !state?.point) this.#say("Select a joint first: click it in a view.");
     else this.#store.set({ pinning: !pinning, pinHover: null, hover: null, hoverPart: null });
   }
 
@@ -101,7 +101,7 @@ export class Pinning {
   fitLimb() {
     const { state } = this.#store.facts;
     if (state && this.limb !== null) this.#send({ type: "fit", frame: state.frame, person: state.person, point: state.point });
-    else this.#say("Select a joint of the limb first: click it in a view, then press Alt+G.");
+    else this.#say("Select a joint of the limb first: click it in a view.");
   }
 
   /** Put the limb back that the last fit moved farthest although nobody had touched it. */

@@ -1,7 +1,6 @@
 /** Edit poses without a drag: selection, steps, mirror, copies, resets and locks. */
 
 import { stored } from "../widgets/stored.js";
-import { alternativesOf } from "../model/selectors.js";
 
 /** Minimum interval of messages while a key is held down. */
 const SEND_MS = 50;
@@ -180,11 +179,6 @@ export class Posing {
    */
   takeAlternative(rank) {
     this.#edit({ ...this.#head(), action: "alternative", rank: rank ?? null });
-  }
-
-  /** Why no alternative can be taken by its number; null if one can. */
-  get whyNoRanked() {
-    return alternativesOf(this.#store.facts).length > 0 ? null : "No numbered alternative is shown. Alt+W looks for some.";
   }
 
   resetLimb() {

@@ -32,22 +32,16 @@ export function posingBindings(posing, jointBar, why) {
     { keys: ["U"], label: "Next degree of freedom", run: () => posing.nextDof() },
     { keys: ["+"], label: "Increase the selected degree of freedom by one step", matches: sign(["+", "="]), run: () => posing.turn(1) },
     { keys: ["-"], label: "Decrease the selected degree of freedom by one step", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
-    { keys: ["Enter"], label: "Type a value for the selected degree of freedom", run: () => jointBar.type() },
+    { label: "Type a value for the selected degree of freedom", run: () => jointBar.type() },
     { keys: ["O"], label: "Lock or unlock the joint", run: () => posing.toggleLock(posing.dofs) },
-    { keys: ["Shift O"], label: "Lock or unlock the joint's limb", run: () => posing.toggleLock(posing.limb.dofs) },
-    { keys: ["Alt H"], label: "Hold the joint in place while others are dragged, or release it", run: () => posing.toggleHold() },
-    { keys: ["Alt Shift H"], label: "Release all held joints of the person on this frame", run: () => posing.releaseAll() },
-    { keys: ["M"], label: "Mirror the pose left to right", run: () => posing.mirror() },
-    { keys: ["Shift X"], label: "Switch to the alternative pose, or back", run: () => posing.takeAlternative() },
-    {
-      keys: ["Alt 1 – 9"],
-      label: "Take an alternative pose by its number in the views",
-      why: () => why() ?? posing.whyNoRanked,
-      run: (/** @type {KeyboardEvent} */ event) => posing.takeAlternative(Number(event.code.at(-1)) - 1),
-    },
-    { keys: ["R"], label: "Reset the joint's limb to neutral", run: () => posing.resetLimb() },
-    { keys: ["Alt ,"], label: "Copy the pose from the previous frame", run: () => posing.copyNeighbour(-1) },
-    { keys: ["Alt ."], label: "Copy the pose from the next frame", run: () => posing.copyNeighbour(1) },
+    { label: "Lock or unlock the joint's limb", run: () => posing.toggleLock(posing.limb.dofs) },
+    { label: "Hold the joint in place while others are dragged, or release it", run: () => posing.toggleHold() },
+    { label: "Release all held joints of the person on this frame", run: () => posing.releaseAll() },
+    { label: "Mirror the pose left to right", run: () => posing.mirror() },
+    { label: "Switch to the alternative pose, or back", run: () => posing.takeAlternative() },
+    { label: "Reset the joint's limb to neutral", run: () => posing.resetLimb() },
+    { label: "Copy the pose from the previous frame", run: () => posing.copyNeighbour(-1) },
+    { label: "Copy the pose from the next frame", run: () => posing.copyNeighbour(1) },
   ];
   return inArea("Posing", bindings, why);
 }
@@ -60,11 +54,11 @@ export function pinBindings(pinning, why) {
   const bindings = [
     { keys: ["X"], label: "Pin the joint by clicks (toggle)", run: () => pinning.toggle() },
     { keys: ["G"], label: "Fit to pins and edges", run: () => pinning.fit() },
-    { keys: ["Alt G"], label: "Fit only the limb of the selected joint", words: "arm leg part", run: () => pinning.fitLimb() },
-    { keys: ["Alt B"], label: "Take back the untouched limb that the last fit moved", run: () => pinning.takeLimbBack() },
-    { keys: ["Shift G"], label: "Update the body while a pin is dragged (toggle)", run: () => pinning.toggleLive() },
+    { label: "Fit only the limb of the selected joint", words: "arm leg part", run: () => pinning.fitLimb() },
+    { label: "Take back the untouched limb that the last fit moved", run: () => pinning.takeLimbBack() },
+    { label: "Update the body while a pin is dragged (toggle)", run: () => pinning.toggleLive() },
     { keys: ["Delete"], label: "Remove the pin under the pointer, or else those of the selected joint", run: () => pinning.remove() },
-    { keys: ["Shift Delete"], label: "Remove all pins of the person on this frame", run: () => pinning.clear() },
+    { label: "Remove all pins of the person on this frame", run: () => pinning.clear() },
   ];
   return inArea("Pins", bindings, why);
 }
@@ -77,7 +71,6 @@ export function pinBindings(pinning, why) {
 export function depthBindings({ facts }, grid, away) {
   return inArea("Posing", [
     {
-      keys: ["Alt V"],
       label: "Fill the grid with the view that looks across the last placed joint",
       words: "depth opposite side",
       why: () => away() ?? (facts.state?.view_across == null ? "The views have shown the depth of the last placed joint." : null),
@@ -94,11 +87,6 @@ export function depthBindings({ facts }, grid, away) {
  * @param {() => string | null} why
  */
 export function epipolarBindings(check, why) {
-  const binding = {
-    keys: ["Alt X"],
-    label: "Epipolar lines (toggle)",
-    words: "calibration check cameras line of sight distance pointer",
-    run: () => check.toggle(),
-  };
-  return inArea("Views", [binding], why);
+  const words = "calibration check cameras line of sight distance pointer";
+  return inArea("Views", [{ label: "Epipolar lines (toggle)", words, run: () => check.toggle() }], why);
 }

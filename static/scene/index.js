@@ -52,8 +52,7 @@ function loadLate(frame, store, isSoftware) {
     const { shown, state, session } = store.facts;
     if (isLoaded || shown === null || state === null) return;
     if (session && session.role !== "host") return showNoScene();
-    const waits = isSoftware && BEFORE_COST.has(state.compiling ?? "") && state.cost_px === null;
-    if (waits) return;
+    if (isSoftware && BEFORE_COST.has(state.compiling ?? "") && state.cost_px === null) return;
     isLoaded = true;
     loadScene(frame, store);
   });

@@ -1,6 +1,6 @@
 /** Keys of the 3-D view and of the floor. */
 
-import { inArea, matchesKey } from "../widgets/key_matching.js";
+import { inArea } from "../widgets/key_matching.js";
 
 /**
  * @param {import("./camera_view.js").CameraView} cameraView
@@ -8,25 +8,13 @@ import { inArea, matchesKey } from "../widgets/key_matching.js";
  * @param {() => string | null} away why the 3-D view is unavailable
  */
 export function sceneBindings(cameraView, floor, away) {
-  const why = () => (floor.isOn ? null : "The floor is not being set. Press Shift+Y to start.");
+  const why = () => (floor.isOn ? null : "The floor is not being set. Set floor… in the inspector starts that.");
   /** @type {import("../widgets/key_matching.js").Command[]} */
   const bindings = [
-    { keys: ["Y"], label: "3-D view: look through the active camera (toggle)", run: () => cameraView.toggle() },
-    { keys: ["Shift Y"], label: "Set the floor from three clicked points (toggle)", run: () => floor.toggle() },
-    {
-      keys: ["Enter"],
-      label: "Setting the floor: next point, then apply",
-      matches: (event) => floor.isOn && matchesKey("Enter")(event),
-      why,
-      run: () => floor.goOn(),
-    },
-    {
-      keys: ["Backspace"],
-      label: "Setting the floor: undo the last click",
-      matches: (event) => floor.isOn && matchesKey("Backspace")(event),
-      why,
-      run: () => floor.takeBack(),
-    },
+    { label: "3-D view: look through the active camera (toggle)", run: () => cameraView.toggle() },
+    { label: "Set the floor from three clicked points (toggle)", run: () => floor.toggle() },
+    { label: "Setting the floor: next point, then apply", matches: ({ key }) => floor.isOn && key === "Enter", why, run: () => floor.goOn() },
+    { label: "Setting the floor: undo the last click", matches: ({ key }) => floor.isOn && key === "Backspace", why, run: () => floor.takeBack() },
   ];
   return inArea("3-D view", bindings, away);
 }

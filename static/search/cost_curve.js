@@ -108,7 +108,7 @@ export class CostCurve {
       context.font = "12px system-ui, sans-serif";
       context.textAlign = "center";
       context.fillStyle = style.getPropertyValue("--muted");
-      context.fillText("Start a search: Step (S), Stage (Shift+S) or Frame (F)", clientWidth / 2, clientHeight / 2);
+      context.fillText("Start a search: Step, Stage or Frame", clientWidth / 2, clientHeight / 2);
       return;
     }
     const all = runs.map(({ number }) => /** @type {Steps} */ (searchSteps.get(number)));

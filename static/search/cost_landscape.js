@@ -124,8 +124,7 @@ export function mountCostLandscape(store, send) {
     const margin = Math.max(0.05, 0.06 * (max - min));
     const xs = found.values.map((value) => value * factor);
     const range = { min: xs[0], max: xs[xs.length - 1] };
-    const costs = { min: Math.max(0, min - margin), max: max + margin };
-    const plot = new Plot(clientWidth, clientHeight, range, costs);
+    const plot = new Plot(clientWidth, clientHeight, range, { min: Math.max(0, min - margin), max: max + margin });
     lastPlot = plot;
     plot.drawFrame(context, style, sign);
     plot.within(context, () => {

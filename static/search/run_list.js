@@ -58,8 +58,7 @@ export class RunList {
     const take = textButton("Apply", `Use the pose found by run ${number}. Can be undone`, () =>
       this.#send({ type: "take", run: number, candidate: null }),
     );
-    const element = make("div", "run-row", look, figures, compare, take, differs);
-    return { element, figures, differs, compare, take };
+    return { element: make("div", "run-row", look, figures, compare, take, differs), figures, differs, compare, take };
   }
 
   /** @param {import("../model/protocol.js").SearchRun} run */

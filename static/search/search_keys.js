@@ -13,10 +13,10 @@ export function searchBindings(store, actions, { search: why }) {
   };
   return inArea("Search", [
     { keys: ["S"], label: "Search: one step", why, run: search("step") },
-    { keys: ["Shift S"], label: "Search: to the end of the stage", why, run: search("stage") },
-    { keys: ["Shift F"], label: "Search: repeat from the same start", run: () => actions.searchAgain() },
-    { keys: [], label: "Search: fit the contours, iteration by iteration", why, run: search("contours") },
-    { keys: [], label: "Search: fit the contours chain by chain, from a rough pose", why, run: search("chains") },
+    { label: "Search: to the end of the stage", why, run: search("stage") },
+    { label: "Search: repeat from the same start", run: () => actions.searchAgain() },
+    { label: "Search: fit the contours, iteration by iteration", why, run: search("contours") },
+    { label: "Search: fit the contours chain by chain, from a rough pose", why, run: search("chains") },
     { keys: ["F"], label: "Search: this frame", why, run: search("frame") },
   ]);
 }

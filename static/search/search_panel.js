@@ -56,7 +56,7 @@ export function mountSearchPanel(store, actions, send) {
     const track = () => (hasTrack(store.facts.state) ? actions.togglePause() : actions.track("forward"));
     return {
       step: textButton("Step", "Run one expansion of the search (S)", search("step")),
-      stage: textButton("Stage", "Run to the end of the current stage (Shift+S)", search("stage")),
+      stage: textButton("Stage", "Run to the end of the current stage", search("stage")),
       frame: textButton("Frame", "Run the whole search of this frame (F)", search("frame")),
       contours: textButton(
         "Contours",
@@ -68,10 +68,10 @@ export function mountSearchPanel(store, actions, send) {
         "Fit the contours of a rough pose chain by chain: root, trunk, each limb, then the whole body; each iteration can be replayed",
         search("chains"),
       ),
-      again: textButton("Rerun", "Repeat the selected run from its start pose with the current settings (Shift+F)", () =>
+      again: textButton("Rerun", "Repeat the selected run from its start pose with the current settings", () =>
         actions.searchAgain(),
       ),
-      track: textButton("Track", "Track forward from this frame (T); pause or continue (Alt+P)", track),
+      track: textButton("Track", "Track forward from this frame, pause or continue (T)", track),
       stop: textButton("Stop", "Stop the search or tracking and keep the best pose (Esc)", () =>
         hasTrack(store.facts.state) ? actions.stopTracking() : actions.search("stop"),
       ),
@@ -80,10 +80,9 @@ export function mountSearchPanel(store, actions, send) {
 
   function build() {
     const group = make("div", { className: "group", role: "group", "aria-label": "Search" }, ...Object.values(buttons));
-    const speed = make("label", { className: "search-field", title: "Search speed in expansions per second. Changes take effect immediately" });
+    const title = "Search speed in expansions per second. Changes take effect immediately";
     onChange(speedField, () => send({ type: "search_speed", per_second: Number(speedField.value) || null }));
-    speed.append("Speed", speedField);
-    controls.append(group, speed, theta.element, figures);
+    controls.append(group, make("label", { className: "search-field", title }, "Speed", speedField), theta.element, figures);
   }
 
   function open() {

@@ -2,7 +2,7 @@
 
 import { byId, make } from "../widgets/elements.js";
 import { makePathField } from "./path_field.js";
-import { postJson } from "./session_requests.js";
+import { postJson } from "../widgets/post_json.js";
 
 export class DialogForm {
   /** Values that the form proposed, by the name of the field. @type {Record<string, string>} */

@@ -18,15 +18,9 @@ export function mount({ store, notify }) {
   const sessions = new Sessions(store, notify);
   const showNew = () => void sessions.showNew();
   const bindings = inArea("History and help", [
-    {
-      keys: ["Ctrl O"],
-      label: "Open another session",
-      words: "recent sessions folder recording file load switch",
-      anywhere: true,
-      run: () => sessions.toggle(),
-    },
-    { keys: [], label: "New session from videos and a calibration", words: "new session… create recording footage form cameras", run: showNew },
-    { keys: [], label: "Calibrate cameras by a board", words: "calibration… checkerboard charuco corners lenses", run: () => void sessions.showBoard() },
+    { label: "Open another session", words: "recent sessions folder recording file load switch", anywhere: true, run: () => sessions.toggle() },
+    { label: "New session from videos and a calibration", words: "new session… create recording footage form cameras", run: showNew },
+    { label: "Calibrate cameras by a board", words: "calibration… checkerboard charuco corners lenses", run: () => void sessions.showBoard() },
   ]);
   return { bindings, showNew, completes: sessions.completes };
 }

@@ -7,7 +7,7 @@ import { button, byId, make } from "../widgets/elements.js";
 import { CameraCards } from "./camera_cards.js";
 import { DialogForm } from "./dialog_form.js";
 import { drawRig } from "./rig_drawing.js";
-import { postJson } from "./session_requests.js";
+import { postJson } from "../widgets/post_json.js";
 
 /**
  * @typedef {{cameras: [string, string], with_backgrounds: boolean, text: string}} Exchanged

@@ -2,12 +2,13 @@
 
 import { byId, make } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
+import { postJson } from "../widgets/post_json.js";
 import { batchTable } from "./batch_table.js";
 import { BoardCalibration } from "./board_calibration.js";
 import { NewSession } from "./new_session.js";
 import { makePathField } from "./path_field.js";
 import { PathPicker } from "./path_picker.js";
-import { completePaths, postJson } from "./session_requests.js";
+import { completePaths } from "./session_requests.js";
 
 const POLL_MS = 300;
 /** A slow disk and an old processor need half of it. */

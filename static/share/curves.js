@@ -30,8 +30,7 @@ const draw = () => {
   const values = plot.values.flat().filter((x) => x !== null);
   const [low, high] = values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
   const span = Math.max(high - low, 1);
-  const n = data.frames.length;
-  const x = (/** @type {number} */ i) => LEFT + ((width - LEFT - RIGHT) * i) / Math.max(1, n - 1);
+  const x = (/** @type {number} */ i) => LEFT + ((width - LEFT - RIGHT) * i) / Math.max(1, data.frames.length - 1);
   const y = (/** @type {number} */ value) => height - MARGIN - ((height - 2 * MARGIN) * (value - low)) / span;
   context.fillStyle = token("--plot");
   context.fillRect(LEFT, 0, width - LEFT - RIGHT, height);

@@ -53,19 +53,18 @@ export function keyCommands(table) {
 }
 
 /**
- * Buttons and switches without a binding. A key in the title of a button refers to its binding.
+ * Buttons and switches without a binding.
  *
  * @param {import("../widgets/key_matching.js").Binding[]} table
  * @returns {Command[]}
  */
 export function buttonCommands(table) {
-  const known = new Set(table.flatMap(({ keys, label }) => [...keys, label]));
+  const known = new Set(table.map(({ label }) => label));
   const commands = [];
   for (const control of document.querySelectorAll(BUTTONS)) {
     if (!(control instanceof HTMLElement) || !isThere(control)) continue;
     const { label, title } = wordsOf(control);
-    const named = [...title.matchAll(/\(([^)]*)\)/g)].flatMap(([, inside]) => inside.split(/[,:]/));
-    if (!label || known.has(label) || named.some((key) => known.has(key.trim().replaceAll("+", " ").replace(/ $/, "+")))) continue;
+    if (!label || known.has(label)) continue;
     const input = control.matches("input") ? control : (control.querySelector("input") ?? control);
     commands.push({
       id: `button ${control.id || label}`,
@@ -74,7 +73,7 @@ export function buttonCommands(table) {
       keys: [],
       words: title,
       why: () => {
-        if (control.closest("#range-bar[hidden]")) return "No range is marked. Press [ and ] to mark its ends.";
+        if (control.closest("#range-bar[hidden]")) return "No range is marked. Drag over the timeline with Shift to mark one.";
         return input.matches(":disabled") ? `Not available now: ${title}.` : null;
       },
       run: () => input.click(),
@@ -175,5 +174,5 @@ function wordsOf(control) {
 /** @param {HTMLElement} control */
 function isThere(control) {
   const hidden = control.closest("[hidden]");
-  return (!hidden || hidden.id === "range-bar") && !control.hasAttribute("data-no-command");
+  return (!hidden || hidden.id === "range-bar") && !control.closest("[data-no-command]");
 }

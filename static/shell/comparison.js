@@ -36,13 +36,12 @@ export function mountComparison(store, actions) {
       if (panel.matches(":popover-open")) panel.hidePopover();
       return;
     }
-    const was = last.before_px?.toFixed(2) ?? "–";
-    beforeButton.textContent = isBefore ? "before" : `${was} →`;
+    beforeButton.textContent = isBefore ? "before" : `${last.before_px?.toFixed(2) ?? "–"} →`;
     beforeButton.classList.toggle("is-warned", last.warning !== "");
     beforeButton.title = `Cost before and after the ${last.work}: ${costs(last.before_px, last.after_px)}. Click for each view`;
-    badge.textContent = `Before the ${last.work}: ${px(last.before_px)} · Shift+B shows the result`;
+    badge.textContent = `Before the ${last.work}: ${px(last.before_px)}`;
     const label = isBefore ? `Show the result of the ${last.work}` : `Show the pose before the ${last.work}`;
-    toggle.title = toggleHere.title = `${label} (Shift+B)`;
+    toggle.title = toggleHere.title = label;
     toggleHere.textContent = isBefore ? "Show result" : "Show before";
     toggle.setAttribute("aria-label", label);
     list(last);

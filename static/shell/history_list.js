@@ -92,10 +92,9 @@ export class HistoryList {
    * @param {boolean} isUndone
    */
   #entry(edit, cells, title, isCurrent, isUndone) {
-    const row = make("button", { type: "button", title, "data-edit": String(edit) });
+    const row = make("button", { type: "button", title, "data-edit": String(edit) }, ...cells.map((text) => make("span", "is-clipped", text)));
     row.classList.toggle("is-undone", isUndone);
     if (isCurrent) row.setAttribute("aria-current", "step");
-    row.append(...cells.map((text) => make("span", "is-clipped", text)));
     row.addEventListener("click", () => isCurrent || this.#send({ type: "go_to", edit }));
     return make("li", {}, row);
   }

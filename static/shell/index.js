@@ -12,6 +12,7 @@ import { mountComparison } from "./comparison.js";
 import { deeds } from "./deeds.js";
 import { ExportPanel } from "./export_panel.js";
 import { HistoryList } from "./history_list.js";
+import { KeyChoices, followChoices } from "./key_choices.js";
 import { KeyList } from "./key_list.js";
 import { listen, orderedByArea } from "./keys.js";
 import { Palette } from "./palette.js";
@@ -50,17 +51,14 @@ export function mount(context, rooms) {
   const people = new People(store, actions, posing);
   const workspace = new Workspace(store);
   const history = new HistoryList(store, send);
-  const exporting = new ExportPanel(store, context.notify);
-  const advice = new AdviceLine(store, deeds(context, rooms, exporting));
+  const advice = new AdviceLine(store, deeds(context, rooms, new ExportPanel(store, context.notify)));
   context.onNotice((notice) => advice.answer(notice));
   mountSavedMark(store, send);
   mountAnnouncer(byId("announcer", HTMLElement), store);
-  const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });
-  const keyList = new KeyList();
   button("show-palette", () => palette.toggle());
 
   const own = [
-    ...helpBindings({ actions, history, advice, palette, keyList, reasons }),
+    ...helpBindings({ actions, history, advice, showPalette: () => palette.toggle(), showKeys: () => keyList.show(), reasons }),
     ...rooms.sessions.bindings,
     ...escapeBindings({ store, actions, advice, grid, gestures, pinning, epipolar: rooms.posing.epipolar, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
@@ -71,8 +69,11 @@ export function mount(context, rooms) {
     own,
     ...[scene, search, timeline, rooms.posing, panes, inspector, annotation, participants].map(({ bindings }) => bindings),
   ]);
-  palette.setBindings(table);
-  keyList.setBindings(table);
+  const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: inspector.inspector, away: reasons.away }, table);
+  const choices = new KeyChoices(table, (text) => context.say(text, "error"));
+  const keyList = new KeyList(table, choices);
+  followChoices(choices);
+  store.on(["session"], () => store.facts.session?.role === "host" && void choices.load());
   obeyKeys(context, table, scene.frame);
   return table;
 }

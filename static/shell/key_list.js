@@ -1,8 +1,13 @@
-/** Dialog that lists the keys by area, and the marks, with a search field. */
+/** Dialog that lists the keys by area and changes them, and lists the marks, with a search field. */
 
 import { button, byId, keyCaps, make } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
+import { keyOf, obeys } from "../widgets/key_matching.js";
 import { markSection } from "../timeline/mark_list.js";
+
+/**
+ * @typedef {import("../widgets/key_matching.js").Binding} Binding
+ */
 
 export class KeyList {
   #dialog = byId("key-list", HTMLDialogElement);
@@ -10,28 +15,30 @@ export class KeyList {
   #list = byId("key-areas", HTMLElement);
   #marks = byId("key-marks", HTMLElement);
   #none = byId("key-none", HTMLElement);
+  #reset;
+  #table;
+  #choices;
+  /** Buttons of the commands that are listed. @type {Map<Binding, HTMLButtonElement>} */
+  #buttons = new Map();
+  /** Command whose key is asked for. @type {Binding | null} */
+  #asked = null;
 
-  constructor() {
+  /**
+   * @param {Binding[]} table
+   * @param {import("./key_choices.js").KeyChoices} choices
+   */
+  constructor(table, choices) {
+    this.#table = table;
+    this.#choices = choices;
+    choices.onChange = () => this.#dialog.open && this.#search();
     this.#marks.append(markSection());
     this.#query.addEventListener("input", () => this.#search());
     button("show-key-list", () => this.show());
+    this.#reset = button("reset-keys", () => void choices.reset());
     this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
-  }
-
-  /** @param {import("../widgets/key_matching.js").Binding[]} table */
-  setBindings(table) {
-    /** @type {Map<string, HTMLElement>} */
-    const areas = new Map();
-    for (const { keys, label, labels, area } of merged(table.filter((binding) => binding.keys.length > 0))) {
-      let section = areas.get(area);
-      if (!section) {
-        section = make("section", {}, make("h3", {}, area), make("dl"));
-        areas.set(area, section);
-      }
-      const description = make("dd", { "data-labels": JSON.stringify(labels) }, label);
-      section.querySelector("dl")?.append(make("div", {}, make("dt", {}, keyCaps(keys)), description));
-    }
-    this.#list.replaceChildren(...areas.values());
+    this.#dialog.addEventListener("keydown", (event) => this.#take(event), true);
+    this.#dialog.addEventListener("close", () => this.#list.replaceChildren());
+    this.#list.addEventListener("focusout", () => this.#cancel());
   }
 
   show() {
@@ -40,41 +47,106 @@ export class KeyList {
     this.#dialog.showModal();
   }
 
+  /** List the commands that have keys, and with a query those without keys too. */
   #search() {
     const query = this.#query.value;
-    for (const section of [...this.#list.children, ...this.#marks.children]) {
-      const area = section.querySelector("h3")?.textContent ?? "";
-      let some = false;
-      for (const row of section.querySelectorAll("dl > div")) {
-        const fits = fitness(query, `${row.textContent} ${area}`) !== null;
-        /** @type {HTMLElement} */ (row).hidden = !fits;
-        some ||= fits;
-      }
-      /** @type {HTMLElement} */ (section).hidden = !some;
+    /** @type {Map<string, HTMLElement>} */
+    const areas = new Map();
+    this.#buttons.clear();
+    for (const bindings of merged(this.#table.filter(({ keys }) => keys.length > 0 || query.trim() !== ""))) {
+      const { area = "More" } = bindings[0];
+      const label = joined(bindings.map((one) => one.label));
+      if (fitness(query, `${label} ${bindings.flatMap(({ keys }) => keys).join(" ")} ${area}`) === null) continue;
+      const section = areas.get(area) ?? make("section", {}, make("h3", {}, area), make("dl"));
+      areas.set(area, section);
+      const labels = JSON.stringify(bindings.map((one) => one.label));
+      section.lastChild?.appendChild(make("div", {}, make("dt", {}, ...bindings.map((one) => this.#caps(one))), make("dd", { "data-labels": labels }, label)));
     }
-    this.#none.hidden = [this.#list, this.#marks].some((one) => one.querySelector("section:not([hidden])") !== null);
+    this.#list.replaceChildren(...areas.values());
+    for (const row of this.#marks.querySelectorAll("dl > div")) row.toggleAttribute("hidden", fitness(query, `${row.textContent}`) === null);
+    this.#marks.hidden = this.#marks.querySelector("dl > div:not([hidden])") === null;
+    this.#none.hidden = areas.size > 0 || !this.#marks.hidden;
+    this.#reset.disabled = !this.#choices.areChanged;
+  }
+
+  /** @param {Binding} binding */
+  #caps(binding) {
+    const { keys, label, matches } = binding;
+    if (matches) return make("span", { title: "This key cannot be changed" }, keyCaps(keys));
+    const title = `Change the key of “${label}”`;
+    const name = `${title}: ${keys.join(", ") || "none"}`;
+    const change = make("button", { type: "button", title, "aria-label": name, onclick: () => this.#ask(binding) }, capsOf(binding));
+    this.#buttons.set(binding, change);
+    return change;
+  }
+
+  /** @param {Binding} binding */
+  #ask(binding) {
+    this.#cancel();
+    this.#asked = binding;
+    this.#buttons.get(binding)?.replaceChildren("Press a key");
+    this.#note(binding, "Esc cancels, Delete leaves it without a key");
+  }
+
+  #cancel() {
+    if (!this.#asked) return;
+    this.#buttons.get(this.#asked)?.replaceChildren(capsOf(this.#asked));
+    this.#list.querySelector("output")?.remove();
+    this.#asked = null;
+  }
+
+  /** @param {KeyboardEvent} event */
+  async #take(event) {
+    const binding = this.#asked;
+    if (!binding || ["Control", "Alt", "Shift", "Meta", "AltGraph"].includes(event.key)) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.#cancel();
+    if (event.key === "Escape") return;
+    const key = event.key === "Delete" ? null : keyOf(event);
+    const owner = this.#table.find((one) => one !== binding && obeys(one, event));
+    let note = owner?.matches ? `“${owner.label}” keeps this key.` : "Expected a letter, a sign or a named key, found another.";
+    if (event.key === "Delete" || (key !== null && !owner?.matches)) {
+      note = (await this.#choices.choose(binding, key)) || (owner && key ? `Taken from “${owner.label}”` : "");
+    }
+    this.#note(binding, note);
+  }
+
+  /**
+   * Show a sentence in the row of a command, and give its button the focus.
+   *
+   * @param {Binding} binding
+   * @param {string} text
+   */
+  #note(binding, text) {
+    this.#list.querySelector("output")?.remove();
+    const change = this.#buttons.get(binding);
+    change?.closest("div")?.lastChild?.appendChild(make("output", {}, text));
+    change?.focus();
   }
 }
 
+/** @param {Binding} binding */
+function capsOf({ keys }) {
+  return keys.length > 0 ? keyCaps(keys) : make("span", "keys", "none");
+}
+
 /**
- * Merge neighbours that differ in one word, such as *Next keyframe* and *Previous keyframe*, so that the list fits the screen.
+ * Merge neighbours with keys that differ in one word, such as *Next keyframe* and *Previous keyframe*, so that the list fits the screen.
  *
- * @param {import("../widgets/key_matching.js").Binding[]} bindings
- * @returns {{keys: string[], label: string, labels: string[], area: string}[]}
+ * @param {Binding[]} bindings
+ * @returns {Binding[][]}
  */
 function merged(bindings) {
-  /** @type {{keys: string[], labels: string[], area: string, at: number | null}[]} at: position of the word that differs */
+  /** @type {Binding[][]} */
   const rows = [];
-  for (const { keys, label, area = "More" } of bindings) {
+  for (const binding of bindings) {
     const row = rows.at(-1);
-    const at = row && row.area === area ? differingWord(row.labels[0], label) : null;
-    if (row && at !== null && (row.at === null || row.at === at)) {
-      row.at = at;
-      row.labels.push(label);
-      row.keys.push(...keys);
-    } else rows.push({ keys: [...keys], labels: [label], area, at: null });
+    const words = row?.map(({ label }) => differingWord(label, binding.label)) ?? [null];
+    if (row?.[0].keys.length && binding.keys.length && row[0].area === binding.area && words[0] !== null && new Set(words).size === 1) row.push(binding);
+    else rows.push([binding]);
   }
-  return rows.map(({ keys, labels, area, at }) => ({ keys, labels, area, label: at === null ? labels[0] : joined(labels, at) }));
+  return rows;
 }
 
 /**
@@ -90,15 +162,11 @@ function differingWord(one, other) {
   return differing.length === 1 ? differing[0] : null;
 }
 
-/**
- * @param {string[]} labels
- * @param {number} at position of the word that differs
- */
-function joined(labels, at) {
+/** @param {string[]} labels that differ in one word at most */
+function joined(labels) {
+  if (labels.length === 1) return labels[0];
+  const at = differingWord(labels[0], labels[1]) ?? 0;
   const words = labels.map((label) => label.split(" ")[at]).map((word, index) => (index > 0 && at === 0 ? word.toLowerCase() : word));
-  const all = `${words.slice(0, -1).join(", ")} or ${words.at(-1)}`;
-  return labels[0]
-    .split(" ")
-    .map((word, index) => (index === at ? all : word))
-    .join(" ");
+  const either = `${words.slice(0, -1).join(", ")} or ${words.at(-1)}`;
+  return labels[0].split(" ").map((word, index) => (index === at ? either : word)).join(" ");
 }

@@ -1,5 +1,6 @@
 /** Table of all keys, and the listener that runs them. */
 
+import { obeys } from "../widgets/key_matching.js";
 import { keepsUndo } from "../widgets/typing.js";
 
 /** @typedef {import("../widgets/key_matching.js").Binding} Binding */
@@ -60,14 +61,25 @@ export function listen(target, table, { viser, isDragging, say }) {
     if (event.defaultPrevented || document.querySelector("dialog[open]")) return;
     if (!isEscape && (isDragging() || operates(from, event))) return;
     if (viser && !event.ctrlKey && VISER_KEYS.has(event.key.toLowerCase())) return;
-    const binding = table.find(({ matches }) => matches(event));
+    const binding = table.find((one) => obeys(one, event));
     if (!binding || (writes(from) && !isEscape && !(binding.anywhere && !keepsUndo(from, event)))) return;
     event.preventDefault();
-    const why = binding.why?.();
-    if (why) say(why);
     if (binding.release) held = { binding, code: event.code };
-    binding.run(event);
+    obey(binding, event, say);
   });
+}
+
+/**
+ * Run a command, and show why it is unavailable where it is.
+ *
+ * @param {Binding} binding
+ * @param {KeyboardEvent} event
+ * @param {(why: string) => void} say
+ */
+export function obey(binding, event, say) {
+  const why = binding.why?.();
+  if (why) say(why);
+  binding.run(event);
 }
 
 /** @param {HTMLElement | null} element */

@@ -21,17 +21,18 @@ export class Palette {
   #list = byId("palette-list", HTMLElement);
   #why = byId("palette-why", HTMLElement);
   #context;
-  /** @type {import("../widgets/key_matching.js").Binding[]} */
-  #table = [];
+  #table;
   /** @type {Command[]} the listed commands */
   #found = [];
   #at = 0;
 
   /**
    * @param {import("./commands.js").CommandContext} context
+   * @param {import("../widgets/key_matching.js").Binding[]} table
    */
-  constructor(context) {
+  constructor(context, table) {
     this.#context = context;
+    this.#table = table;
     this.#input.addEventListener("input", () => this.#search());
     this.#input.addEventListener("keydown", (event) => this.#onKey(event));
     this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
@@ -39,11 +40,6 @@ export class Palette {
       const option = event.target instanceof Element ? event.target.closest("[role=option]") : null;
       if (option) this.#choose([...this.#list.children].indexOf(option));
     });
-  }
-
-  /** @param {import("../widgets/key_matching.js").Binding[]} table */
-  setBindings(table) {
-    this.#table = table;
   }
 
   toggle() {

@@ -63,13 +63,12 @@ export class People {
    * @param {number} person
    */
   #choice(within, name, info, person) {
-    const label = make("label", { title: `Select ${info.name} (P: next person)` });
     const input = make("input", { type: "radio", name, value: String(person) });
     input.addEventListener("change", () => {
       this.#actions.selectPerson(person);
       if (within === this.#bar) input.blur();
     });
-    label.append(input, make("span", { className: "person-name is-clipped", "--person": info.color }, info.name));
+    make("label", { title: `Select ${info.name}` }, input, make("span", { className: "person-name is-clipped", "--person": info.color }, info.name));
     return input;
   }
 
@@ -109,7 +108,7 @@ export class People {
       copy.disabled = !connected || person === state.person;
       summary.textContent = source === null ? "not placed" : [source, status].filter(Boolean).join(", ");
       eye.setAttribute("aria-pressed", String(shown));
-      eye.title = `${shown ? "Hide" : "Show"} ${session.people[person].name} in all views${person === state.person ? " (Shift+V)" : ""}`;
+      eye.title = `${shown ? "Hide" : "Show"} ${session.people[person].name} in all views`;
       eye.querySelector("path")?.setAttribute("d", shown ? EYE : SHUT);
     });
     this.#solo.disabled = !connected;

@@ -7,8 +7,7 @@ import { button } from "../widgets/elements.js";
  * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
  */
 export function mountSavedMark(store, send) {
-  const retry = () => send({ type: "save" });
-  const mark = button("saved", retry);
+  const mark = button("saved", () => send({ type: "save" }));
   store.on(["state", "connected"], show);
   addEventListener("beforeunload", (event) => {
     if (isSafe()) return;

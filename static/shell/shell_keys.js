@@ -8,24 +8,19 @@ import { closePopover } from "../widgets/popovers.js";
 
 /**
  * @param {{actions: import("../model/actions.js").Actions, history: import("./history_list.js").HistoryList,
- *   advice: import("./advice.js").AdviceLine, palette: import("./palette.js").Palette, keyList: import("./key_list.js").KeyList,
+ *   advice: import("./advice.js").AdviceLine, showPalette: () => void, showKeys: () => void,
  *   reasons: import("../model/unavailable_reasons.js").Reasons}} parts
  */
-export function helpBindings({ actions, history, advice, palette, keyList, reasons }) {
+export function helpBindings({ actions, history, advice, showPalette, showKeys, reasons }) {
   return inArea("History and help", [
-    { keys: ["Ctrl K"], label: "Commands", anywhere: true, run: () => palette.toggle() },
-    { keys: ["Ctrl Z"], label: "Undo", anywhere: true, why: reasons.undo, run: () => actions.undo() },
-    { keys: ["Ctrl Shift Z", "Ctrl Y"], label: "Redo", anywhere: true, why: reasons.redo, run: () => actions.redo() },
-    {
-      keys: ["Shift B"],
-      label: "Show the pose before the last fit or search, or its result",
-      why: reasons.compared,
-      run: () => actions.toggleBefore(),
-    },
-    { keys: ["H"], label: "History of edits", run: () => history.toggle() },
-    { keys: ["Shift H"], label: "Earlier sentences of the line", words: "messages log", run: () => advice.log.toggle() },
-    { keys: ["Shift Esc"], label: "Dismiss what the line says", words: "messages", run: () => void advice.dismiss() },
-    { keys: ["?"], label: "Keyboard shortcuts", matches: (event) => event.key === "?", run: () => keyList.show() },
+    { keys: ["Ctrl K"], label: "Commands", anywhere: true, run: showPalette },
+    { keys: ["Ctrl Z"], label: "Undo the last change", anywhere: true, why: reasons.undo, run: () => actions.undo() },
+    { keys: ["Ctrl Shift Z", "Ctrl Y"], label: "Redo the last change", anywhere: true, why: reasons.redo, run: () => actions.redo() },
+    { label: "Show the pose before the last fit or search, or its result", why: reasons.compared, run: () => actions.toggleBefore() },
+    { label: "History of edits", run: () => history.toggle() },
+    { label: "Earlier sentences of the line", words: "messages log", run: () => advice.log.toggle() },
+    { label: "Dismiss what the line says", words: "messages", run: () => void advice.dismiss() },
+    { keys: ["?"], label: "Keyboard shortcuts", words: "keys change set", matches: (event) => event.key === "?", run: showKeys },
   ]);
 }
 
@@ -52,7 +47,7 @@ export function escapeBindings({ store, actions, advice, grid, gestures, pinning
     else advice.dismiss();
   };
   const label = "Cancel a drag, exit the replay, stop a run, or unmark the range";
-  return inArea("Tracking", [{ keys: ["Esc"], label, run }]);
+  return inArea("Tracking", [{ keys: ["Esc"], label, matches: ({ key }) => key === "Escape", run }]);
 }
 
 /**
@@ -64,10 +59,10 @@ export function peopleBindings({ actions, posing, people, reasons }) {
   return inArea("People", [
     { keys: ["P"], label: "Select the next person", why, run: () => actions.stepPerson(1) },
     { keys: ["Shift P"], label: "Select the previous person", why, run: () => actions.stepPerson(-1) },
-    { keys: ["Shift A"], label: "Solo: dim other people (toggle)", why, run: () => actions.toggleSolo() },
-    { keys: ["Shift V"], label: "Show or hide the active person", why, run: () => actions.toggleShown() },
-    { keys: ["Shift E"], label: "Search and fit everyone or only the active person (toggle)", why, run: () => actions.toggleScope() },
-    { keys: ["Shift C"], label: "Copy the next person's angles", why, run: () => posing.copyNextPerson() },
-    { keys: ["Shift U"], label: "List of people", why, run: () => people.toggle() },
+    { label: "Solo: dim other people (toggle)", why, run: () => actions.toggleSolo() },
+    { label: "Show or hide the active person", why, run: () => actions.toggleShown() },
+    { label: "Search and fit everyone or only the active person (toggle)", why, run: () => actions.toggleScope() },
+    { label: "Copy the next person's angles", why, run: () => posing.copyNextPerson() },
+    { label: "List of people", why, run: () => people.toggle() },
   ]);
 }

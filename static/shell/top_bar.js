@@ -25,7 +25,7 @@ export function mountTopBar(store, actions) {
     const { session } = store.facts;
     if (!session) return;
     sessionName.textContent = session.name;
-    sessionName.title = `${session.name}. Open another session (Ctrl+O)`;
+    sessionName.title = `${session.name}. Open another session`;
     document.title = `${session.name} – Quadrille`;
   }
 

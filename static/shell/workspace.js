@@ -62,13 +62,8 @@ export class Workspace {
   }
 
   get bindings() {
-    const binding = {
-      keys: ["Alt Y"],
-      label: "3-D view: fold away or open (toggle)",
-      words: "show hide close collapse scene panel",
-      run: () => this.toggleScene(),
-    };
-    return inArea("3-D view", [binding]);
+    const words = "show hide close collapse scene panel";
+    return inArea("3-D view", [{ label: "3-D view: fold away or open (toggle)", words, run: () => this.toggleScene() }]);
   }
 
   /** Fold the 3-D view away, or open it. */
@@ -112,7 +107,7 @@ export class Workspace {
     const share = 100 / Math.max(1, whole);
     showPosition(this.#bar, { now: share * panes, min: share * min, max: share * (this.#width - bar) });
     this.#button.setAttribute("aria-pressed", String(!isFolded));
-    this.#button.title = `3-D view: ${isFolded ? "open it" : "fold it away"} (Alt+Y)`;
+    this.#button.title = `3-D view: ${isFolded ? "open it" : "fold it away"}`;
     return panes;
   }
 

@@ -78,7 +78,7 @@ export function mountDoubtList(store, queue) {
     const { all, resolved } = countDoubts(store.facts);
     if (all > 0) return `All ${count(resolved)} doubtful and lost poses are confirmed or reviewed.`;
     if (timeline.statuses.some((status) => status > 0)) return "No pose is doubtful or lost.";
-    return "No frame has been tracked. Press T to track; doubtful and lost poses are listed here.";
+    return "No frame has been tracked. Once frames are tracked, doubtful and lost poses are listed here.";
   }
 
   /** Mark the entry of the current frame. */
@@ -136,7 +136,7 @@ export function mountDoubtList(store, queue) {
     const go = textButton("", title, () => queue.visit(doubt), { className: "doubt", "data-no-command": "" });
     go.append(image, text);
     const accepts = keyframe ? "this keyframe is right" : `mark ${frames} as reviewed`;
-    const accept = iconButton(TICK, `Accept: ${accepts} (Alt+Enter)`, () => queue.accept(doubt));
+    const accept = iconButton(TICK, `Accept: ${accepts}`, () => queue.accept(doubt));
     accept.classList.add("doubt-accept");
     return make("li", {}, go, accept);
   }

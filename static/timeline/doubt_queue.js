@@ -48,7 +48,7 @@ export class DoubtQueue {
 
   /** Why there is nothing to accept; null if there is something. */
   get whyNotAccept() {
-    return this.current ? null : "The active person has no doubtful or lost pose here. Alt+↓ goes to the most severe one.";
+    return this.current ? null : "The active person has no doubtful or lost pose here. Open the list of doubts for the most severe one.";
   }
 
   /** @param {import("./doubts.js").Doubt} doubt */
@@ -95,8 +95,7 @@ export class DoubtQueue {
     const { doubts, current } = this;
     if (doubts.length === 0) return;
     const at = current ? doubts.indexOf(current) : way > 0 ? this.#rank - 1 : this.#rank;
-    const rank = Math.max(0, Math.min(doubts.length - 1, at + way));
-    this.visit(doubts[rank]);
+    this.visit(doubts[Math.max(0, Math.min(doubts.length - 1, at + way))]);
   }
 
   /**

@@ -64,8 +64,7 @@ export class FrameWindow {
     const start = Math.max(0, range.first - margin);
     const length = Math.max(LEAST, range.last + 1 + margin - start);
     const { start: at, end } = this.span;
-    const isShown = Math.abs(at - start) < 0.5 && Math.abs(end - at - length) < 1.5;
-    if (isShown) this.#show(0, this.#frames);
+    if (Math.abs(at - start) < 0.5 && Math.abs(end - at - length) < 1.5) this.#show(0, this.#frames);
     else this.#show(start, length);
   }
 

@@ -16,7 +16,7 @@ export function mountJumpMenu(store, jumps, listDoubts) {
   const menu = byId("jump-menu", HTMLElement);
   /** @type {Map<import("./jumps.js").Kind, {count: HTMLElement, buttons: HTMLButtonElement[]}>} */
   const rowsByKind = new Map();
-  const gap = { type: /** @type {const} */ ("button"), className: "jump-gap", title: "Go to the middle of the longest gap between keyframes, the best place for a new one (Q)" };
+  const gap = { type: /** @type {const} */ ("button"), className: "jump-gap", title: "Go to the middle of the longest gap between keyframes, the best place for a new one" };
   const gapButton = make("button", { ...gap, onclick: () => jumps.toLongestGap() }, "Longest gap between keyframes");
   const previous = button("previous-doubt", () => jumps.go("doubt", -1));
   const next = button("next-doubt", () => jumps.go("doubt", 1));
@@ -41,20 +41,20 @@ export function mountJumpMenu(store, jumps, listDoubts) {
   store.on(["timeline", "disagreeing", "calibration", "otherCopy", "provenanceFilter", "annotators", "connected", "session"], countAll);
 
   function build() {
-    const rows = KINDS.map(({ kind, label, title, key, more }) => {
+    const rows = KINDS.map(({ kind, label, title, more, keys }) => {
       const row = make("div", { className: "jump-row", title });
       const name = make("span", {}, label);
       const number = make("output", { "aria-label": `Number of frames: ${label}` });
-      const keyOf = (/** @type {boolean} */ back) => (key ? ` (${back ? previousKey(key) : key.replace(" ", "+")})` : "");
+      const [onward, back] = keys?.map(([key]) => ` (${key.replace(" ", "+")})`) ?? ["", ""];
       const buttons = [
-        iconButton(PREVIOUS, `Previous ${more}${keyOf(true)}`, () => jumps.go(kind, -1)),
-        iconButton(NEXT, `Next ${more}${keyOf(false)}`, () => jumps.go(kind, 1)),
+        iconButton(PREVIOUS, `Previous ${more}${back}`, () => jumps.go(kind, -1)),
+        iconButton(NEXT, `Next ${more}${onward}`, () => jumps.go(kind, 1)),
       ];
-      row.append(name, number, make("kbd", {}, key.replace(" ", "+")), make("div", "group", ...buttons));
+      row.append(name, number, make("div", "group", ...buttons));
       rowsByKind.set(kind, { count: number, buttons });
       return row;
     });
-    const title = "List doubtful and lost poses with thumbnails, most severe first (Shift+L)";
+    const title = "List doubtful and lost poses with thumbnails, most severe first";
     menu.append(...rows, gapButton, make("button", { type: "button", className: "jump-list", title, onclick: toList }, "List doubts by severity"));
   }
 
@@ -72,8 +72,7 @@ export function mountJumpMenu(store, jumps, listDoubts) {
 
   function countAll() {
     const { connected, session } = store.facts;
-    const doubts = jumps.count("doubt");
-    previous.disabled = next.disabled = !connected || doubts === 0;
+    previous.disabled = next.disabled = !connected || jumps.count("doubt") === 0;
     open.disabled = !connected || !session;
     if (menu.hidden) return;
     for (const [kind, { count: number, buttons }] of rowsByKind) {
@@ -87,9 +86,4 @@ export function mountJumpMenu(store, jumps, listDoubts) {
       ? `Longest gap between keyframes: ${count(gap.last - gap.first + 1)}`
       : "Every frame is a keyframe";
   }
-}
-
-/** @param {string} key */
-function previousKey(key) {
-  return key.startsWith("Alt ") ? `Alt+Shift+${key.slice(4)}` : `Shift+${key}`;
 }

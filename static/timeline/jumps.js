@@ -6,35 +6,35 @@ import { copyDifferences, earlierCalibration } from "../model/selectors.js";
 
 /** @typedef {"doubt" | "ambiguous" | "unreviewed" | "disagreeing" | "earlier" | "copy" | "chosen" | "keyframe" | "empty"} Kind */
 
-/** @type {{kind: Kind, label: string, title: string, key: string, more: string}[]} */
+/** @type {{kind: Kind, label: string, title: string, more: string, keys?: [string[], string[]]}[]} */
 export const KINDS = [
   {
-    kind: "doubt", label: "Doubtful or lost", key: "N", more: "doubtful or lost frame",
+    kind: "doubt", label: "Doubtful or lost", keys: [["N"], ["Shift N"]], more: "doubtful or lost frame",
     title: "Frames whose pose the tracker is not sure of, and that nobody has confirmed or reviewed",
   },
   {
-    kind: "ambiguous", label: "Ambiguous", key: "Alt A", more: "ambiguous frame",
-    title: "Frames where another pose, drawn dashed, fits about as well. Shift+X uses it, K keeps the current pose",
+    kind: "ambiguous", label: "Ambiguous", more: "ambiguous frame",
+    title: "Frames where another pose, drawn dashed, fits about as well. Use it, or keep the current pose as a keyframe",
   },
-  { kind: "unreviewed", label: "Not reviewed", title: "Frames whose pose nobody has confirmed or reviewed", key: "Alt N", more: "unreviewed frame" },
+  { kind: "unreviewed", label: "Not reviewed", title: "Frames whose pose nobody has confirmed or reviewed", more: "unreviewed frame" },
   {
-    kind: "disagreeing", label: "Inconsistent", key: "D", more: "frame inconsistent with its neighbours",
+    kind: "disagreeing", label: "Inconsistent", more: "frame inconsistent with its neighbours",
     title: "Frames where the body jumps, for example between two runs or next to a keyframe",
   },
   {
-    kind: "earlier", label: "Earlier calibration", key: "", more: "frame of an earlier calibration",
+    kind: "earlier", label: "Earlier calibration", more: "frame of an earlier calibration",
     title: "Frames with a pose that was made before the cameras were corrected",
   },
   {
-    kind: "copy", label: "Other copy differs", key: "Alt S", more: "frame where the copies differ",
+    kind: "copy", label: "Other copy differs", more: "frame where the copies differ",
     title: "Frames on which the copy that the inspector compares differs by more than the tolerance, and nobody has decided",
   },
   {
-    kind: "chosen", label: "Filtered by provenance", key: "Alt Q", more: "frame of the chosen provenance",
+    kind: "chosen", label: "Filtered by provenance", more: "frame of the chosen provenance",
     title: "Frames that the filter of the inspector's section Provenance lets through",
   },
-  { kind: "keyframe", label: "Keyframes", title: "Frames whose pose a person has set or confirmed", key: "W", more: "keyframe" },
-  { kind: "empty", label: "Without a pose", title: "Frames that have no pose", key: "", more: "frame without a pose" },
+  { kind: "keyframe", label: "Keyframes", title: "Frames whose pose a person has set or confirmed", more: "keyframe" },
+  { kind: "empty", label: "Without a pose", title: "Frames that have no pose", more: "frame without a pose" },
 ]; // prettier-ignore
 
 const DOUBT = STATUSES.indexOf("doubtful");

@@ -25,10 +25,10 @@ const LINES = [
   ["compared", "neutral", "result of another run"],
   ["result", "neutral", "result, while the pose before is shown"],
   ["preview", "proposal", "candidate: click takes it"],
-  ["alternative", "proposal", "alternative pose: Shift+X takes it"],
+  ["alternative", "proposal", "alternative pose, which can be taken instead"],
   ["new_sizes", "proposal", "new body sizes: Apply takes them"],
   ["other_copy", "neutral", "pose of another copy: the section Other copy takes it"],
-  ["former", "neutral", "limb before the fit: Alt+B takes it back"],
+  ["former", "neutral", "limb before the fit, which can be taken back"],
   ["epipolar", "mark", "line of sight of a pin or drag"],
 ];
 

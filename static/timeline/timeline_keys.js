@@ -40,8 +40,8 @@ export function trackBindings(store, actions, reasons) {
   return inArea("Tracking", [
     { keys: ["T"], label: "Track forward", why, run: track("forward") },
     { keys: ["Shift T"], label: "Track backward", why, run: track("backward") },
-    { keys: ["Alt P"], label: "Pause or continue tracking", why: tracking, run: () => actions.togglePause() },
-    { keys: ["L"], label: "Follow the tracker (toggle)", why: tracking, run: () => actions.toggleFollow() },
+    { label: "Pause or continue tracking", why: tracking, run: () => actions.togglePause() },
+    { label: "Follow the tracker (toggle)", why: tracking, run: () => actions.toggleFollow() },
   ]);
 }
 
@@ -49,22 +49,22 @@ export function trackBindings(store, actions, reasons) {
 export function drawerBindings(drawer) {
   return inArea("Views", [
     { keys: ["C"], label: "Curves", run: () => drawer.toggleCurves() },
-    { keys: ["B"], label: "Search panel", run: () => drawer.toggle("search") },
-    { keys: ["V"], label: "Cost landscape", run: () => drawer.toggle("landscape") },
-    { keys: ["Shift L"], label: "Doubtful and lost poses, most severe first", run: () => drawer.toggle("doubts") },
-    { keys: [], label: "Poses compared with those that they replaced", run: () => drawer.toggle("runs") },
+    { label: "Search panel", run: () => drawer.toggle("search") },
+    { label: "Cost landscape", run: () => drawer.toggle("landscape") },
+    { label: "Doubtful and lost poses, most severe first", run: () => drawer.toggle("doubts") },
+    { label: "Poses compared with those that they replaced", run: () => drawer.toggle("runs") },
   ]);
 }
 
 /** @param {import("../posing/curve_edits.js").CurveEdits} edits */
 export function curveBindings(edits) {
   const { why } = edits;
-  const whyNone = () => (edits.choices.length > 0 ? null : "No curve can be edited here. Press C, and choose Arms, Torso or Legs.");
+  const whyNone = () => (edits.choices.length > 0 ? null : "No curve can be edited here. Open the curves, and choose Arms, Torso or Legs.");
   return inArea("Posing", [
-    { keys: [], label: "Curves: choose the next curve (U in the curves)", why: whyNone, run: () => edits.next(false) },
-    { keys: [], label: "Curves: choose one more curve (Shift+U in the curves)", why: whyNone, run: () => edits.next(true) },
-    { keys: [], label: "Curves: raise the chosen values by one step (↑ in the curves)", why, run: () => edits.step(1) },
-    { keys: [], label: "Curves: lower the chosen values by one step (↓ in the curves)", why, run: () => edits.step(-1) },
+    { label: "Curves: choose the next curve (U in the curves)", why: whyNone, run: () => edits.next(false) },
+    { label: "Curves: choose one more curve (Shift+U in the curves)", why: whyNone, run: () => edits.next(true) },
+    { label: "Curves: raise the chosen values by one step (↑ in the curves)", why, run: () => edits.step(1) },
+    { label: "Curves: lower the chosen values by one step (↓ in the curves)", why, run: () => edits.step(-1) },
   ]);
 }
 
@@ -75,10 +75,9 @@ export function curveBindings(edits) {
 export function queueBindings(queue, away) {
   const why = () => away() ?? queue.why;
   return inArea("Timeline", [
-    { keys: ["Alt ↓"], label: "Next doubtful or lost pose by severity", why, run: () => queue.step(1) },
-    { keys: ["Alt ↑"], label: "Previous doubtful or lost pose by severity", why, run: () => queue.step(-1) },
+    { label: "Next doubtful or lost pose by severity", why, run: () => queue.step(1) },
+    { label: "Previous doubtful or lost pose by severity", why, run: () => queue.step(-1) },
     {
-      keys: ["Alt Enter"],
       label: "Accept the doubtful or lost poses here: mark them as reviewed",
       why: () => away() ?? queue.whyNotAccept,
       run: () => queue.accept(queue.current),
@@ -92,27 +91,17 @@ export function queueBindings(queue, away) {
  */
 export function timelineBindings({ store, actions, playback, jumps, frameWindow, reasons }) {
   return inArea("Timeline", [
-    ...playBindings(playback),
-    ...KINDS.filter(({ key }) => key).flatMap(({ kind, key, more }) => jumpKeys(jumps, kind, key, more)),
-    { keys: ["Q"], label: "Middle of the longest gap", words: "between keyframes", run: () => jumps.toLongestGap() },
+    { label: "Loop playback, within the marked range if there is one (toggle)", run: () => playback.toggleLoop() },
+    { label: "Play slower", run: () => playback.changeRate(-1) },
+    { label: "Play faster", run: () => playback.changeRate(1) },
+    ...KINDS.flatMap(({ kind, keys, more }) => jumpKeys(jumps, kind, more, keys)),
+    { label: "Middle of the longest gap", words: "between keyframes", run: () => jumps.toLongestGap() },
     ...markBindings(store, actions, reasons),
-    { keys: ["Z"], label: "Timeline: zoom in", run: () => frameWindow.zoomIn() },
-    { keys: ["Shift Z"], label: "Timeline: zoom out", run: () => frameWindow.zoomOut() },
-    { keys: ["Alt Z"], label: "Timeline: show the marked range, or all frames", run: () => frameWindow.fit() },
+    { label: "Timeline: zoom in", run: () => frameWindow.zoomIn() },
+    { label: "Timeline: zoom out", run: () => frameWindow.zoomOut() },
+    { label: "Timeline: show the marked range, or all frames", run: () => frameWindow.fit() },
     ...rangeBindings(store),
   ]);
-}
-
-/**
- * @param {Playback} playback
- * @returns {Command[]}
- */
-function playBindings(playback) {
-  return [
-    { keys: ["Shift Space"], label: "Loop playback, within the marked range if there is one (toggle)", run: () => playback.toggleLoop() },
-    { keys: [";"], label: "Play slower", run: () => playback.changeRate(-1) },
-    { keys: ["'"], label: "Play faster", run: () => playback.changeRate(1) },
-  ];
 }
 
 /**
@@ -127,11 +116,10 @@ function markBindings(store, actions, reasons) {
   };
   return [
     { keys: ["K"], label: "Keyframe: confirm this pose (toggle)", run: () => actions.toggleMark("keyframe") },
-    { keys: ["Shift K"], label: "Remove the marks of this frame", run: () => actions.unmark() },
+    { label: "Remove the marks of this frame", run: () => actions.unmark() },
     { keys: ["E"], label: "Reviewed (toggle)", run: () => actions.toggleMark("reviewed") },
-    { keys: ["Shift I"], label: "Interpolate the marked range", why: reasons.range, run: interpolate },
+    { label: "Interpolate the marked range", why: reasons.range, run: interpolate },
     {
-      keys: ["Shift R"],
       label: "Estimate the poses here again",
       words: "marked range, or the poses around this frame",
       why: reasons.away,
@@ -159,16 +147,14 @@ function rangeBindings(store) {
 /**
  * @param {import("./jumps.js").Jumps} jumps
  * @param {import("./jumps.js").Kind} kind
- * @param {string} key
  * @param {string} what
- * @returns {import("../widgets/key_matching.js").Command[]}
+ * @param {[string[], string[]]} [keys] to the next and to the previous one
+ * @returns {Command[]}
  */
-function jumpKeys(jumps, kind, key, what) {
-  const letter = key.slice(-1);
+function jumpKeys(jumps, kind, what, keys = [[], []]) {
   const why = () => (jumps.count(kind) > 0 ? null : `There is no ${what}.`);
-  const previous = key.startsWith("Alt ") ? `Alt Shift ${letter}` : `Shift ${letter}`;
   return [
-    { keys: [key], label: `Next ${what}`, why, run: () => jumps.go(kind, 1) },
-    { keys: [previous], label: `Previous ${what}`, why, run: () => jumps.go(kind, -1) },
+    { keys: keys[0], label: `Next ${what}`, why, run: () => jumps.go(kind, 1) },
+    { keys: keys[1], label: `Previous ${what}`, why, run: () => jumps.go(kind, -1) },
   ];
 }

@@ -26,7 +26,7 @@ export function mountTrackBar(store, actions) {
     forwardButton.title = `Track forward from this frame ${to} (T)`;
     back.title = `Track backward from this frame ${range ? to : "to its beginning"} (Shift+T)`;
     pause.classList.toggle("is-paused", isActive && !isRunning);
-    pause.title = isActive && !isRunning ? "Continue tracking (Alt+P)" : "Pause tracking (Alt+P)";
+    pause.title = isActive && !isRunning ? "Continue tracking" : "Pause tracking";
     pause.setAttribute("aria-label", isActive && !isRunning ? "Continue tracking" : "Pause tracking");
     follow.checked = state?.follow ?? true;
   }

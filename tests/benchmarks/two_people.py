@@ -25,7 +25,7 @@ from playwright.async_api import Browser, Page, async_playwright
 from sample_page import ROOT, drag_latencies
 
 from chromium import FLAGS, chromium_path  # isort: skip  (found by sample_page)
-from page_driver import shows  # isort: skip
+from page_driver import command, shows  # isort: skip
 from program import READY, WITHOUT_3D, Program  # isort: skip
 
 ROUNDS, MOVES, INTERVAL_S = 4, 150, 1 / 30
@@ -73,7 +73,7 @@ async def in_browsers(
             roots[f"browser that {name}"] = min(p for p in now.keys() - before.keys() if now[p][0] not in now)
         there = (address, "ben") if elsewhere is None else (elsewhere.address, "")
         anna, ben = await opened(browsers[0], address, ""), await opened(browsers[1], *there)
-        await ben.keyboard.press("Shift+Space")  # loops
+        await command(ben, "Loop playback, within the marked range if there is one (toggle)")
         for _ in range(ROUNDS):
             spent = ProcessorTime(**roots)
             alone += await drag_latencies(anna, "left_wrist", MOVES, INTERVAL_S)

@@ -13,6 +13,7 @@ from playwright.async_api import Error, async_playwright
 from serving import listening
 
 from app.server.access import Access
+from app.server.key_routes import KEYS_FILE, KeyRoutes
 from app.server.server import create_app
 from app.server.static_files import static_folder
 
@@ -84,13 +85,23 @@ class _Server:
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="session")
-async def server(blank_viser):
+async def server(blank_viser, tmp_path_factory):
     server = _Server()
     app = create_app(server, blank_viser, Access(), static_folder())
     app.router.add_get("/thumbnail/{person}/{frame}", server.thumbnail)
+    server.state_folder = tmp_path_factory.mktemp("state")
+    KeyRoutes(server.state_folder, has_token=True).add_to(app)
     async with listening(app) as port:
         server.address = f"http://127.0.0.1:{port}/"
         yield server
+
+
+@pytest.fixture
+def keys_file(server):
+    """The user's keys, which the page reads when it is loaded; there are none."""
+    path = server.state_folder / KEYS_FILE
+    yield path
+    path.unlink(missing_ok=True)
 
 
 @pytest.fixture

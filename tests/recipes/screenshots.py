@@ -20,7 +20,7 @@ import numpy as np
 sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from chromium import FLAGS, chromium_path
-from page_driver import handle_of, shows, to_client
+from page_driver import command, handle_of, shows, to_client, toggle_layer
 from playwright.async_api import Browser, Page, async_playwright
 from program import ROOT, Program
 
@@ -55,12 +55,12 @@ class Screenshot:
 
 
 def by_keys(*steps: str | tuple[str, str, float]) -> Act:
-    """Return an act that presses keys; after one, it may wait so many seconds for what the page must show."""
+    """Return an act of commands and keys; after one, it may wait so many seconds for what the page must show."""
 
     async def act(page: Page) -> None:
         for step in steps:
             key, *shown = (step,) if isinstance(step, str) else step
-            await page.keyboard.press(key)
+            await command(page, key)
             if shown:
                 await shows(page, *shown)
 
@@ -89,9 +89,16 @@ async def pins(page: Page) -> None:
         await shows(page, f"quadrille.state.overlay.pins.length === {camera + 1}", 20)
 
 
+async def layers(page: Page) -> None:
+    """Every layer in its menu, some of them on."""
+    for layer in ("hidden", "parts"):
+        await toggle_layer(page, layer)
+    await page.keyboard.press("a")
+
+
 async def searching(page: Page) -> None:
     """A search at a speed for watching."""
-    await page.keyboard.press("b")
+    await command(page, "Search panel")
     await page.select_option("select[aria-label='Expansions per second']", index=1)
     await page.keyboard.press("f")
     await shows(page, "quadrille.state.state.job.evaluations > 50", 60)
@@ -99,14 +106,14 @@ async def searching(page: Page) -> None:
 
 async def replaying(page: Page) -> None:
     """A finished search, looked at half way."""
-    await by_keys("b", ("f", "quadrille.state.state.job.message.startsWith('done')", 120))(page)
+    await by_keys("Search panel", ("f", "quadrille.state.state.job.message.startsWith('done')", 120))(page)
     box = await page.locator("#drawer input[type=range]").bounding_box()
     await page.mouse.click(box["x"] + box["width"] / 3, box["y"] + box["height"] / 2)
 
 
 async def landscape(page: Page) -> None:
     await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "left_elbow")))
-    await page.keyboard.press("v")
+    await command(page, "Cost landscape")
 
 
 async def palette(page: Page) -> None:
@@ -117,22 +124,22 @@ async def palette(page: Page) -> None:
 
 async def history(page: Page) -> None:
     """A few edits, and the list of them."""
-    for key in ("ArrowRight", "m", "ArrowUp"):
-        await page.keyboard.press(key)
+    for key in ("ArrowRight", "Mirror the pose left to right", "ArrowUp"):
+        await command(page, key)
         await asyncio.sleep(1.2)
-    await page.keyboard.press("h")
+    await command(page, "History of edits")
 
 
 async def before_fit(page: Page) -> None:
     """A fit, with the pose before it and the costs of each view."""
-    compared = "quadrille.state.state.compared"
-    await by_keys(("g", f"{compared}?.work === 'fit'", 60), ("Shift+B", f"{compared}.is_before_shown", 20))(page)
+    compared, before = "quadrille.state.state.compared", "Show the pose before the last fit or search, or its result"
+    await by_keys(("g", f"{compared}?.work === 'fit'", 60), (before, f"{compared}.is_before_shown", 20))(page)
     await page.click("#show-comparison")
 
 
 async def inspector(page: Page) -> None:
     """Other sizes that are not applied yet, and the settings below them."""
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     upper_arm = page.get_by_label("Upper arm: length between its joints, cm")
     await upper_arm.fill("36")
     await page.keyboard.press("Enter")
@@ -141,7 +148,7 @@ async def inspector(page: Page) -> None:
 
 async def settings(page: Page) -> None:
     """Settings of tracker, search and view."""
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     for section in ("body", "track", "search", "view"):
         await page.click(f"[data-section={section}] summary")
 
@@ -161,7 +168,8 @@ async def new_session(page: Page) -> None:
 TRACK = "t", "quadrille.state.state.track.message.startsWith('done')", 300
 THUMBNAILS = "[...document.querySelectorAll('.doubt img')].slice(0, 3).every((one) => one.naturalWidth > 0)"
 NOTHING, TRACKED = by_keys(), by_keys(TRACK, "c")
-DOUBTS = by_keys(TRACK, "Shift+L", ("Alt+ArrowDown", THUMBNAILS, 60))
+NEXT = ("Next doubtful or lost pose by severity", THUMBNAILS, 60)
+DOUBTS = by_keys(TRACK, "Doubtful and lost poses, most severe first", NEXT)
 FAULT = "document.querySelector('#advice').dataset.level === 'fault'"
 SCREENS = [
     Screenshot("empty", "fresh", NOTHING),
@@ -171,12 +179,14 @@ SCREENS = [
     Screenshot("filled", "placed", by_keys("1")),
     Screenshot("pins", "placed", pins),
     Screenshot("pins-light", "placed", pins, scheme="light"),
-    Screenshot("layers", "placed", by_keys("Shift+Digit7", "Shift+Digit8", "a")),
+    Screenshot("layers", "placed", layers),
     Screenshot("search-running", "near", searching),
     Screenshot("search-replay", "near", replaying),
     Screenshot("search-replay-large", "near", replaying, LARGE, "light"),
     Screenshot("landscape", "placed", landscape),
-    Screenshot("tracking", "placed", by_keys(("t", "quadrille.state.state.track.done > 3", 120), "Alt+p")),
+    Screenshot(
+        "tracking", "placed", by_keys(("t", "quadrille.state.state.track.done > 3", 120), "Pause or continue tracking")
+    ),
     Screenshot("curves", "placed", TRACKED),
     Screenshot("curves-light-large", "placed", TRACKED, LARGE, "light"),
     Screenshot("notice", "fresh", by_keys(("t", FAULT, 20))),
@@ -193,7 +203,7 @@ SCREENS = [
     Screenshot("inspector-light-large", "tango", inspector, LARGE, "light"),
     Screenshot("settings", "tango", settings),
     Screenshot("settings-light-large", "placed", settings, LARGE, "light"),
-    Screenshot("sessions", "placed", by_keys("Control+o")),
+    Screenshot("sessions", "placed", by_keys("Open another session")),
     Screenshot("new-session", "fresh", new_session),
     Screenshot("two-people", "tango", NOTHING),
     Screenshot("page", "tango", by_keys(("g", "/fit/i.test(quadrille.state.state.undo ?? '')", 60)), (1600, 900)),

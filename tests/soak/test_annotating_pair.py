@@ -15,7 +15,7 @@ from contextlib import asynccontextmanager
 import numpy as np
 import pytest
 from chromium import FLAGS, chromium_path
-from page_driver import OPENED, drags_of, handle_of, shows, to_client, until
+from page_driver import OPENED, command, drags_of, handle_of, shows, to_client, until
 from playwright.async_api import async_playwright
 from program import ROOT, WITHOUT_3D, Program
 from scripted_user import LIMBS, ScriptedUser
@@ -260,7 +260,7 @@ async def review(eye):
         if worst_px(off[worst]) <= REJECTED_PX:
             await eye.page.keyboard.press("Alt+k")
         else:
-            await eye.page.keyboard.press("Alt+r")
+            await command(eye.page, "Reject the planned pose")
             await eye.page.keyboard.type(worst.replace("_", " ") + IS_OFF)
             await eye.page.keyboard.press("Enter")
         await shows(eye.page, f"document.querySelectorAll('.plan-tasks button').length === {left - 1}", 30)
@@ -275,7 +275,7 @@ async def look_again(eye, n, rng):
     for _ in range(n):
         for _ in range(rng.integers(1, 9)):
             frame, person = await next_task(eye.page)
-        await eye.page.keyboard.press("Alt+r")
+        await command(eye.page, "Reject the planned pose")
         await eye.page.keyboard.type(LOOK_AGAIN.replace("_", " "))
         await eye.page.keyboard.press("Enter")
         await shows(
@@ -327,14 +327,14 @@ async def test_a_pair_makes_a_verified_dataset(folder, truths, tmp_path, cases, 
             opened(browser, program.address, errors) as (page, sent),
             opened(browser, program.links["review"], errors) as (second, second_sent),
         ):
-            await second.keyboard.press("Alt+e")
+            await command(second, "People on this session, and your name")
             await second.keyboard.type("Rita")
             await second.keyboard.press("Enter")
             await shows(second, "quadrille.state.presence?.name === 'Rita' && quadrille.state.connected")
             await second.keyboard.press("Escape")
             anna, rita = Eye(page, sent, session, truths, 1), Eye(second, second_sent, session, truths, 1000)
             for one in (page, second):
-                await one.keyboard.press("Alt+u")
+                await command(one, "Plan, tasks and comments")
             for every in EVERY:
                 await plan(page, every)
                 rounds += await to_and_fro(anna, rita, folder)

@@ -49,7 +49,10 @@ WHOLE = 100
 """Frames of a made recording in a full run."""
 HALF_HOUR_S = 1800
 REPORT_S = 300
-PANELS = ("c", "b", "v", "h", "Shift+H", "a", "Control+k", "?", "Shift+L", "Alt+i")
+PANELS = (
+    "c", "a", "Control+k", "?", "Search panel", "Cost landscape", "History of edits", "Earlier sentences of the line",
+    "Doubtful and lost poses, most severe first", "Inspector: sizes, settings (toggle)",
+)  # fmt: skip
 ARRIVED = (
     "quadrille.state.state.frame === quadrille.state.target && quadrille.state.shown.frame === quadrille.state.target "
     "&& quadrille.state.overlay.frame === quadrille.state.target"
@@ -79,7 +82,7 @@ async def make_session(hour):
     stranger, page = hour.stranger, hour.page
     with stranger.stage("new session") as stage:
         await hour.picture("first page")
-        await stranger.press("Control+o")
+        await stranger.press("Open another session")
         await hour.picture("sessions")
         await stranger.click("#show-new-session")
         await stranger.fill("#new-footage", str(hour.data))
@@ -152,10 +155,10 @@ async def improve(hour):
         await hour.picture("searched")
         compared = (await state_of(hour.page))["state"]["compared"]
         if compared["warning"]:
-            await stranger.press("Shift+b")
+            await stranger.press("Show the pose before the last fit or search, or its result")
             await stranger.until("quadrille.state.state.compared.is_before_shown")
             await hour.picture("before the search")
-            await stranger.press("Shift+b")
+            await stranger.press("Show the pose before the last fit or search, or its result")
             await hour.take_back()
             stage.result["remark"] = "warned of, taken back"
 
@@ -188,7 +191,7 @@ async def correct(hour):
     for k in range(1, STRETCHES + 1):
         with stranger.stage(f"correct {k}") as stage:
             if (await state_of(hour.page))["drawer"] != "doubts":
-                await stranger.press("Shift+L")
+                await stranger.press("Doubtful and lost poses, most severe first")
             await stranger.until("quadrille.state.drawer === 'doubts'")
             await hour.picture("doubts")
             found = await worst_listed(hour) or await worst_looking(hour, done)
@@ -242,7 +245,7 @@ async def change_sizes(hour):
     stranger = hour.stranger
     with stranger.stage("sizes") as stage:
         await stranger.go_to(hour.start)
-        await stranger.press("Alt+i")
+        await stranger.press("Inspector: sizes, settings (toggle)")
         section = "#inspector [data-section=body]"
         for person, name in enumerate(hour.people):
             await hour.choose_person(person)
@@ -255,7 +258,7 @@ async def change_sizes(hour):
             await stranger.click(f"{section} button:has-text('Apply')")
             await stranger.until("!quadrille.state.bodySizes.edited && quadrille.state.state.saved")
         await hour.picture("sizes applied")
-        await stranger.press("Alt+i")
+        await stranger.press("Inspector: sizes, settings (toggle)")
         await hour.work("g", "fit")
         stage.result |= hour.judged([hour.start])
     await track(hour, "track again")
@@ -270,11 +273,11 @@ async def review(hour):
             await stranger.press("Shift+.")
             await stranger.until(ARRIVED)
         if (await state_of(page))["drawer"] != "doubts":
-            await stranger.press("Shift+L")
+            await stranger.press("Doubtful and lost poses, most severe first")
         rows = page.locator("#doubt-list .doubt")
         accepted = corrected = 0
         while n := await rows.count():
-            await stranger.press("Alt+ArrowDown")
+            await stranger.press("Next doubtful or lost pose by severity")
             await stranger.until(ARRIVED)
             state = await state_of(page)
             frame, person = state["target"], state["state"]["person"]
@@ -283,11 +286,11 @@ async def review(hour):
                 await hour.work("g", "fit")
             else:
                 accepted += 1
-                await stranger.press("Alt+Enter")
+                await stranger.press("Accept the doubtful or lost poses here: mark them as reviewed")
                 await stranger.until(f"document.querySelectorAll('#doubt-list .doubt').length < {n}")
         stage.result |= hour.judged() | {"remark": f"{accepted} entries accepted, {corrected} corrected"}
         await hour.picture("reviewed")
-        await stranger.press("Shift+L")
+        await stranger.press("Doubtful and lost poses, most severe first")
 
 
 async def export(hour):

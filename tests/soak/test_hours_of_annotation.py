@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from chromium import FLAGS, chromium_path
 from memory import memory_mb
-from page_driver import dragging, shows
+from page_driver import command, dragging, shows
 from playwright.async_api import async_playwright
 from program import ROOT, started, visited
 
@@ -37,7 +37,10 @@ KEPT_S = 60.0
 """The least of this time is what the program keeps: what a frame or a search takes and gives back is some 30 MB, which
 leaves the slope of half an hour uncertain by more than what is allowed."""
 POINTS = ("left_wrist", "right_wrist", "left_elbow", "right_elbow", "left_knee", "right_ankle", "head", "torso")
-KEYS = ("g", "g", "Control+z", "Control+z", "Control+Shift+z", "h", "h", "Shift+H", "Shift+H", "]", "[", "m", "c", "r")
+KEYS = (
+    "g", "g", "Control+z", "Control+z", "Control+Shift+z", "]", "[", "c", *("History of edits",) * 2,
+    *("Earlier sentences of the line",) * 2, "Mirror the pose left to right", "Reset the joint's limb to neutral",
+)  # fmt: skip
 N_FRAMES = 50
 SEED = 7
 
@@ -110,7 +113,7 @@ async def act(page, socket, rng):
             await asyncio.sleep(0.1)
         await asyncio.sleep(rng.uniform(0.1, 0.4))
     for key in rng.sample(KEYS, 2):
-        await page.keyboard.press(key)
+        await command(page, key)
         await asyncio.sleep(0.1)
     await page.keyboard.press("Escape")
     if rng.random() < 0.1:

@@ -134,3 +134,14 @@ async def dragging(page, camera, point, *steps_px):
         await page.mouse.move(*await to_client(page, camera, u + du, v + dv))
     yield u, v
     await page.mouse.up()
+
+
+async def command(page, label):
+    """Run a command of the page by its label, as its key would; another word is a key, which is pressed."""
+    if not await page.evaluate("(label) => quadrille.command(label)", label):
+        await page.keyboard.press(label)
+
+
+async def toggle_layer(page, layer):
+    """Show or hide a layer of the views, by the menu of layers."""
+    await page.locator(f"[data-layer={layer}]").evaluate("(box) => box.click()")

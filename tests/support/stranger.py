@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
-from page_driver import drags_of, handle_of, shows, state_of, to_client, until
+from page_driver import command, drags_of, handle_of, shows, state_of, to_client, until
 from scripted_user import LIMBS, TRUNK
 
 NEAR_ENOUGH_PX = 4
@@ -84,7 +84,7 @@ class Stranger:
     async def press(self, key):
         """Press a key."""
         self.stages[-1].keys += 1
-        await self.page.keyboard.press(key)
+        await command(self.page, key)
 
     async def fill(self, selector, text):
         """Type a text into a field, which is clicked first."""
@@ -112,7 +112,7 @@ class Stranger:
 
     async def zoom_to_people(self):
         """Zoom every view to the people: in whole images a pixel of the screen is centimetres of the room."""
-        await self.press("Shift+0")
+        await self.press("Zoom all views to the people")
         await self.until("true")
 
     async def drag(self, camera, point, to_px, person=0, key=None):
@@ -165,7 +165,7 @@ class Stranger:
             wanted = {"person": person, "point": point}
             if wanted not in hover.get("overlapping", []):
                 return False
-            await self.press("Alt+o")
+            await self.press("Take the next of the joints that overlap under the pointer")
         return False
 
     async def seen_off(self, user, cameras, person=0):

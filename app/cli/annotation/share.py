@@ -58,8 +58,7 @@ def command(arguments: Annotated[ShareArguments, tyro.conf.arg(name="")]) -> Non
     require_files(at.session)
     motion = read_motion(at.session, at.people, frames)
     with Reporter(silent=arguments.json).over(len(motion.frames), "sharing") as tick:
-        comments = _comments(at.session)
-        n_bytes = share(motion, arguments.out, 1e6 * arguments.size, arguments.overwrite, tick, comments)
+        n_bytes = share(motion, arguments.out, 1e6 * arguments.size, arguments.overwrite, tick, _comments(at.session))
     opened = arguments.out if arguments.out.suffix.lower() == ".html" else arguments.out / "index.html"
     found: dict[str, Any] = {
         "open": str(opened),

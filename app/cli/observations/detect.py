@@ -52,8 +52,7 @@ def command(arguments: Annotated[DetectArguments, tyro.conf.arg(name="")]) -> No
     folder = arguments.models or default_folder()
     reporter = Reporter(silent=arguments.json)
     if arguments.get_models:
-        paths = fetch_models(folder, reporter.say)
-        found = {"models": [str(path) for path in paths], "license": LICENSE}
+        found = {"models": [str(path) for path in fetch_models(folder, reporter.say)], "license": LICENSE}
         print(format_json(found) if arguments.json else "\n".join([*found["models"], LICENSE]))
         return
     if arguments.session is None:

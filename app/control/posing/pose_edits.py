@@ -149,8 +149,7 @@ class PoseEdits:
                     f"expected {display_name(name)} before {view.name}, found it behind; choose another view"
                 )
             hand = grabbing.grab(model, values, view, name, start, self._session_state.drag_constraints(person))
-            label = f"nudge {display_name(name)}"
-            self._apply(person, drag_to(hand, end, values), label, ("nudge", name, camera))
+            self._apply(person, drag_to(hand, end, values), f"nudge {display_name(name)}", ("nudge", name, camera))
 
     def place_part(self, person: int, part: int, R_world: Array, position_world: Array | None, gesture: object) -> None:
         """Turn a part to an orientation, as far as its joint allows; the root also moves to a position.
@@ -240,8 +239,7 @@ class PoseEdits:
         """Move degrees of freedom of a pose, (n_values,), and show and save it; see `_apply`."""
         model = self._session_state.models[person]
         require_unlocked(model, self._session_state.state.locked[person], dofs)
-        moved = move_dofs(model, before[None], dofs, by)[0]
-        self._apply(person, moved, label, gesture, lasting)
+        self._apply(person, move_dofs(model, before[None], dofs, by)[0], label, gesture, lasting)
 
     def _apply(self, person: int, values: Array, label: str, gesture: object = None, lasting: bool = False) -> None:
         """Show and save a pose.

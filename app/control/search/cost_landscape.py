@@ -74,8 +74,7 @@ class CostLandscapes:
     def _compute(self, state: State) -> None:
         views = self._session_state.frames.cached_evidence(state.frame)
         person, poses = state.person, state.poses
-        model = state.models[person]
-        dof = self._dof_of(model, state)
+        dof = self._dof_of(state.models[person], state)
         key = (state.frame, person, dof, state.settings, *map(id, poses))
         if views is None or not self._pages or key == self._computed:
             return

@@ -53,7 +53,7 @@ class Comparing:
                     return
                 raise TrackerError(
                     "expected the result of a fit or search on this frame, found none or a changed one; "
-                    "fit (G) or search (F) first"
+                    "fit or search first"
                 )
             if shown == last.is_before_shown:
                 return

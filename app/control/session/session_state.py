@@ -319,8 +319,7 @@ class SessionState:
         self, views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array],
         velocities: Sequence[Array | None],
     ) -> Costs:  # fmt: skip
-        bodies = map(PosedBody, models, poses, velocities or [None] * len(poses))
-        cost = frame_cost(views, [*bodies])
+        cost = frame_cost(views, [*map(PosedBody, models, poses, velocities or [None] * len(poses))])
         return {
             "cost_px": finite_or_none(cost.total_px),
             "view_costs_px": tuple(finite_or_none(c) for c in cost.view_costs_px),

@@ -81,7 +81,7 @@ class FindingPeople:
             people = unplaced(self, range(len(session_state.present)))
             if not people and of is None:
                 raise TrackerError(
-                    "expected a person without a pose, found that all are placed; track from here (T), or clear a "
+                    "expected a person without a pose, found that all are placed; track from here, or clear a "
                     "person's frames first"
                 )
             before = session_state.state.finding
@@ -214,8 +214,7 @@ class FindingPeople:
             axes = axes_record(found)
             self._session_state.saver.store_setting(AXES, axes)
             frame, lines = _axes(axes)
-            before = self._session_state.state.finding
-            finding = replace(before, frame=frame, axes=lines, tried=None, **_ENDED)
+            finding = replace(self._session_state.state.finding, frame=frame, axes=lines, tried=None, **_ENDED)
             self._session_state.show_frame(found.frame, finding=finding)
 
     def place(self, found: FirstPoses, label: str) -> int | None:
@@ -237,7 +236,7 @@ class FindingPeople:
             if record is None or record.keyframe or record.model_revision != revision:
                 raise TrackerError(
                     f"expected {name} as found on frame {start}, found another pose or other sizes; the acquired sizes "
-                    "are discarded; track from here (T)"
+                    "are discarded; track from here"
                 )
             stored = StoredPose(PosedBody(self._session_state.present[person], record.values), record)
             resized = partial(resized_start, stored, acquired.body)

@@ -262,8 +262,7 @@ class Observing:
             saver.write(label, changes, edit, by_program=True)
             session_state.refresh_saving()
             session_state.show_frame(session_state.state.frame)
-        n = len(set().union(*found.values()))
-        return f"Stored poses on {n} frames; keyframes stayed. Undo takes them back."
+        return f"Stored poses on {len(set().union(*found.values()))} frames; keyframes stayed. Undo takes them back."
 
 
 class _ShownProgress:

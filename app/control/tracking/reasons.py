@@ -107,8 +107,7 @@ class Reasons:
         try:
             self._set(running=True, stage="reading the frame", share=0.0, message="")
             people = self._people(state)
-            run = self._run(people)
-            found = self._explained(state, run, people)
+            found = self._explained(state, self._run(people), people)
             self._set(found=found, message="")
             self._set(found=self._with_alternatives(state, found))
         except StoppedError:

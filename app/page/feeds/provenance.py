@@ -106,5 +106,4 @@ def other_copy(controller: Controller, state: State) -> OtherCopyMessage:
         for i, found in enumerate(copy.differences)
     )
     posed = tuple(state.frame in poses for poses in copy.poses)
-    tolerance_mm = round(1000 * copy.tolerance_m, 3)
-    return OtherCopyMessage(copy.name, copy.own_name, tolerance_mm, copy.notes, posed, people)
+    return OtherCopyMessage(copy.name, copy.own_name, round(1000 * copy.tolerance_m, 3), copy.notes, posed, people)

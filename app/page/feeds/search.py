@@ -169,5 +169,4 @@ def _clearest_view(points: np.ndarray) -> int:
     """Return the view in which candidates, (n, V, N, 2) px, differ most."""
     if len(points) < 2:
         return 0
-    spreads = np.nan_to_num(points.std(axis=0)).sum(axis=(1, 2))
-    return int(np.argmax(spreads))
+    return int(np.argmax(np.nan_to_num(points.std(axis=0)).sum(axis=(1, 2))))

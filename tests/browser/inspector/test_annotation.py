@@ -1,7 +1,7 @@
 """The section of annotation: the counter, the list, the reviewer's two keys, comments, and the next best click."""
 
 import pytest
-from page_driver import shows, until
+from page_driver import command, shows, until
 
 SESSION = "document.querySelector('[data-section=annotation]')"
 
@@ -46,7 +46,7 @@ def section(page):
 async def opened(page, endpoint, message=PLAN):
     await endpoint.broadcast(message)
     await shows(page, "quadrille.state.annotation")
-    await page.keyboard.press("Alt+u")
+    await command(page, "Plan, tasks and comments")
     await shows(page, f"{SESSION}.open")
 
 
@@ -96,7 +96,7 @@ async def test_a_reviewer_accepts_and_rejects_pose_by_pose(page, endpoint, secti
     await page.keyboard.press("Alt+k")
     await sent(endpoint, action="verify", person=0, frame=20, comment="", pose=f"{20:032x}")
     await at(page, 8)
-    await page.keyboard.press("Alt+r")
+    await command(page, "Reject the planned pose")
     await page.keyboard.type("right knee")
     await page.keyboard.press("Enter")
     await sent(endpoint, action="reject", person=0, frame=8, comment="right knee", pose=f"{8:032x}")
@@ -131,7 +131,7 @@ async def test_comments_are_written_at_the_limb_gone_to_and_resolved(page, endpo
     await page.locator(".plan-comments li button").first.click()
     await at(page, 9)
     await shows(page, "quadrille.state.state.point === 'l_wrist'")
-    await page.keyboard.press("Alt+m")
+    await command(page, "Comment on the selected limb")
     assert await page.evaluate("document.activeElement.placeholder") == "On left arm, frame 9"
     await page.keyboard.type("look again")
     await page.keyboard.press("Enter")
@@ -158,7 +158,7 @@ PROPOSED = NOTHING_PROPOSED | {"number": 1, "click": CLICK, "error_mm": 16.6, "i
 
 async def test_the_next_best_click_is_gone_to_explained_and_measured(page, endpoint, section):
     await opened(page, endpoint)
-    await page.keyboard.press("Alt+c")
+    await command(page, "Next best click")
     await sent(endpoint, action="next_click")
     await endpoint.broadcast(PLAN | {"proposal": NOTHING_PROPOSED | {"running": True}})
     await section.get_by_text("Looking for the next best click").wait_for()

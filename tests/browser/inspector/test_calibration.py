@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from page_driver import shows, until
+from page_driver import command, shows, until
 
 from app.messages.advice import Action, Advice, AdviceMessage
 
@@ -45,7 +45,7 @@ def section(page):
 
 
 async def opened(page):
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await page.evaluate("document.querySelector('[data-section=calibration]').open = true")
 
 

@@ -1,7 +1,7 @@
 """The section of the clocks: offsets, nudges, estimates and the pictures of a fast moment."""
 
 import pytest
-from page_driver import shows, until
+from page_driver import command, shows, until
 
 CLOCK = {"offset_frames": 0.0, "drift_ms_per_s": 0.0, "found": None}
 FOUND = {"offset_frames": -0.118, "drift_ms_per_s": None, "sigma_ms": 1.56, "is_clear": True}
@@ -17,7 +17,7 @@ MOMENT = {"frame": 40, "views": [1, 0], "centers": [[300.0, 200.0], [5.0, 470.0]
 
 
 async def opened(page, endpoint):
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await page.evaluate("document.querySelector('[data-section=clocks]').open = true")
     await endpoint.broadcast(CLOCKS)
     found = page.locator("[data-section=clocks]")

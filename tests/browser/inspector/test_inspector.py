@@ -2,12 +2,12 @@
 
 import pytest
 from fake_endpoint import CAMERA_NAMES
-from page_driver import reloaded, shows, until
+from page_driver import command, reloaded, shows, until
 
 
 async def opened(page, *sections):
     """Open the inspector by its key, with some sections open."""
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await page.evaluate(
         "(open) => document.querySelectorAll('.section').forEach((s) => (s.open = open.includes(s.dataset.section)))",
         sections,

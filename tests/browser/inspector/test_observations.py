@@ -1,7 +1,7 @@
 """The section of observations: sets, their judgement, the way through the worst, and what it asks of the program."""
 
 import pytest
-from page_driver import shows, until
+from page_driver import command, shows, until
 
 SETS = [
     {"name": "mp", "format": "openpose", "people": ["person"], "is_in_space": False, "frames": 40, "problem": ""},
@@ -30,7 +30,7 @@ def section(page):
 
 async def opened(page, endpoint, message):
     await endpoint.broadcast(message)
-    await page.keyboard.press("Alt+j")
+    await command(page, "Observations of other programs")
     await shows(page, "document.querySelector('[data-section=observations]').open")
     await shows(page, "document.querySelector('.observed-sets li')")
 
@@ -54,7 +54,7 @@ async def test_sets_are_listed_shown_and_judged(page, endpoint, section):
 
 async def test_people_are_detected_where_nothing_was_imported(page, endpoint, section):
     await endpoint.broadcast(EMPTY | {"sets": []})
-    await page.keyboard.press("Alt+j")
+    await command(page, "Observations of other programs")
     detect = section.get_by_role("button", name="Detect people")
     await detect.click()
     await until(lambda: endpoint.received[-1] == {"type": "observations", "action": "detect", "name": ""})
@@ -93,17 +93,17 @@ async def test_the_worst_are_gone_through_by_click_and_key(page, endpoint, secti
     await page.locator(".observed-worst button").first.click()
     await until(lambda: {"type": "select", "person": 0, "point": "l_wrist"} in endpoint.received)
     await shows(page, "quadrille.state.target === 9")
-    await page.keyboard.press("Alt+Shift+ArrowDown")
+    await command(page, "Next imported limb that is off")
     await shows(page, "quadrille.state.target === 4")
     assert "exchanged" in await page.locator(".observed-worst [aria-current]").inner_text()
-    await page.keyboard.press("Alt+Shift+ArrowUp")
+    await command(page, "Previous imported limb that is off")
     await shows(page, "quadrille.state.target === 9")
 
 
 @pytest.mark.endpoint(has_outlines=False)
 async def test_a_network_is_offered_where_only_what_moves_shows_the_people(page, endpoint):
     await endpoint.broadcast(EMPTY)
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     find = page.locator("[data-section=find]")
     await page.evaluate("document.querySelector('[data-section=find]').open = true")
     await find.get_by_text("No camera has a background").wait_for()

@@ -1,7 +1,7 @@
 """The section of the other copy: where it differs, the way through it, and what it asks of the program."""
 
 import pytest
-from page_driver import shows, until
+from page_driver import command, shows, until
 
 
 def difference(frame, joint, distance_mm, decided=False):
@@ -25,7 +25,7 @@ def section(page):
 
 
 async def opened(page, endpoint, message=COPY):
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await page.evaluate("document.querySelector('[data-section=copy]').open = true")
     await endpoint.broadcast(message)
     await shows(page, "quadrille.state.otherCopy !== null")
@@ -45,7 +45,7 @@ async def test_differences_are_counted_listed_and_visited(page, endpoint, sectio
     await section.locator(".observed-worst button").first.click()
     await until(lambda: {"type": "select", "person": 0, "point": "r_wrist"} in endpoint.received)
     await shows(page, "quadrille.state.target === 30")
-    await page.keyboard.press("Alt+Shift+s")
+    await command(page, "Previous frame where the copies differ")
     await shows(page, "quadrille.state.target === 12")
     await endpoint.broadcast(NONE)
     await shows(page, "quadrille.state.otherCopy === null")
@@ -75,7 +75,7 @@ async def test_a_frame_without_their_pose_needs_no_decision(page, endpoint, sect
 
 
 async def test_a_folder_that_is_refused_is_said_beside_the_field(page, endpoint, section):
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await page.evaluate("document.querySelector('[data-section=copy]').open = true")
     await page.route("**/sessions/paths*", lambda route: route.fulfill(body="[]", content_type="application/json"))
     await page.route("**/copies/open", lambda route: route.fulfill(status=400, body="expected a copy, found none"))

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from page_driver import handle_of, shows, state_of, to_client, until
+from page_driver import command, handle_of, shows, state_of, to_client, until
 
 NO_ONE = {"source": "tracked", "author": "", "time": "", "views": [], "lost": None}
 POINTS = [
@@ -34,7 +34,7 @@ def section(page):
 
 
 async def opened(page, endpoint):
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await page.evaluate("document.querySelector('[data-section=provenance]').open = true")
     await until(lambda: endpoint.asked[-1] == {"type": "provenance", "person": 0, "annotators": True})
 
@@ -101,7 +101,7 @@ async def test_the_filter_dims_other_frames_and_leads_to_the_next_of_its_kind(pa
     assert await page.evaluate(cell, 35) != tracked
     await section.get_by_label("Filter").select_option("interpolated")
     await page.locator("body").click(position={"x": 2, "y": 2})
-    await page.keyboard.press("Alt+q")
+    await command(page, "Next frame of the chosen provenance")
     await shows(page, "quadrille.state.target === 60")
     await section.get_by_label("Filter").select_option("keyframes of nobody named")
     assert "annotators" in endpoint.asked[-1]

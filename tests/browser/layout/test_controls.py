@@ -1,7 +1,7 @@
 """All controls can be seen and pressed in windows of every size."""
 
 import pytest
-from page_driver import shows
+from page_driver import command, shows
 
 AMISS = """() => {
   const name = (e) => e.id || e.ariaLabel || e.textContent;
@@ -34,8 +34,8 @@ async def test_no_control_is_cut_off_or_covered_in_windows_of_any_size(page, end
         await page.set_viewport_size({"width": width, "height": height})
         least = {1100: 0.46, 1280: 0.5}.get(width, 0.0) if endpoint.n_people == 1 else 0.0  # of the views
         await shows(page, f"document.body.scrollWidth === {width} && quadrille.state.views[0].scale > {least}")
-        for opened in ("Alt+i", "Shift+L"):
-            await page.keyboard.press(opened)
+        for opened in ("Inspector: sizes, settings (toggle)", "Doubtful and lost poses, most severe first"):
+            await command(page, opened)
             await shows(page, "true")
             assert await page.evaluate(AMISS) == [], (width, height, opened)
-            await page.keyboard.press(opened)
+            await command(page, opened)

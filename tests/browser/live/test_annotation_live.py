@@ -3,7 +3,7 @@
 from contextlib import closing
 
 import pytest
-from page_driver import dragging, shows
+from page_driver import command, dragging, shows
 
 from tracker.annotation.comments import read_comments
 from tracker.annotation.plan import read_tasks
@@ -26,7 +26,7 @@ async def lift(page, px):
 
 async def test_a_plan_is_annotated_and_reviewed(tab, folder):
     page, section = tab, tab.locator("[data-section=annotation]")
-    await page.keyboard.press("Alt+u")
+    await command(page, "Plan, tasks and comments")
     await section.get_by_text("Plan frames").click()
     await section.get_by_label("N", exact=True).fill("20")
     await section.get_by_role("button", name="Plan", exact=True).click()
@@ -45,11 +45,11 @@ async def test_a_plan_is_annotated_and_reviewed(tab, folder):
     await page.keyboard.press("Alt+k")
     await shows(page, f"{COUNTER} === '1 of 3 verified'")
     await at(page, 0)  # the next pose to review
-    await page.keyboard.press("Alt+r")
+    await command(page, "Reject the planned pose")
     await page.keyboard.type("left elbow too high")
     await page.keyboard.press("Enter")
     await section.get_by_text("left elbow too high").first.wait_for()
-    await page.keyboard.press("Alt+m")
+    await command(page, "Comment on the selected limb")
     await page.keyboard.type("see the hand")
     await page.keyboard.press("Enter")
     await section.get_by_role("button", name="see the hand").wait_for()
@@ -58,7 +58,7 @@ async def test_a_plan_is_annotated_and_reviewed(tab, folder):
     await page.locator(".plan-tasks button").click()
     await at(page, 0)
     await page.evaluate("document.activeElement.blur()")
-    await page.keyboard.press("Alt+c")
+    await command(page, "Next best click")
     await section.get_by_text("expected error").wait_for()
     await lift(page, 30)  # the annotator corrects it
     await shows(page, "document.querySelector('.plan-strip').ariaLabel.startsWith('0 rejected, 1 draft, 1 annotated')")

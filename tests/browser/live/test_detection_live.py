@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from page_driver import shows
+from page_driver import command, shows
 from program import ROOT, started, visited
 
 from tracker.evaluation.references import read_joints
@@ -33,7 +33,7 @@ async def test_people_are_detected_found_and_tracked_by_one_button(browser, sess
     main = (str(ROOT / "tests" / "support" / "detecting_program.py"),)
     async with started(session.folder, main=main) as program, visited(browser, program.address) as page:
         find = page.locator("[data-section=find]")
-        await page.keyboard.press("Alt+i")
+        await command(page, "Inspector: sizes, settings (toggle)")
         await page.evaluate("document.querySelector('[data-section=find]').open = true")
         await find.get_by_text("No camera has a background").wait_for()
         await find.get_by_role("button", name="Detect and track").click()

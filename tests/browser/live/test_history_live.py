@@ -5,7 +5,7 @@ import resource
 
 import pytest
 import pytest_asyncio
-from page_driver import dragging, go_to, handle_of, state_of, to_client
+from page_driver import command, dragging, go_to, handle_of, state_of, to_client
 from page_driver import shows as shows_within
 from program import WITHOUT_3D
 
@@ -69,7 +69,7 @@ async def test_the_history_is_gone_along_also_after_a_restart(tabs, program):
     for frame in (5, 6, 7):
         await go_to(page, frame)
         await lift(page, "left_wrist", 12)
-    await page.keyboard.press("h")
+    await command(page, "History of edits")
     row = page.locator("#history-list button", has_text="frame 6")
     await row.click()
     await shows(page, "quadrille.state.state.redo === 'drag left wrist, frame 7'")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from observed_people import BODY_25, write_openpose
-from page_driver import handle_of, shows, to_client
+from page_driver import command, handle_of, shows, to_client
 from program import ROOT, started, visited
 
 from tracker.evaluation.references import read_joints
@@ -70,7 +70,7 @@ async def page(browser, session, tmp_path_factory):
 
 
 async def imported(page, files):
-    await page.keyboard.press("Alt+j")
+    await command(page, "Observations of other programs")
     section = page.locator("[data-section=observations]")
     await section.get_by_text("Import…").click()
     await page.fill("#import-paths", str(files))
@@ -126,7 +126,7 @@ async def test_the_worst_is_mended_and_the_files_differ_there_alone(page, sessio
     came = {p.relative_to(files).as_posix(): p.read_bytes() for p in files.rglob("*.json")}
     assert await sent_back(page) == came
     await page.keyboard.press("Escape")
-    await page.keyboard.press("Alt+Shift+ArrowDown")
+    await command(page, "Next imported limb that is off")
     await shows(page, f"quadrille.state.overlay.frame === {WRONG} && quadrille.state.state.point === 'left_wrist'")
     names = session.camera_names
     for name in VIEWS:

@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import frame_place, go_to, handle_of, shows, state_of
+from page_driver import command, frame_place, go_to, handle_of, shows, state_of
 from program import ROOT, visited
 
 from tracker.formats.model_toml import format_model
@@ -44,7 +44,7 @@ async def live(browser, program):
 
 PAUSED_AFTER = """async (done) => {
   while (!(quadrille.state.state.track.done > done)) await new Promise((resolve) => setTimeout(resolve, 2));
-  document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "p", code: "KeyP", altKey: true, bubbles: true }));
+  quadrille.command("Pause or continue tracking");
 }"""
 """Pauses from within the page: a quick tracker is through before a driver outside has heard of it."""
 THUMBNAIL = """async (frame) => {
@@ -91,7 +91,7 @@ async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
     assert thumbnail == [200, "image/jpeg", 160, 160]
     assert (await live.evaluate(THUMBNAIL, at + 5))[0] == 404  # not tracked yet
 
-    await live.keyboard.press("Alt+p")
+    await command(live, "Pause or continue tracking")
     await said(live, f"quadrille.state.state.track.at > {at}", 120)
     await live.keyboard.press("Escape")
     await shows(live, "quadrille.state.state.track.first === null", 60)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from page_driver import shows
+from page_driver import command, shows
 from program import ROOT, started, visited
 
 from tracker.estimation.posing.default_pose import default_pose
@@ -47,7 +47,7 @@ async def test_the_mean_of_two_copies_is_taken_and_undone(browser, copies):
         started(anna, "--annotator", "carl", has_token=True) as program,
         visited(browser, program.address) as page,
     ):
-        await page.keyboard.press("Alt+i")
+        await command(page, "Inspector: sizes, settings (toggle)")
         section = page.locator("[data-section=copy]")
         await page.evaluate("document.querySelector('[data-section=copy]').open = true")
         await section.get_by_label("Folder", exact=True).fill(str(anna.parent / "nobody"))

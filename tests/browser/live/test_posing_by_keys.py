@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 import pytest_asyncio
-from page_driver import go_to, handle_of, state_of
+from page_driver import command, go_to, handle_of, state_of
 from page_driver import shows as shows_within
 from program import visit_again
 
@@ -60,7 +60,7 @@ async def test_a_frame_is_positioned_by_keys_alone(live):
     # Then the elbow's own degree of freedom, typed in.
     await select(live, "left_elbow")
     await live.locator("#joint-name").blur()
-    await live.keyboard.press("Enter")
+    await command(live, "Type a value for the selected degree of freedom")
     await live.keyboard.type("40")
     await live.keyboard.press("Enter")
     await live.keyboard.press("Escape")
@@ -76,9 +76,9 @@ async def test_a_frame_is_positioned_by_keys_alone(live):
 
 async def test_mirror_copy_and_reset(live):
     await go_to(live, 5)
-    await live.keyboard.press("m")
+    await command(live, "Mirror the pose left to right")
     await shows(live, "quadrille.state.state.undo === 'mirror, frame 5'")
-    await live.keyboard.press("Alt+,")  # nobody has posed frame 4
+    await command(live, "Copy the pose from the previous frame")  # nobody has posed frame 4
     await shows(live, "document.querySelector('#advice-text')?.textContent.includes('on frame 4 to copy, found none')")
     await live.locator("#copy-pose").focus()
     await live.keyboard.press("Enter")
@@ -87,7 +87,7 @@ async def test_mirror_copy_and_reset(live):
     await shows(live, "quadrille.state.state.undo === 'copy frame 3, frame 5'")
     await select(live, "left_wrist")
     await live.locator("#joint-name").blur()
-    await live.keyboard.press("r")
+    await command(live, "Reset the joint's limb to neutral")
     await shows(live, "quadrille.state.state.undo === 'reset left arm, frame 5'")
     assert (await state_of(live))["state"]["dofs"][(await state_of(live))["dof"]] == pytest.approx(0)
 
@@ -103,10 +103,10 @@ async def test_locks_hold_under_keys_and_show(live):
     await live.keyboard.press("+")
     await shows(live, "document.querySelector('#advice-text')?.textContent.includes('left elbow extension is locked')")
     assert (await state_of(live))["state"]["dofs"] == before["dofs"]
-    await live.keyboard.press("Shift+O")
+    await command(live, "Lock or unlock the joint's limb")
     await shows(live, "quadrille.state.state.locked.length > 3")
     assert await live.locator("#lock-joint").get_attribute("aria-pressed") == "true"
-    await live.keyboard.press("Shift+O")
+    await command(live, "Lock or unlock the joint's limb")
     await shows(live, "quadrille.state.state.locked.length === 0")
 
 

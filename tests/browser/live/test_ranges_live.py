@@ -6,7 +6,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import dragging, frame_place, go_to, shows
+from page_driver import command, dragging, frame_place, go_to, shows
 from program import ROOT, started, visited
 from run_with_doubt import store_run
 
@@ -31,7 +31,7 @@ async def test_a_range_is_interpolated_reviewed_cleared_and_given_back(live):
     await shows(page, "quadrille.state.timeline[10]?.keyframe", 30)
     await page.mouse.dblclick(*await frame_place(page, 5))
     await shows(page, "quadrille.state.range?.first === 0 && quadrille.state.range.last === 10")
-    await page.keyboard.press("Shift+I")
+    await command(page, "Interpolate the marked range")
     await shows(page, "document.querySelector('#range-work').textContent === 'interpolated 9 frames'", 30)
     sources = "[0, 1, 9, 10].map((k) => quadrille.state.timeline[k]?.source).join()"
     await shows(page, f"{sources} === 'manual,interpolated,interpolated,manual'")
@@ -59,7 +59,7 @@ async def test_the_poses_around_a_correction_are_estimated_again_and_given_back(
             pass
         await shows(page, "quadrille.state.timeline[30]?.keyframe", 30)
         before = poses_of(folder)
-        await page.keyboard.press("Shift+R")
+        await command(page, "Estimate the poses here again")
         await shows(page, "document.querySelector('#range-work').textContent === 'estimated 8 frames'", 120)
         after = poses_of(folder)
         assert {k for k in before if not np.array_equal(before[k], after[k])} == {*range(26, 35)} - {30}

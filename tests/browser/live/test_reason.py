@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 import pytest_asyncio
-from page_driver import shows, state_of
+from page_driver import command, shows, state_of
 from program import ROOT, visited
 from run_with_doubt import WRONG_FRAME, store_run
 
@@ -31,7 +31,7 @@ async def live(browser, program):
 
 
 async def test_a_doubt_leads_to_its_reason_and_to_a_good_pose(live):
-    await live.keyboard.press("Shift+L")
+    await command(live, "Doubtful and lost poses, most severe first")
     card = live.locator("#doubt-list .doubt").first
     assert "left arm: 60 % chance that it is lost" in await card.inner_text()
     await card.click()
@@ -63,7 +63,7 @@ async def test_a_doubt_leads_to_its_reason_and_to_a_good_pose(live):
     assert reason["alternatives"][0]["nats"] < -6
     assert reason["alternatives"][0]["limbs"] == ["left arm"]
     await shows(live, f"{GHOSTS} > 0")
-    await live.keyboard.press("Alt+Digit1")
+    await live.locator("[title^='Take this pose, drawn blue with the number 1']").click()
     await shows(live, "quadrille.state.state.status === 'good' && !quadrille.state.state.is_checked", 120)
     await shows(live, f"{EXPLAINED} && quadrille.state.reason.sentence === ''", 60)
     assert await live.evaluate(GHOSTS) == 0

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import shows, state_of, to_client
+from page_driver import command, shows, state_of, to_client
 from program import started
 
 from tracker.body.model import PosedBody
@@ -141,7 +141,7 @@ async def snap(page, index, through=True):
             await page.mouse.move(pane["x"] + 20, pane["y"] + pane["height"] / 2)
             await asyncio.sleep(0.1)
             await page.mouse.move(pane["x"] + 24, pane["y"] + pane["height"] / 2)
-    await page.keyboard.press("y")
+    await command(page, "3-D view: look through the active camera (toggle)")
     await shows(page, f"quadrille.state.state.snapped === {index if through else 'null'}", 30)
 
 
@@ -236,7 +236,7 @@ async def test_the_image_follows_the_frame_and_a_turn_leaves_the_camera(live):
 async def test_the_floor_from_three_points_lies_where_it_was_clicked(live, folder):
     up = rigid.so3_exp(np.array([0.04, -0.03, 0.0]))[:, 2]
     height_m = float(up @ viewed_point(CAMERAS)) - 0.9
-    await live.keyboard.press("Shift+Y")
+    await command(live, "Set the floor from three clicked points (toggle)")
     await shows(live, "quadrille.state.state.floor !== null", 30)
     for number, (x, y) in enumerate(((-0.5, -0.5), (0.6, -0.4), (0.0, 0.6)), 1):
         place = np.array([x, y, (height_m - up[0] * x - up[1] * y) / up[2]])

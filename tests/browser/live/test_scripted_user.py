@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from first_poses import true_body, views_of
-from page_driver import handle_of, state_of, to_client
+from page_driver import command, handle_of, state_of, to_client
 from page_driver import shows as shows_within
 from program import ROOT, started, visited
 from scripted_user import TRUNK, ScriptedUser
@@ -105,7 +105,7 @@ class Hands:
     async def zoom_to_body(self):
         """Zoom all views to the body where it is now: the page opened with the body that stood wrong."""
         before = (await state_of(self.page))["views"]
-        await self.page.keyboard.press("Shift+0")
+        await command(self.page, "Zoom all views to the people")
         await shows(self.page, f"quadrille.state.views[0].origin.y !== {before[0]['origin']['y']}")
         self.actions += 1
 
@@ -272,7 +272,7 @@ async def test_two_people_in_a_close_hold_are_placed_and_searched_together(tango
     session = load_session(folder)
     truths = [true_body(TANGO / f"truth_{p.name}") for p in session.people]
     cameras = [c.camera.pinhole for c in session.cameras]
-    await page.keyboard.press("Shift+A")  # the other is dimmed, and out of the hand's reach
+    await command(page, "Solo: dim other people (toggle)")  # the other is dimmed, and out of the hand's reach
     told = []
     for person, info in enumerate(session.people):
         await page.get_by_text(info.name, exact=True).first.click()

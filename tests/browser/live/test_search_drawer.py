@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import reloaded, shows, state_of
+from page_driver import command, reloaded, shows, state_of, toggle_layer
 from program import ROOT, started, visit_again, visited
 
 pytestmark = pytest.mark.slow
@@ -40,7 +40,7 @@ async def page(tab, address, request):
     await page.locator("#frame").fill(str(frame))
     await page.keyboard.press("Enter")
     await shows(page, f"quadrille.state.shown?.frame === {frame} && quadrille.state.state.cost_px", 120)
-    await page.keyboard.press("b")
+    await command(page, "Search panel")
     await shows(page, f"quadrille.state.searchSetup && {RUNS}", 20)
     yield page
     assert page.errors == []
@@ -73,7 +73,7 @@ async def drawn(page, kind):
 async def test_a_search_goes_stage_by_stage_and_the_tree_marks_where_it_is(page):
     passes, strip = page.locator(".tree-pass"), page.locator("#candidates")
     assert not await strip.is_visible()  # empty before a search
-    await page.keyboard.press("Shift+S")
+    await command(page, "Search: to the end of the stage")
     await strip.wait_for(state="visible")
     await shows(page, f"{RUNS}[0]?.stages[0].done && !quadrille.state.state.job.running", 30)
     await shows(page, "document.querySelectorAll('.tree-pass.is-done').length === 1")
@@ -116,9 +116,9 @@ async def test_a_search_is_replayed_and_left_as_it_was(page):
     legend = page.locator("#pose-legend")
     assert "Replay of run" in await legend.inner_text()
     assert "tested" in await legend.inner_text()
-    await page.keyboard.press("Shift+Digit6")
+    await toggle_layer(page, "contours")
     await shows(page, "document.querySelector('#pose-legend').innerText.includes('contours are hidden')")
-    await page.keyboard.press("Shift+Digit6")
+    await toggle_layer(page, "contours")
     await page.keyboard.press("Escape")
     await shows(page, "quadrille.state.state.replay === null && quadrille.state.overlay.handles.length > 0", 10)
     await asyncio.sleep(0.2)
@@ -138,7 +138,7 @@ async def test_runs_are_compared_in_cost_and_pose_and_one_is_taken(page):
     await theta.fill("9")
     await theta.press("Enter")
     await shows(page, "quadrille.state.settings.search.theta_px === 9", 10)
-    await page.keyboard.press("Shift+F")
+    await command(page, "Search: repeat from the same start")
     await shows(page, f"{RUNS}.length === 2 && {OVER}", 60)
     rows = page.locator(".run-row")
     assert await page.locator(".run-differs").all_inner_texts() == ["theta 9 px", "theta default"]
@@ -186,7 +186,7 @@ async def test_bounds_of_a_group_are_edited_in_the_tree(page):
 
 
 async def test_the_landscape_is_read_and_clicked(page):
-    await page.keyboard.press("v")
+    await command(page, "Cost landscape")
     await shows(page, "quadrille.state.landscape", 20)
     await page.get_by_label("Degree of freedom").select_option("left_elbow.extension")
     await shows(page, "quadrille.state.landscape.names[quadrille.state.landscape.dof] === 'left_elbow.extension'", 10)

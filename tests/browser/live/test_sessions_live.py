@@ -7,7 +7,7 @@ import time
 import pytest
 import pytest_asyncio
 from command_line import SAMPLE
-from page_driver import shows
+from page_driver import command, shows
 from program import WITHOUT_3D, Program
 from stranger import Errors
 
@@ -39,14 +39,14 @@ async def page(browser, tmp_path, monkeypatch):
 async def test_another_session_takes_the_place_of_the_first(page, tmp_path):
     shutil.copytree(SAMPLE, tmp_path / "dance")
     errors = Errors(page)
-    await page.keyboard.press("Control+o")
+    await command(page, "Open another session")
     await page.keyboard.type(str(tmp_path / "dance"))
     began = time.monotonic()
     async with page.expect_event("load", timeout=60_000):
         await page.keyboard.press("Enter")
     await shows(page, "window.quadrille?.state.overlay && quadrille.state.shown?.frame === 0", 60)
     print(f"another session after {time.monotonic() - began:.1f} s")
-    await page.keyboard.press("Control+o")
+    await command(page, "Open another session")
     await shows(page, f"document.querySelector('#recent-sessions').innerText.includes('{tmp_path / 'walk'}')")
     assert errors.found == []
     assert not (tmp_path / "walk" / "lock.json").exists()

@@ -4,7 +4,7 @@ from contextlib import asynccontextmanager, closing
 
 import pytest
 import pytest_asyncio
-from page_driver import OPENED, dragging, go_to, shows
+from page_driver import OPENED, command, dragging, go_to, shows
 from program import WITHOUT_3D, started
 
 from tracker.session.session import load_session
@@ -38,7 +38,7 @@ async def opened(browser, address):
 
 
 async def join(page, name):
-    await page.keyboard.press("Alt+e")
+    await command(page, "People on this session, and your name")
     await page.keyboard.type(name)
     await page.keyboard.press("Enter")
     await shows(page, f"quadrille.state.presence?.name.toLowerCase() === '{name.lower()}' && quadrille.state.connected")

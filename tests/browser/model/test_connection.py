@@ -9,6 +9,7 @@ from page_driver import dragging, shows, until
 from serving import listening
 
 from app.server.access import Access
+from app.server.key_routes import KeyRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app
 from app.server.static_files import static_folder
@@ -73,7 +74,7 @@ async def test_a_foreign_page_cannot_open_the_socket(browser, endpoint, address)
 
 
 @pytest.mark.slow
-async def test_viser_runs_in_its_frame_behind_the_proxy(browser, endpoint):
+async def test_viser_runs_in_its_frame_behind_the_proxy(browser, endpoint, tmp_path):
     scene = PrivateViser()
     connected = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -83,7 +84,9 @@ async def test_viser_runs_in_its_frame_behind_the_proxy(browser, endpoint):
     errors = []
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     try:
-        async with listening(create_app(endpoint, scene.socket_path, Access(), static_folder())) as port:
+        app = create_app(endpoint, scene.socket_path, Access(), static_folder())
+        KeyRoutes(tmp_path, has_token=True).add_to(app)
+        async with listening(app) as port:
             await page.goto(f"http://127.0.0.1:{port}/")
             await asyncio.wait_for(connected.wait(), 30.0)
             assert errors == []

@@ -1,7 +1,7 @@
 """The picture without drawing over it: a held key, contours of all kinds, and the corner of a replayed pose."""
 
 import pytest
-from page_driver import DRAWN, dragging, shows, until
+from page_driver import DRAWN, dragging, shows, toggle_layer, until
 
 REPLAY = {"run": 1, "step": 3, "steps": 9, "stage": "arms"}
 LINES = """(() => {
@@ -57,7 +57,7 @@ async def test_without_contours_no_dashed_ones_are_left(page, endpoint):
     await contours.click()
     await shows(page, f"({DRAWN}) > 200 && quadrille.state.layers.shown.hidden")
     # Somebody who does not want them does not get them with the others.
-    await page.keyboard.press("Shift+Digit7")
+    await toggle_layer(page, "hidden")
     await shows(page, "!quadrille.state.layers.shown.hidden")
     for _ in range(2):
         await contours.click()

@@ -1,7 +1,7 @@
 """The switch of the error ellipses: in the inspector, in the palette, kept in the browser; the error of a joint."""
 
 from fake_endpoint import COLORS, REST
-from page_driver import handle_of, reloaded, shows, until
+from page_driver import command, handle_of, reloaded, shows, until
 
 LAYER = "quadrille.state.layers.shown.errors"
 ERRORS_M = [0.023 if name == "l_elbow" else 0.1 for name in REST]
@@ -16,7 +16,7 @@ ON_CIRCLE = """([u, v]) => {
 
 
 async def open_inspector(page):
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await page.evaluate(
         "document.querySelectorAll('.section').forEach((s) => (s.open = ['joint', 'view'].includes(s.dataset.section)))"
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from fake_endpoint import project
-from page_driver import dragging, handle_of, shows, to_client, until
+from page_driver import command, dragging, handle_of, shows, to_client, until
 
 PIXELS = """(places) => {
   const canvas = document.querySelector(".pane-overlay");
@@ -67,7 +67,7 @@ async def test_overlapping_joints_are_both_offered(page, endpoint):
     await shows(page, "quadrille.state.hover?.overlapping.length === 2")
     first = (await page.evaluate("quadrille.state.hover"))["point"]
     (other,) = {"l_knee", "r_knee"} - {first}
-    await page.keyboard.press("Alt+o")
+    await command(page, "Take the next of the joints that overlap under the pointer")
     await shows(page, f"quadrille.state.hover.point === '{other}'")
     await page.mouse.down()
     await page.mouse.up()
@@ -99,9 +99,9 @@ async def test_a_held_joint_has_a_ring_and_is_released_by_shift_and_a_click(page
         await shows(page, held_in_page if held else f"!{held_in_page}")
         await page.wait_for_timeout(60)
         assert (np.mean(is_orange(await pixels(page, ring))) > 0.8) == held
-    await page.keyboard.press("Alt+h")
+    await command(page, "Hold the joint in place while others are dragged, or release it")
     await until(lambda: endpoint.heard("pose")[-1]["held"])
-    await page.keyboard.press("Alt+Shift+h")
+    await command(page, "Release all held joints of the person on this frame")
     await until(lambda: endpoint.heard("pose")[-1] == {**wanted, "point": None, "held": False})
     assert endpoint.heard("drag") == []
 

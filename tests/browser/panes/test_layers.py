@@ -5,7 +5,7 @@ import itertools
 
 import pytest
 from fake_endpoint import COLORS, HIDDEN_LINE, FakeEndpoint
-from page_driver import handle_of, reloaded, shows, state_of, to_client, until
+from page_driver import command, handle_of, reloaded, shows, state_of, to_client, toggle_layer, until
 
 ROW = """([camera, from, to, v]) => {
   const canvas = document.querySelectorAll(".pane-overlay")[camera];
@@ -58,24 +58,24 @@ async def test_the_image_fades_into_black_in_either_theme(page):
     await set_slider(page, "[data-opacity=image]", 50)
     await shows(page, "quadrille.state.layers.opacity.image === 0.5")
     assert await color_at(page) == pytest.approx([c / 2 for c in plain], abs=3)
-    await page.keyboard.press("Shift+Digit1")
+    await toggle_layer(page, "image")
     await shows(page, "!quadrille.state.layers.shown.image")
     assert await color_at(page) == [0, 0, 0]
 
 
 @pytest.mark.slow
 async def test_without_any_pictures_frames_are_shown_all_the_same(page):
-    await page.keyboard.press("Shift+Digit1")
+    await toggle_layer(page, "image")
     await shows(page, "!quadrille.state.layers.shown.image")
     await page.keyboard.press(".")
     await shows(page, "quadrille.state.shown.frame === 13 && quadrille.state.overlay.frame === 13")
     await reloaded(page, "window.quadrille?.state.overlay?.frame === 13 && !quadrille.state.layers.shown.image")
-    await page.keyboard.press("Shift+Digit1")
+    await toggle_layer(page, "image")
     await shows(page, "'image 0' in quadrille.state.shown.pictures")
 
 
 async def test_hidden_contours_are_dashed(page):
-    await page.keyboard.press("Shift+Digit7")
+    await toggle_layer(page, "hidden")
     await shows(page, "quadrille.state.overlay.paths.some((path) => path.kind === 'hidden')")
     u, v = HIDDEN_LINE[:, 0], HIDDEN_LINE[0, 1]
     row = await page.evaluate(ROW, [0, int(u[2]), int(u[-2]), int(v)])
@@ -139,7 +139,7 @@ async def test_brightness_belongs_to_one_camera_and_is_remembered(page):
     plain, other = await color_at(page), await color_at(page, (1, *PLACE[1:]))
     pane = await page.locator(".pane").first.bounding_box()
     await page.mouse.move(pane["x"] + 60, pane["y"] + 200)
-    await page.keyboard.press("i")
+    await command(page, "Brightness and contrast of a pane")
     await set_slider(page, "[data-tone=brightness]", 30)
     await shows(page, "quadrille.state.imageTones[0].brightness === 30")
     assert await color_at(page) == pytest.approx([c + 0.3 * 255 for c in plain], abs=3)
@@ -150,7 +150,7 @@ async def test_brightness_belongs_to_one_camera_and_is_remembered(page):
     await reloaded(page, "window.quadrille?.state.shown.pictures['image 0'] && quadrille.state.overlay")
     assert (await color_at(page))[0] > plain[0] + 60
     await page.mouse.move(pane["x"] + 60, pane["y"] + 200)
-    await page.keyboard.press("i")
+    await command(page, "Brightness and contrast of a pane")
     await page.locator("#image-tone-menu").get_by_role("button", name="Reset").click()
     await shows(page, "quadrille.state.imageTones[0].brightness === 0")
     assert await color_at(page) == plain
@@ -224,7 +224,7 @@ class TestGrid:
         await shows(page, f"quadrille.state.filled === {n_cameras - 1}")
         assert await page.locator(".pane:visible").count() == 1
         await until(lambda: [r > 0 for r in endpoint.views[-1]["reductions"]] == [False] * (n_cameras - 1) + [True])
-        await page.keyboard.press("PageDown")
+        await command(page, "Fill the grid with the next camera")
         await shows(page, "quadrille.state.filled === 0")
         await page.keyboard.press("Escape")
         await shows(page, "quadrille.state.filled === null")

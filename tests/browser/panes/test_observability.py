@@ -2,7 +2,7 @@
 
 import pytest
 from fake_endpoint import DOFS
-from page_driver import handle_of, shows, state_of, to_client, until
+from page_driver import command, handle_of, shows, state_of, to_client, until
 
 SENTENCES = {"known": "extension of the l elbow: known to 2.0 degrees", "unknown": "twist of the torso: not observable"}
 RING = """([u, v, away]) => {
@@ -38,7 +38,7 @@ async def test_rings_lines_and_sentences(page, endpoint):
     await until_color(page, [*at, 11], GOOD)
     torso = await handle_of(page, 0, "torso")
     await until_color(page, [*torso, 14.5], BAD)  # the second ring
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await page.evaluate("document.querySelector('[data-section=joint]').open = true")
     x, y = await to_client(page, 0, *at)
     await page.mouse.click(x, y)

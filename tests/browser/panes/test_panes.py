@@ -5,7 +5,7 @@ import asyncio
 import numpy as np
 import pytest
 from fake_endpoint import project
-from page_driver import DRAWN, OPENED, dragging, handle_of, reloaded, shows, state_of, to_client, until
+from page_driver import DRAWN, OPENED, command, dragging, handle_of, reloaded, shows, state_of, to_client, until
 
 PIXEL = """([x, y]) => {
   const canvas = document.querySelector(".pane-overlay");
@@ -269,7 +269,7 @@ class TestPeople:
 
 @pytest.mark.slow
 async def test_all_views_are_framed_on_the_people_by_a_key(page):
-    await page.keyboard.press("Shift+0")
+    await command(page, "Zoom all views to the people")
     await shows(page, "quadrille.state.views.every((view) => view.zoom > 1.05)")
     for camera in range(4):
         pane = await page.locator(".pane").nth(camera).bounding_box()
@@ -286,7 +286,7 @@ async def test_all_views_are_framed_on_the_people_by_a_key(page):
 
 async def test_linked_views_show_the_same_joint_at_the_same_size(page):
     joint = next(h for h in (await state_of(page))["overlay"]["handles"] if h["camera"] == 0)
-    await page.keyboard.press("Alt+0")
+    await command(page, "Link the zoom of all views (toggle)")
     x, y = await to_client(page, 0, joint["u"], joint["v"])
     await page.mouse.move(x, y)
     await page.mouse.wheel(0, -700)
@@ -305,7 +305,7 @@ async def test_linked_views_show_the_same_joint_at_the_same_size(page):
     zooms = [view["zoom"] for view in (await state_of(page))["views"]]
     await page.mouse.wheel(0, 300)  # they follow on, and each only once
     await shows(page, f"quadrille.state.views.every((view, i) => view.zoom < {zooms}[i])")
-    await page.keyboard.press("Alt+0")  # no longer
+    await command(page, "Link the zoom of all views (toggle)")  # no longer
     others = [view["zoom"] for view in (await state_of(page))["views"]][1:]
     await page.mouse.wheel(0, -600)
     await shows(page, f"quadrille.state.views[0].zoom > {zooms[0]}")

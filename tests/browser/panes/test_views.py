@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from page_driver import OPENED, handle_of, reloaded, shows, state_of, to_client, until
+from page_driver import OPENED, command, handle_of, reloaded, shows, state_of, to_client, until
 
 PORTRAIT = ((1080, 1920),)
 STEPPED = "quadrille.state.shown.frame === {0} && quadrille.state.overlay.frame === {0}"
@@ -54,7 +54,7 @@ async def test_a_zoomed_view_follows_the_person_from_frame_to_frame(page, endpoi
     await shows(page, "!quadrille.state.playing && quadrille.state.overlay.frame === quadrille.state.target")
     assert await place_in_pane(page, 0, "head") == pytest.approx(before, abs=0.01)
     # On request it stays.
-    await page.keyboard.press("Alt+l")
+    await command(page, "Zoomed views follow the people from frame to frame (toggle)")
     frame = (await state_of(page))["target"]
     origin = (await state_of(page))["views"][0]["origin"]
     await step(page, frame + 1)
@@ -99,7 +99,7 @@ async def test_a_hidden_tab_asks_for_no_view(page, endpoint):
 @pytest.mark.slow
 @pytest.mark.endpoint(walk_m=0.1)
 async def test_framed_people_stay_framed_and_an_edit_moves_no_view(page, endpoint):
-    await page.keyboard.press("Shift+0")
+    await command(page, "Zoom all views to the people")
     await shows(page, "quadrille.state.views[0].zoom > 1.05")
     before = (await state_of(page))["views"][0]
     u, _ = await handle_of(page, 0, "torso")
@@ -117,7 +117,7 @@ async def test_framed_people_stay_framed_and_an_edit_moves_no_view(page, endpoin
 @pytest.mark.slow
 @pytest.mark.endpoint(walk_m=0.1)
 async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, endpoint):
-    await page.keyboard.press("Shift+0")
+    await command(page, "Zoom all views to the people")
     await shows(page, "(localStorage.getItem('quadrille.views.elbow_rotation') ?? '').includes('framed')")
     endpoint.state["frame"] = 24
     await reloaded(page, f"{OPENED} && quadrille.state.views[0].zoom > 1.05")
@@ -161,8 +161,8 @@ async def test_a_drawer_keeps_the_arrangement_of_the_panes(page, endpoint, size)
     await page.set_viewport_size({"width": size[0], "height": size[1]})
     await shows(page, f"document.querySelector('#workspace').clientWidth === {size[0]}")
     before, width = await tracks_of(page), await page.locator("#panes").evaluate("(panes) => panes.clientWidth")
-    for key in ("b", "c", "Shift+l"):
-        await page.keyboard.press(key)
+    for key in ("Search panel", "c", "Doubtful and lost poses, most severe first"):
+        await command(page, key)
         await shows(page, "quadrille.state.drawer !== null && document.querySelector('#drawer').offsetHeight > 100")
         assert await tracks_of(page) == before
         assert await page.locator("#panes").evaluate("(panes) => panes.clientWidth") == width

@@ -1,7 +1,7 @@
 """The epipolar check: lines of the place under the pointer, a place that is kept, the distance of another, Esc."""
 
 import pytest
-from page_driver import shows, to_client, until
+from page_driver import command, shows, to_client, until
 
 LINES = {"type": "epipolar", "lines": [{"camera": 1, "x0": 0, "y0": 100, "x1": 400, "y1": 180}], "distance": None}
 MARKED = """(camera) => {
@@ -28,7 +28,7 @@ def asked(endpoint):
 
 async def test_lines_follow_the_pointer_a_click_keeps_them_and_another_measures(page, endpoint):
     hint = page.locator("#epipolar-hint")
-    await page.keyboard.press("Alt+x")
+    await command(page, "Epipolar lines (toggle)")
     await shows(page, "!document.querySelector('#epipolar-hint').hidden")
     await page.mouse.move(*await to_client(page, 0, 200, 150))
     await until(lambda: asked(endpoint)[-1] == [[0, pytest.approx(200, abs=2), pytest.approx(150, abs=2)]])

@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from page_driver import shows
+from page_driver import command, shows
 
 RECENT = {"refusal": None, "folder": "/data/here", "recent": [
     {"folder": "/data/walks/dance", "name": "dance", "opened": "2026-03-04T10:00:00+00:00"},
@@ -47,7 +47,7 @@ async def test_a_session_is_opened_by_its_folder_or_from_the_list(fresh_page, en
 
     await page.route(re.compile(r"/sessions(/|$)"), answer)
     await page.route("**/starting.json", start)
-    await page.keyboard.press("Control+o")
+    await command(page, "Open another session")
     await shows(page, "document.activeElement.id === 'session-folder'")
     await shows(page, "document.querySelector('#recent-sessions').innerText.includes('/data/walks/dance')")
     await page.keyboard.type("/data/w")
@@ -77,7 +77,7 @@ async def test_a_new_session_is_offered_at_the_first_start(fresh_page):
     page = fresh_page
     await page.route(re.compile(r"/sessions$"), lambda route: route.fulfill(json=RECENT | {"recent": []}))
     await page.route("**/sessions/models", lambda route: route.fulfill(json={"models": [], "default": "gavrila34"}))
-    await page.keyboard.press("Control+o")
+    await command(page, "Open another session")
     await page.locator("#recent-sessions button").click()
     await page.locator("#new-session[open]").wait_for()
     assert not await page.locator("#sessions-panel").is_visible()
@@ -109,7 +109,7 @@ async def test_a_recording_of_a_batch_is_opened_at_its_worst_frame(fresh_page):
 
     await page.route(re.compile(r"/sessions(/|$)"), answer)
     await page.route("**/starting.json", lambda route: route.fulfill(json=STARTED))
-    await page.keyboard.press("Control+o")
+    await command(page, "Open another session")
     await page.get_by_text("night_batch").click()
     table = page.locator(".batch table")
     assert (await table.locator("tbody tr").all_inner_texts())[1].split("\t")[1:] == ["21.3", "25%", "4/40", "63"]

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from page_driver import shows, until
+from page_driver import command, shows, until
 
 TEXT = "document.querySelector('#advice-text').textContent"
 LONG = (
@@ -33,7 +33,7 @@ async def test_the_most_urgent_is_said_and_the_next_after_it_is_dismissed(page, 
     await advise(endpoint, said("The first thing.", action("fit", "Fit")), said("The second thing."))
     await shows(page, f"{TEXT} === 'The first thing.'")
     assert await page.locator("#advice-actions button").all_inner_texts() == ["Fit"]
-    await page.keyboard.press("Shift+Escape")
+    await command(page, "Dismiss what the line says")
     await shows(page, f"{TEXT} === 'The second thing.'")
     assert await page.locator("#advice-actions button").count() == 0
     await page.locator("#dismiss-advice").click()
@@ -85,7 +85,7 @@ async def test_each_button_does_what_it_says(page, endpoint):
         await page.locator("#advice-actions button").click()
         if kind is not None:
             await until(lambda: {"type": kind, **fields}.items() <= (endpoint.heard(kind) or [{}])[-1].items())  # noqa: B023
-        await page.keyboard.press("Shift+Escape")  # an answer
+        await command(page, "Dismiss what the line says")  # an answer
     assert await page.evaluate("document.activeElement === document.body")  # keys go to the views
 
 
@@ -120,9 +120,9 @@ async def test_an_answer_is_said_for_a_while_and_kept_in_the_list(page, endpoint
     for text in ("one thing", "another", "one thing", "one thing"):
         await answer(endpoint, text)
     await shows(page, f"{TEXT} === 'one thing' && document.querySelector('#advice').dataset.level === 'fault'")
-    await page.keyboard.press("Shift+Escape")
+    await command(page, "Dismiss what the line says")
     await shows(page, f"{TEXT} === 'What is next.'")
-    await page.keyboard.press("Shift+H")
+    await command(page, "Earlier sentences of the line")
     lines = await page.locator("#advice-log-list span").all_inner_texts()
     assert lines[:4] == ["What is next.", "one thing (2 times)", "another", "one thing"]
     await page.locator("#clear-advice-log").click()

@@ -1,7 +1,7 @@
 """Before and after of a fit or search in the page: costs, the key that shows the pose before, the warning."""
 
 import pytest
-from page_driver import shows, until
+from page_driver import command, shows, until
 
 WARNING = "The fit lowered the cost but left the left wrist 8 cm from where you placed it."
 COMPARED = {
@@ -31,7 +31,7 @@ async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_befor
         ["Mean", "5.74", "5.44", "▼", "−0.30"],
     ]
     await page.keyboard.press("Escape")
-    await page.keyboard.press("Shift+B")
+    await command(page, "Show the pose before the last fit or search, or its result")
     await shows(page, "!document.querySelector('#before-badge').hidden")
     assert "Before the fit: 5.74 px" in await page.locator("#before-badge").inner_text()
     assert await page.locator("#toggle-before").get_attribute("aria-pressed") == "true"
@@ -40,7 +40,7 @@ async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_befor
     await until(lambda: [m["shown"] for m in endpoint.heard("before")] == [True, False])
     await endpoint.tell(compared=None)  # the pose has changed since
     await page.locator("#show-comparison").wait_for(state="hidden")
-    await page.keyboard.press("Shift+B")
+    await command(page, "Show the pose before the last fit or search, or its result")
     await until(lambda: len(endpoint.heard("before")) == 2)
 
 

@@ -3,7 +3,7 @@
 import pytest
 import pytest_asyncio
 from fake_endpoint import COLORS
-from page_driver import frame_place, handle_of, shows, state_of, to_client, until
+from page_driver import command, frame_place, handle_of, shows, state_of, to_client, toggle_layer, until
 
 pytestmark = pytest.mark.endpoint(n_people=2)
 
@@ -24,7 +24,7 @@ async def drag_wrist(page, person):
 
 
 async def test_solo_keeps_the_others_out_of_reach(couple, endpoint):
-    await couple.keyboard.press("Shift+A")
+    await command(couple, "Solo: dim other people (toggle)")
     await shows(couple, "quadrille.state.state.solo")
     assert await couple.locator("#solo").get_attribute("aria-pressed") == "true"
     await drag_wrist(couple, 1)
@@ -40,8 +40,8 @@ async def test_solo_keeps_the_others_out_of_reach(couple, endpoint):
 
 @pytest.mark.slow
 async def test_searches_and_fits_are_of_everybody_or_of_one(couple, endpoint):
-    for key in ("s", "g", "Shift+E", "s", "g"):
-        await couple.keyboard.press(key)
+    for key in ("s", "g", "Search and fit everyone or only the active person (toggle)", "s", "g"):
+        await command(couple, key)
     await until(lambda: len(endpoint.heard("fit")) == 2)
     assert [m["person"] for m in endpoint.heard("search")] == [None, 0]
     assert [m["person"] for m in endpoint.heard("fit")] == [None, 0]
@@ -53,7 +53,7 @@ async def test_searches_and_fits_are_of_everybody_or_of_one(couple, endpoint):
 
 
 async def test_the_list_chooses_hides_and_copies(couple, endpoint):
-    await couple.keyboard.press("Shift+U")
+    await command(couple, "List of people")
     await couple.get_by_label("Show person 1", exact=True).click()
     await shows(couple, "!quadrille.state.state.people[1].shown")
     assert await couple.get_by_label("Copy the pose of person 0", exact=True).is_disabled()
@@ -61,8 +61,8 @@ async def test_the_list_chooses_hides_and_copies(couple, endpoint):
     await couple.locator("#people-list").get_by_text("person 1").click()
     await shows(couple, "quadrille.state.state.person === 1")
     await couple.keyboard.press("Escape")
-    await couple.keyboard.press("Shift+C")
-    await couple.keyboard.press("Shift+V")
+    await command(couple, "Copy the next person's angles")
+    await command(couple, "Show or hide the active person")
     await shows(couple, "quadrille.state.state.people[1].shown")
     copies = [(m["person"], m["from"]) for m in endpoint.heard("pose") if m["action"] == "copy_person"]
     assert copies == [(0, 1), (1, 0)]
@@ -108,13 +108,13 @@ async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoin
     assert (await state_of(couple))["timeline"]["71"]["ambiguous"]
     height = (await couple.locator("#timeline").bounding_box())["height"]
     assert height > 72
-    await couple.keyboard.press("Alt+a")
+    await command(couple, "Next ambiguous frame")
     await shows(couple, "quadrille.state.state.frame === 71")
     assert not await couple.locator("#take-alternative").is_visible()
     endpoint.state["people"][1]["alternatives"] = 1
     await endpoint.broadcast(endpoint.state)
     await couple.locator("#take-alternative").click()
-    await couple.keyboard.press("Shift+X")
+    await command(couple, "Switch to the alternative pose, or back")
     await until(lambda: [m["action"] for m in endpoint.heard("pose")] == ["alternative", "alternative"])
 
 
@@ -146,7 +146,7 @@ async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(coup
     samples = legend.locator("path")
     assert len({await samples.nth(i).get_attribute("stroke-dasharray") for i in (0, 2)}) == 2
     assert await couple.locator("#source").inner_text() == "person 1: replay"
-    await couple.keyboard.press("Shift+Digit6")
+    await toggle_layer(couple, "contours")
     await shows(couple, "document.querySelectorAll('#pose-legend svg').length === 0")
     assert "contours are hidden" in await legend.inner_text()
 
@@ -159,6 +159,6 @@ async def test_a_joint_tells_by_whom_it_is_hidden_and_solo_shows_it(couple, endp
     corner = couple.locator(".pane-joint").first
     await shows(couple, "document.querySelector('.pane-joint').innerText.includes('hidden by person 1')")
     assert "is occluded by person 1" in await corner.get_attribute("title")
-    await couple.keyboard.press("Shift+A")
+    await command(couple, "Solo: dim other people (toggle)")
     await shows(couple, "document.querySelector('.pane-joint').innerText.includes('behind person 1')")
     assert "who is dimmed" in await corner.get_attribute("title")

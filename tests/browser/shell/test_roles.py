@@ -1,7 +1,7 @@
 """Pages with a shared link, against `fake_endpoint`: what they show, and what they send."""
 
 import pytest
-from page_driver import reloaded, shows, until
+from page_driver import command, reloaded, shows, until
 from playwright.async_api import expect
 
 ANNOTATING = ("#joint-bar", "#undo", "#toggle-keyframe", "#track-forward", "#search-frame", "#show-export")
@@ -47,7 +47,7 @@ async def test_a_link_to_review_moves_and_marks(page, endpoint):
 @pytest.mark.slow
 async def test_a_review_sees_the_plan_alone(page, endpoint):
     await join(page, endpoint, "review")
-    await page.keyboard.press("Alt+u")
+    await command(page, "Plan, tasks and comments")
     await expect(page.locator("[data-section=annotation]")).to_be_visible()
     await expect(page.locator("[data-section=body]")).to_be_hidden()
     await expect(page.locator("#plan-frames")).to_be_hidden()
@@ -65,7 +65,7 @@ async def test_a_link_asks_for_a_name_and_then_moves_by_itself(page, endpoint):
     await expect(page.locator("#play")).to_be_visible()
     await page.keyboard.press("End")
     await until(lambda: endpoint.received[-1]["type"] == "seek")
-    await page.keyboard.press("Alt+e")
+    await command(page, "People on this session, and your name")
     await expect(page.locator("#participants-list")).to_contain_text("Lou Q (you)")
     await page.keyboard.press("Escape")
     await reloaded(page, "window.quadrille?.state.presence?.name === 'Lou Q'")
@@ -81,7 +81,7 @@ async def test_others_have_marks_at_their_frames(page, endpoint):
 async def test_the_list_of_a_host_who_is_alone_opens_below_its_button(page):
     button, panel = page.locator("#show-participants"), page.locator("#participants-panel")
     assert not await button.is_visible()
-    await page.keyboard.press("Alt+e")
+    await command(page, "People on this session, and your name")
     above, below = await button.bounding_box(), await panel.bounding_box()
     assert below["y"] >= above["y"] + above["height"]
     await page.keyboard.press("Escape")
@@ -92,7 +92,7 @@ async def test_the_list_of_a_host_who_is_alone_opens_below_its_button(page):
 async def test_the_note_in_place_of_the_3d_view_covers_nothing(page, endpoint):
     endpoint.role = "review"
     await reloaded(page, "!document.querySelector('#scene-note').hidden")
-    await page.keyboard.press("Alt+u")
+    await command(page, "Plan, tasks and comments")
     await expect(page.locator("[data-section=annotation]")).to_be_visible()
     note, column = [await page.locator(one).bounding_box() for one in ("#scene-note", "#inspector")]
     assert note["x"] + note["width"] <= column["x"]

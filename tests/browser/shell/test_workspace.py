@@ -1,7 +1,7 @@
 """Widths of the panes and the 3-D view, and how the 3-D view folds away."""
 
 import pytest
-from page_driver import reloaded, shows, until
+from page_driver import command, reloaded, shows, until
 
 SMALL = {"width": 1280, "height": 720}
 
@@ -16,9 +16,9 @@ async def widths(page):
 @pytest.mark.slow
 async def test_the_3d_view_leaves_its_room_where_inspector_and_search_leave_none(page):
     await page.set_viewport_size(SMALL)
-    await page.keyboard.press("b")
+    await command(page, "Search panel")
     assert (await widths(page))[1] > 300
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await shows(page, "document.querySelector('.is-scene-folded')")
     pane, scene = await widths(page)
     assert pane > 240  # 172 beside the 3-D view
@@ -32,10 +32,10 @@ async def test_the_3d_view_leaves_its_room_where_inspector_and_search_leave_none
     assert (await widths(page))[1] >= 290
     await reloaded(page)
     assert (await widths(page))[1] >= 290
-    await page.keyboard.press("Alt+y")
+    await command(page, "3-D view: fold away or open (toggle)")
     assert (await widths(page))[1] == 0
     # Elsewhere nothing is folded: this was the automatic choice.
-    await page.keyboard.press("Alt+i")
+    await command(page, "Inspector: sizes, settings (toggle)")
     await shows(page, "!document.querySelector('.is-scene-folded')")
 
 
@@ -59,7 +59,7 @@ async def test_the_separator_folds_the_3d_view_away_and_opens_it(page, endpoint)
     await page.keyboard.press("Enter")
     assert (await widths(page))[1] == 0
     # Who looks through a camera wants to see it.
-    await page.keyboard.press("y")
+    await command(page, "3-D view: look through the active camera (toggle)")
     await until(lambda: endpoint.heard("snap"))
     await shows(page, "!document.querySelector('.is-scene-folded')")
     assert (await widths(page))[1] > 300

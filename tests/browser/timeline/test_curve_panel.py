@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from fake_endpoint import curve
-from page_driver import drag_up, frame_place, point_of_curve, shows, state_of, until
+from page_driver import command, drag_up, frame_place, point_of_curve, shows, state_of, until
 from playwright.async_api import expect
 
 DRAWN = """([first, last, index]) => {
@@ -236,11 +236,11 @@ class TestLong:
 
 @pytest.mark.slow
 async def test_the_landscape_says_why_it_is_empty(page, endpoint):
-    await page.keyboard.press("v")
+    await command(page, "Cost landscape")
     waiting = page.locator("#landscape p")
     assert "Sampling the cost" in await waiting.inner_text()
-    await page.keyboard.press("v")
+    await command(page, "Cost landscape")
     await endpoint.tell(compiling="cost")
     await shows(page, "quadrille.state.state.compiling === 'cost'")
-    await page.keyboard.press("v")
+    await command(page, "Cost landscape")
     await shows(page, "document.querySelector('#landscape p').innerText.includes('once the kernels are compiled')")

@@ -1,7 +1,7 @@
 """The queue of doubtful and lost poses: ranked, with thumbnails, walked through, resolved."""
 
 import pytest
-from page_driver import handle_of, shows, state_of, to_client, until
+from page_driver import command, handle_of, shows, state_of, to_client, until
 
 ROWS = "[...document.querySelectorAll('#doubt-list li')]"
 LOADED = f"{ROWS}.every((row) => row.querySelector('img').naturalWidth > 0)"
@@ -14,7 +14,7 @@ async def rows_of(page):
 @pytest.mark.slow
 @pytest.mark.endpoint(n_people=2)
 async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(page, endpoint):
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     await shows(page, f"{ROWS}.length === 4 && {LOADED}")
     doubtful = ["right arm: 31 % chance that it is lost", "frames 31–32"]
     lost = ["left arm: 97 % chance that it is lost", "right arm: 4 %", "frame 50"]
@@ -29,16 +29,16 @@ async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(p
     await page.locator("#doubt-list .doubt").nth(1).click()
     await shows(page, "quadrille.state.state.frame === 50 && quadrille.state.state.person === 1")
     await shows(page, f"{ROWS}[1].classList.contains('is-current')")
-    await page.keyboard.press("Alt+Enter")
+    await command(page, "Accept the doubtful or lost poses here: mark them as reviewed")
     await shows(page, f"{ROWS}.length === 3")
     assert [(m["action"], m["first"], m["last"], m["person"]) for m in endpoint.heard("range")] == [
         ("reviewed", 50, 50, 1)
     ]
     n_loaded = len(endpoint.thumbnails)
     for frame, person in ((31, 0), (31, 1)):  # the next takes the place of the one that was resolved
-        await page.keyboard.press("Alt+ArrowDown")
+        await command(page, "Next doubtful or lost pose by severity")
         await shows(page, f"quadrille.state.state.frame === {frame} && quadrille.state.state.person === {person}")
-    await page.keyboard.press("Alt+ArrowUp")
+    await command(page, "Previous doubtful or lost pose by severity")
     await shows(page, "quadrille.state.state.person === 0")
     for left in (2, 1, 0):
         await page.locator("#doubt-list .doubt-accept").first.click()
@@ -47,7 +47,7 @@ async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(p
         await page.locator("#doubts-empty").inner_text() == "All 6 doubtful and lost poses are confirmed or reviewed."
     )
     assert len(endpoint.thumbnails) == n_loaded  # those that stay are not loaded again
-    await page.keyboard.press("Alt+ArrowDown")
+    await command(page, "Next doubtful or lost pose by severity")
     await page.locator("#advice-text", has_text="no doubtful or lost frame left").wait_for()
 
 
@@ -66,7 +66,7 @@ async def test_doubts_of_one_cause_are_one_entry(page, endpoint):
     right_arm = {k: [0.0, 0.44 if k == 40 else 0.2, 0.03, 0.0, 0.0] for k in (*range(30, 46), *range(52, 60), 75)}
     left_leg = {k: [0.0, 0.0, 0.3, 0.0, 0.0] for k in (47, 110)}
     await replace_doubts(page, endpoint, right_arm | left_leg)
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     await shows(page, f"{ROWS}.length === 3")
     assert await rows_of(page) == [
         ["doubtful", "right arm: 44 % chance that it is lost", "left leg: 3 %", "frames 30–75, in 3 stretches"],
@@ -83,14 +83,14 @@ async def test_doubts_of_one_cause_are_one_entry(page, endpoint):
 @pytest.mark.endpoint(n_frames=1200)
 async def test_ten_entries_are_listed_before_more(page, endpoint):
     await replace_doubts(page, endpoint, {k: [0.05 + k / 3000, 0.0, 0.0, 0.0, 0.0] for k in range(100, 1100, 60)})
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     await shows(page, f"{ROWS}.length === 11")
     assert await page.locator("#doubts-count").inner_text() == "17 to check, the 10 most severe are listed"
     await page.get_by_role("button", name="7 more").click()
     await shows(page, f"{ROWS}.length === 17 && document.activeElement === {ROWS}[10].querySelector('button')")
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     await shows(page, "document.querySelector('#doubts').hidden")
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     await shows(page, f"{ROWS}.length === 11")
 
 
@@ -99,7 +99,7 @@ async def test_ten_entries_are_listed_before_more(page, endpoint):
 async def test_going_to_a_doubt_selects_the_limb_and_zooms_the_views_that_show_it(page, endpoint, way):
     assert await page.evaluate("quadrille.state.views.every(({ zoom }) => zoom === 1)")
     if way == "entry":
-        await page.keyboard.press("Shift+L")
+        await command(page, "Doubtful and lost poses, most severe first")
         await page.locator("#doubt-list .doubt").first.click()
     else:
         for _ in range(3):
@@ -128,7 +128,7 @@ KEYFRAME = {
 
 async def test_an_assessed_keyframe_is_listed_with_the_limb_in_doubt(page, endpoint):
     await replace_doubts(page, endpoint, {40: [0.0, 0.9, 0.0, 0.0, 0.0]}, reviewed=True, keyframe=True)
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     assert await rows_of(page) == []
     doubt = KEYFRAME | {"distance_cm": None, "point": "", "views": [], "reason": "right arm uncertain without LEFT"}
     await endpoint.broadcast({"type": "inconsistent", "frames": [], "keyframes": [doubt]})
@@ -138,13 +138,13 @@ async def test_an_assessed_keyframe_is_listed_with_the_limb_in_doubt(page, endpo
     await page.locator("#doubt-list .doubt").click()
     await shows(page, "quadrille.state.shown.frame === 40 && quadrille.state.state.point === 'r_wrist'")
     assert told in await page.locator("#frame-card").inner_text()
-    await page.keyboard.press("Alt+Enter")
+    await command(page, "Accept the doubtful or lost poses here: mark them as reviewed")
     await until(lambda: endpoint.heard("confirm_keyframe"))
 
 
 async def test_a_keyframe_in_doubt_comes_first_and_takes_its_neighbours(page, endpoint):
     await replace_doubts(page, endpoint, {39: [0.2, 0.0, 0.0, 0.0, 0.0], 41: [0.0, 0.3, 0.0, 0.0, 0.0]})
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     await shows(page, f"{ROWS}.length === 2")
     before = await page.locator("#timeline canvas").first.screenshot()
     await endpoint.broadcast({"type": "inconsistent", "frames": [40], "keyframes": [KEYFRAME]})
@@ -158,7 +158,7 @@ async def test_a_keyframe_in_doubt_comes_first_and_takes_its_neighbours(page, en
     await shows(page, "quadrille.state.shown.frame === 40 && quadrille.state.state.point === 'l_wrist'")
     card = page.locator("#frame-card")
     assert "disagrees with its neighbours: l wrist 27 cm off" in await card.inner_text()
-    await page.keyboard.press("Alt+Enter")
+    await command(page, "Accept the doubtful or lost poses here: mark them as reviewed")
     await until(lambda: endpoint.heard("confirm_keyframe"))
     assert endpoint.heard("confirm_keyframe") == [{"type": "confirm_keyframe", "person": 0, "frame": 40}]
     assert [(m["first"], m["last"]) for m in endpoint.heard("range")] == [(39, 41)]
@@ -170,18 +170,15 @@ async def test_a_keyframe_in_doubt_comes_first_and_takes_its_neighbours(page, en
 @pytest.mark.slow
 @pytest.mark.endpoint(n_frames=6)
 async def test_an_empty_list_says_why(page, endpoint):
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     empty = page.locator("#doubts-empty")
     await empty.wait_for()
-    assert (
-        await empty.inner_text()
-        == "No frame has been tracked. Press T to track; doubtful and lost poses are listed here."
-    )
+    assert (await empty.inner_text()).startswith("No frame has been tracked. ")
     cells = {str(k): endpoint.cell(12) for k in range(6)}
     await endpoint.broadcast({"type": "timeline", "person": None, "cells": cells, "replace": False})
     await shows(page, "document.querySelector('#doubts-empty').textContent === 'No pose is doubtful or lost.'")
     assert (await state_of(page))["drawer"] == "doubts"
-    await page.keyboard.press("Shift+L")
+    await command(page, "Doubtful and lost poses, most severe first")
     await until(lambda: not endpoint.thumbnails)
     await page.locator("#doubts").wait_for(state="hidden")
 

@@ -1,7 +1,7 @@
 """The drawer closes when it is empty, belongs to its session, and leaves the lanes of the timeline their room."""
 
 import pytest
-from page_driver import OPENED, reloaded, shows
+from page_driver import OPENED, command, reloaded, shows
 
 EMPTY = {"type": "timeline", "person": None, "cells": {}, "replace": True}
 
@@ -39,7 +39,7 @@ async def test_a_drawer_whose_content_is_gone_closes(page, endpoint):
 
 async def test_a_search_drawer_without_searches_stays_as_opened(page, endpoint):
     """The list of searches comes only after the drawer has been opened."""
-    await page.keyboard.press("b")
+    await command(page, "Search panel")
     await shows(page, "quadrille.state.drawer === 'search'")
     await endpoint.broadcast(endpoint.state | {"undo": "drag torso, frame 12"})
     await shows(page, "quadrille.state.state.undo !== null")
@@ -56,8 +56,8 @@ async def test_no_lane_of_the_timeline_is_cut_off(page, endpoint, height):
     for kind in ("search", "curves", "doubts"):
         await page.evaluate("(kind) => localStorage.setItem(`quadrille.drawer-height-${kind}`, '2000')", kind)
     await page.set_viewport_size({"width": 1280, "height": height})
-    for key in ("b", "c", "Shift+l"):
-        await page.keyboard.press(key)
+    for key in ("Search panel", "c", "Doubtful and lost poses, most severe first"):
+        await command(page, key)
         await shows(page, "document.querySelector('#drawer').offsetHeight > 0")
         timeline = await page.locator("#timeline").bounding_box()
         assert timeline["y"] + timeline["height"] <= height

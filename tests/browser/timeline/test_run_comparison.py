@@ -1,7 +1,7 @@
 """The drawer's comparison of the poses of a range with those that they replaced."""
 
 import pytest
-from page_driver import shows, until
+from page_driver import command, shows, until
 
 ROWS = "[...document.querySelectorAll('#run-comparison-rows tr')]"
 
@@ -116,7 +116,7 @@ async def test_a_comparison_leaves_a_tab_that_is_opened_after_its_run(page, endp
             await endpoint.broadcast(endpoint.state)
             await shows(page, f"quadrille.state.state.track.running === {str(running).lower()}")
         if is_opened:
-            await page.keyboard.press("Shift+L")
+            await command(page, "Doubtful and lost poses, most severe first")
             await shows(page, "quadrille.state.drawer === 'doubts'")
         await endpoint.broadcast(COMPARED | {"stretches": [stretch(24, 30, 6, "better")], "run": run})
         await shows(page, f"quadrille.state.rangeComparison?.run === {run}")

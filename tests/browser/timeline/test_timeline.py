@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from page_driver import frame_place, shows, state_of, until
+from page_driver import command, frame_place, shows, state_of, until
 
 from tracker.session.store.records import SOURCES
 
@@ -73,9 +73,9 @@ async def test_a_clip_plays_at_its_rate(page, endpoint, rate):
     assert 0.4 * float(rate) < found < 1.4 * float(rate)  # a busy machine draws seldom, and is late for it
 
 
-async def test_keys_change_the_rate(page):
-    for key, rate in (("Quote", 2), ("Quote", 4), ("Quote", 4), ("Semicolon", 2), ("Semicolon", 1), ("Semicolon", 0.5)):
-        await page.keyboard.press(key)
+async def test_commands_change_the_rate(page):
+    for change, rate in (("faster", 2), ("faster", 4), ("faster", 4), ("slower", 2), ("slower", 1), ("slower", 0.5)):
+        await command(page, f"Play {change}")
         await shows(page, f"quadrille.state.rate === {rate} && document.querySelector('#rate').value === '{rate}'")
 
 
@@ -103,12 +103,12 @@ async def test_playing_ends_at_the_last_frame_and_begins_anew(page, endpoint):
 @pytest.mark.slow
 async def test_a_loop_goes_round_the_marked_range(page, endpoint):
     await mark(page, 40, 46)
-    await page.keyboard.press("Shift+Space")
+    await command(page, "Loop playback, within the marked range if there is one (toggle)")
     await shows(page, "document.querySelector('#loop').getAttribute('aria-pressed') === 'true'")
     await page.locator("#every-frame").click()
     _, frames = await played(page, endpoint, lambda f: f.count(40) > 2)
     assert frames[:15] == [*range(40, 47), *range(40, 47), 40]
-    await page.keyboard.press("Shift+Space")
+    await command(page, "Loop playback, within the marked range if there is one (toggle)")
     await shows(page, "!quadrille.state.loops")
 
 
@@ -149,7 +149,7 @@ async def test_the_wheel_zooms_where_the_pointer_is(page):
 
 async def test_a_zoomed_view_is_moved_by_button_and_overview(page):
     for _ in range(4):
-        await page.keyboard.press("z")
+        await command(page, "Timeline: zoom in")
     await shows(page, "quadrille.state.visible?.end - quadrille.state.visible?.start < 20")
     x, y = await frame_place(page, 14)
     await page.mouse.move(x, y)
@@ -164,7 +164,7 @@ async def test_a_zoomed_view_is_moved_by_button_and_overview(page):
     await shows(
         page, "quadrille.state.shown.frame === 13 && quadrille.state.visible.start <= 13"
     )  # it comes back to view
-    await page.keyboard.press("Alt+z")
+    await command(page, "Timeline: show the marked range, or all frames")
     await shows(page, "quadrille.state.visible === null")
 
 
@@ -207,12 +207,14 @@ async def test_the_menu_counts_what_there_is_to_go_to(page):
 
 
 @pytest.mark.slow
-async def test_jumps_by_keys(page):
+async def test_jumps_by_keys_and_commands(page):
+    apart = "frame inconsistent with its neighbours"
     for key, frame in (
-        ("d", 44), ("d", 45), ("d", 45), ("Shift+D", 44), ("w", 60), ("w", 80), ("Shift+W", 60), ("Alt+n", 61),
-        ("Alt+Shift+N", 59), ("q", 100), ("n", 100), ("Shift+N", 50),
+        (f"Next {apart}", 44), (f"Next {apart}", 45), (f"Next {apart}", 45), (f"Previous {apart}", 44),
+        ("Next keyframe", 60), ("Next keyframe", 80), ("Previous keyframe", 60), ("Next unreviewed frame", 61),
+        ("Previous unreviewed frame", 59), ("Middle of the longest gap", 100), ("n", 100), ("Shift+N", 50),
     ):  # fmt: skip
-        await page.keyboard.press(key)
+        await command(page, key)
         await shows(page, f"quadrille.state.shown.frame === {frame}")
 
 
@@ -232,8 +234,8 @@ async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
     names = ["backward", "forward", "interpolate", "estimate", "clear", "keyframe", "reviewed", "unreviewed"]
     for name in names:
         await page.locator(f"#range-{name}").click()
-    await page.keyboard.press("Shift+I")
-    await page.keyboard.press("Shift+R")
+    await command(page, "Interpolate the marked range")
+    await command(page, "Estimate the poses here again")
     await page.locator("#range-compare").click()
     await until(lambda: len(endpoint.heard("range")) == 10 and endpoint.heard("compare_range"))
     assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": 24, "last": 36}]
@@ -264,7 +266,7 @@ async def test_poses_around_a_frame_are_estimated_again_in_a_range_of_their_own(
     """The next frame has another range; one that a user marked stays. A message that comes again is shown again."""
     for frame, first, last in ((30, 26, 34), (3, 0, 7), (99, 95, 99), (112, 112, 112)):
         await go_to(page, frame)
-        await page.keyboard.press("Shift+R")
+        await command(page, "Estimate the poses here again")
         await shows(page, f"quadrille.state.range?.first === {first} && quadrille.state.range.last === {last}")
         for running, text in ((True, "estimating"), (False, "estimated 8 frames")):
             await endpoint.tell(
@@ -273,7 +275,7 @@ async def test_poses_around_a_frame_are_estimated_again_in_a_range_of_their_own(
             )
             await shows(page, f"document.querySelector('#range-work').textContent.startsWith('{text}')")
     await mark(page, 24, 36)
-    await page.keyboard.press("Shift+R")
+    await command(page, "Estimate the poses here again")
     await until(lambda: len(endpoint.heard("range")) == 5)
     assert endpoint.heard("range")[-1] == {
         "type": "range",
@@ -302,7 +304,7 @@ async def test_marks_of_the_shown_frame(page, endpoint):
     assert await page.locator("#toggle-keyframe").get_attribute("aria-pressed") == "false"
     await page.keyboard.press("k")
     await page.keyboard.press("e")
-    await page.keyboard.press("Shift+K")
+    await command(page, "Remove the marks of this frame")
     await page.locator("#toggle-keyframe").click()
     await until(lambda: len(endpoint.heard("mark")) == 3)
     assert [m["toggle"] for m in endpoint.heard("mark")] == ["keyframe", "reviewed", "keyframe"]

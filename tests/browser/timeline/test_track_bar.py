@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 from fake_endpoint import REMARK
-from page_driver import dragging, frame_place, shows, state_of, until
+from page_driver import command, dragging, frame_place, shows, state_of, until
 
 STRIP = """(frame) => {
   const canvas = document.querySelector("#timeline canvas");
@@ -67,7 +67,7 @@ async def test_looking_elsewhere_unticks_follow_and_the_tick_leads_back(page, en
     at = (await state_of(page))["state"]["track"]["at"]
     await shows(page, f"quadrille.state.state.track.at > {at + 3}")
     assert (await state_of(page))["shown"]["frame"] == 5
-    await page.keyboard.press("l")
+    await command(page, "Follow the tracker (toggle)")
     await shows(page, "quadrille.state.shown.frame > 15")
     assert await page.locator("#follow").is_checked()
 
