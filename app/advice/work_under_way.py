@@ -86,7 +86,8 @@ def _tracking(track: TrackState, of: str) -> Advice:
     frames = ", ".join([f"{track.done:,} of {track.total:,} frames", *rate, *counts])
     done = frames if track.stage == "tracking" else "you can go on"
     if track.running:
-        return Advice("tracking", _STAGES[track.stage], (_stop(of),), "work", share, done)
+        is_timed = track.stage != "solve"  # the estimate ends when nothing moves
+        return Advice("tracking", _STAGES[track.stage], (_stop(of),), "work", share, done, is_timed=is_timed)
     text = "Tracking is paused" + ("" if track.at is None else f" at frame {track.at}")
     return Advice("paused", text, (Action("resume", "Go on"), _stop(of)), "work", share, done)
 

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from tracker.pipeline.track_session import Step, TrackSession
     from tracker.session.session import Session
 
-_PASSES = {BackwardStep: "tracking backward", EstimateStep: "estimating all frames together"}
-"""Passes after the first, by their steps."""
+_ESTIMATING = "estimating all frames together"
 
 
 class ChainProgress:
@@ -35,7 +34,7 @@ class ChainProgress:
         self._progress, self._bar, self._stage, self._tried = progress, ExitStack(), "", ""
         self._advance: Callable[[float], None] = lambda share: None
         self._tick: Callable[[], None] = lambda: None
-        self._pass: tuple[type, int] | None = None
+        self._n_backward: int | None = None
 
     def __enter__(self) -> "ChainProgress":
         """Begin."""
@@ -51,7 +50,8 @@ class ChainProgress:
             self._progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
         if stage != self._stage and share < 1:
             self._bar.close()
-            self._advance = self._bar.enter_context(self._progress.share(stage, is_timed=stage != FINDING))
+            is_timed = stage not in (FINDING, _ESTIMATING)
+            self._advance = self._bar.enter_context(self._progress.share(stage, is_timed))
         self._stage = stage
         if text:
             self._progress.say(text)
@@ -71,11 +71,13 @@ class ChainProgress:
             if len(run.costs_px) == 1:
                 self._count(len(run.frames), "tracking")
             self._tick()
-        elif isinstance(step, BackwardStep | EstimateStep):
-            if self._pass != (type(step), step.total):
-                self._pass = type(step), step.total
-                self._count(step.total - step.done + 1, _PASSES[type(step)])
+        elif isinstance(step, BackwardStep):
+            if self._n_backward != step.total:
+                self._n_backward = step.total
+                self._count(step.total - step.done + 1, "tracking backward")
             self._tick()
+        elif isinstance(step, EstimateStep):
+            self.report(_ESTIMATING, step.done / step.total)
 
     def _count(self, total: int, what: str) -> None:
         """Begin another bar."""

@@ -48,6 +48,8 @@ class Advice(Part, frozen=True):
     """Steps of the whole work in order, for people to read; `share` is that of the present one."""
     step: int = 0
     """Rank of the present step, from 0."""
+    is_timed: bool = True
+    """Whether the share grows evenly, so that the time left follows from it."""
     at_most_s: float | None = None
     """Longest time that the present step still takes, s; null while unknown, or where it follows from the share."""
 

@@ -14,7 +14,7 @@ const TICK_MS = 1000;
  * @typedef {import("../model/protocol.js").Advice} Advice
  * @typedef {import("../model/protocol.js").Action} Action
  * @typedef {import("../model/protocol.js").NoticeMessage} Notice
- * @typedef {Pick<Advice, "text" | "level" | "share" | "done" | "steps" | "step" | "at_most_s"> & {actions: Action[]}} Line
+ * @typedef {Pick<Advice, "text" | "level" | "share" | "done" | "steps" | "step" | "is_timed" | "at_most_s"> & {actions: Action[]}} Line
  */
 
 export class AdviceLine {
@@ -116,7 +116,7 @@ export class AdviceLine {
 
   #showFigures() {
     const now = this.#now;
-    const seconds = now?.share == null ? null : this.#left.at(performance.now() / 1000);
+    const seconds = now?.share == null || !now.is_timed ? null : this.#left.at(performance.now() / 1000);
     const bound = now?.at_most_s ?? null;
     const left = bound !== null ? `at most ${timeText(bound)}` : seconds === null ? "" : timeText(seconds);
     const isPart = left && now && now.step < now.steps.length - 1;
@@ -149,7 +149,7 @@ export class AdviceLine {
  * @returns {Line}
  */
 function line(text, level) {
-  return { text, level, share: null, done: "", steps: [], step: 0, at_most_s: null, actions: [] };
+  return { text, level, share: null, done: "", steps: [], step: 0, is_timed: true, at_most_s: null, actions: [] };
 }
 
 /** @param {Advice} advice */

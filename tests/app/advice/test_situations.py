@@ -167,6 +167,12 @@ def test_work_says_how_much_is_done():
         assert advise(now, PLACED)[0].done == done
 
 
+def test_time_is_left_only_where_the_share_grows_evenly():
+    """The estimate ends when no pose moves, which nobody knows before."""
+    runs = [state(track=TrackState(True, 0, 8, 8, 4, 9, stage=stage)) for stage in ("tracking", "back", "solve")]
+    assert [advise(now, TRACKED)[0].is_timed for now in runs] == [True, True, False]
+
+
 def test_nothing_is_said_of_what_is_over():
     """A dismissed doubt leaves nothing but the next step; a failure is over once everybody is placed."""
     late = state("tracked", finding=FindState(failed=True, message="Expected figures."))

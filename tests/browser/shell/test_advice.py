@@ -10,15 +10,15 @@ LONG = (
     "Not saved: expected room on the disk of the session for the poses of 1,200 frames, found none; make room on it, "
     "or give the session another folder, and try again. Edits are kept in memory until saving succeeds."
 )
+WORK = {"share": None, "done": "", "steps": (), "step": 0, "is_timed": True, "at_most_s": None}
 
 
 def action(deed, text="Do it", frame=None, person=None, camera=None, of=""):
     return {"deed": deed, "text": text, "frame": frame, "person": person, "camera": camera, "of": of}
 
 
-def said(text, *actions, situation="done", level="next", share=None, done="", steps=(), step=0, at_most_s=None):
-    work = dict(share=share, done=done, steps=steps, step=step, at_most_s=at_most_s)
-    return dict(situation=situation, text=text, actions=actions, level=level, **work)
+def said(text, *actions, situation="done", level="next", **work):
+    return WORK | work | dict(situation=situation, text=text, actions=actions, level=level)
 
 
 async def advise(endpoint, *advice):
@@ -109,6 +109,8 @@ async def test_work_shows_its_share_and_the_time_left(page, endpoint):
         await page.wait_for_timeout(1100)
     assert re.fullmatch("20%, .* left", await page.locator("#advice-figures").inner_text())
     assert await page.evaluate("document.querySelector('#advice-share').value") == 0.2
+    await advise(endpoint, work | {"situation": "find", "is_timed": False})
+    await shows(page, "document.querySelector('#advice-figures').textContent === '20%'")
     await page.keyboard.press("Period")  # one looks around meanwhile
     await until(lambda: endpoint.heard("seek") == [{"type": "seek", "frame": 13}])
     await advise(endpoint, said("Finding people", level="work", situation="find"))

@@ -24,7 +24,7 @@ from tracker.estimation.trajectory.hypotheses import DISTINCT_M, HypothesisSet, 
 from tracker.estimation.trajectory.motion_model import acceleration, motion_points
 from tracker.geometry.arrays import Array, IntArray
 
-ROUNDS = 3
+_ROUNDS = 3
 """Largest number of rounds. On twelve recordings, nine of simulated people, the path stays after one to three of
 eight."""
 _KEPT = 14
@@ -64,20 +64,18 @@ class PathSearch:
         return frozenset(self._searched)
 
     def rounds(self) -> Iterator[int]:
-        """Search until the path stays. Yields the number of frames visited so far, at most `2 * ROUNDS * T`."""
+        """Search until the path stays. Yields the index of each frame that was visited."""
         n = len(self.frames)
-        for r in range(ROUNDS):
-            before, done = self._points(), 2 * n * r
+        for _ in range(_ROUNDS):
+            before = self._points()
             for order in (range(n), range(n - 1, -1, -1)):
-                for _ in self._swept(order):
-                    done += 1
-                    yield done
+                yield from self._swept(order)
                 self.poses = self._likeliest()
             for t in self._free():
                 self._combine(t)
             for t, lost in self._doubted():
                 self._search(t, lost)
-                yield done
+                yield t
             self.poses = self._likeliest()
             if np.linalg.norm(self._points() - before, axis=-1).max() < DISTINCT_M:
                 return

@@ -24,7 +24,7 @@ from tracker.estimation.by_frame.region_scorer import FrameEvidence
 from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.runs.frame_hypotheses import FrameHypotheses, Proposal
 from tracker.estimation.runs.path_assessment import RunPose, assessed_path
-from tracker.estimation.runs.path_search import ROUNDS, PathSearch
+from tracker.estimation.runs.path_search import PathSearch
 from tracker.estimation.runs.proposals import other_sides
 from tracker.estimation.search.chamfer_cost import frame_cost
 from tracker.estimation.tracking.subjects import Subjects
@@ -105,8 +105,9 @@ class _RunEstimate:
         """Do the work, block by block."""
         blocks, people = even_blocks(len(self._frames)), self._run.subjects.tracked
         n_turns = max(1, self._run.settings.rounds) if len(people) > 1 else 1
-        # Of each frame: evidence and, for each person, proposals, two sweeps a round, and the solve.
-        per_frame = 1 + len(people) * (n_turns * (1 + 2 * ROUNDS) + 1)
+        # For the time left, in that of a person's proposals: evidence around all proposals; proposals and path of each
+        # person; evidence of the whole pictures for the cost. Sweeps are quick.
+        per_frame = 2 + 2 * len(people) + 2
         total, first = per_frame * sum(used.stop - used.start for _, used in blocks), 0
         for own, used in blocks:
             for done in self._block(self._frames[own], self._frames[used], n_turns):
@@ -122,9 +123,9 @@ class _RunEstimate:
         for done, k in enumerate(used):
             if k not in self._views:
                 self._views[k] = self._observe(k, [(i, p.pose) for i in people for p in proposals[k, i]])
-            yield done
+            yield 2 * done
         evidence = {k: self._evidence(k) for k in used}
-        done, searches = n, dict[int, PathSearch]()
+        done, searches = 2 * n, dict[int, PathSearch]()
         for turn in range(n_turns):
             for i in people:
                 frames = list[FrameHypotheses]()
@@ -133,17 +134,18 @@ class _RunEstimate:
                         frames.append(searches[i].frames[t].among(self._bodies(k)))
                     else:
                         frames.append(self._proposed(evidence[k], k, i, proposals[k, i]))
-                    yield done + t
+                        yield done + t
+                done += n if turn == 0 else 0
                 searches[i] = PathSearch(frames, self._times_s(used))
-                for visited in searches[i].rounds():
-                    yield done + n + visited
+                for _ in searches[i].rounds():
+                    yield done
                 self._take(used, i, searches[i].poses)
-                done += n * (1 + 2 * ROUNDS)
         assessed = dict[int, list[RunPose]]()
         for i in people:
             assessed[i] = yield from self._solve(used, i, searches[i], done)
             done += n
         for t, k in enumerate(used):
+            yield done + 2 * t
             if k in own and k in self._run.poses:
                 cost = frame_cost(self._run.observer.origin.evidence(k), self._bodies(k))
                 known = {"cost_px": cost.total_px, "view_costs_px": tuple(map(float, cost.view_costs_px))}
