@@ -11,9 +11,9 @@ from code_counts import code_lines, git, numbers, private_names, unexplained_ris
 MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 991, 224, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
-MAX_CODE_LINES = {"tracker": 49299, "app": 20970, "js": 14436, "css": 4240, "tests": 66006}
-"""Lines without blanks, comments and docstrings. Clocks, curves and the bar of a chain raised them once, by what
-was not won back elsewhere."""
+MAX_CODE_LINES = {"tracker": 49271, "app": 21083, "js": 14586, "css": 4189, "tests": 65934}
+"""Lines without blanks, comments and docstrings. Clocks, curves, the bar of a chain and calibration in the page raised
+them by what was not won back elsewhere."""
 MAX_HIDDEN_SUBJECTS = 25
 MAX_PRIVATE = 207
 """Uses of private names in tests: a test goes through the public surface where that shows the same."""
