@@ -37,7 +37,7 @@ def silhouettes(monkeypatch):
     """What is seen on every frame, a list that tests fill."""
     seen = []
     finder = SimpleNamespace(silhouettes=lambda k, person=None: tuple(seen), close=lambda: None)
-    monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording, step: finder)
+    monkeypatch.setattr(frame_trials, "SilhouetteFinder", lambda cameras, recording, step: finder)
     return seen
 
 
@@ -129,7 +129,8 @@ def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_not
         raise TrackerError("expected a head, found none")
 
     generators = {**dict.fromkeys(GENERATORS, nothing), "mine": proposed}
-    monkeypatch.setattr(first_pose, "GENERATORS", generators)
+    for room in (first_pose, frame_trials):
+        monkeypatch.setattr(room, "GENERATORS", generators)
     said = []
     first = find_first_poses_anywhere(session, OBSERVER, [0], [3], 0.05, said.append)
     assert first.poses[0].start.source == "mine"
@@ -195,7 +196,7 @@ def test_frames_on_which_silhouettes_agree_go_first(session, silhouettes, fits, 
     poor = [whole[0]._replace(mask=whole[0].mask | np.roll(whole[0].mask, 60, axis=1)), *whole[1:]]
     nobody = [s._replace(mask=np.zeros_like(s.mask)) for s in whole]
     seen = SimpleNamespace(silhouettes=lambda k, person=None: {20: nobody, 10: poor}.get(k, whole), close=lambda: None)
-    monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording, step: seen)
+    monkeypatch.setattr(frame_trials, "SilhouetteFinder", lambda cameras, recording, step: seen)
     tried = list[int]()
     find_first_poses_anywhere(session, OBSERVER, [0], [20, 10, 30, 15], 0.05, show=frames_in(tried))
     assert tried == [30, 15]
@@ -361,7 +362,7 @@ def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch
     found = find(session).poses[0]
     assert max(errors(found.model, found.start.pose)) < 0.3
     # Shadows are asked only where a start is not good without them.
-    monkeypatch.setattr(first_pose, "recover_from_shadows", None)
+    monkeypatch.setattr(frame_trials, "recover_from_shadows", None)
     silhouettes[:] = whole
     assert find(session).is_good
 
