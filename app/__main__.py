@@ -5,7 +5,6 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext, redirect_stdout
-from importlib import metadata
 from typing import NoReturn, TextIO, cast
 
 import tyro
@@ -41,6 +40,7 @@ from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
 from app.runtime.malloc_trim import give_back_freed_memory
 from app.runtime.plain_output import PlainOutput, printable
+from tracker.compute.distribution import program_version
 from tracker.compute.extensions import pass_over_unread_packages
 from tracker.errors import TrackerError
 
@@ -107,7 +107,7 @@ def main() -> None:
     """Run the command line. Errors of users and files are one sentence on standard error and status 1."""
     words = sys.argv[1:]
     if words[:1] == ["--version"]:
-        print(f"quadrille {_version()}")
+        print(f"quadrille {program_version()}")
         return
     if not words or (words[0] not in _COMMANDS and words[0] not in _HELP):
         words = ["open", *words]
@@ -144,14 +144,6 @@ def _refuse(sentence: str) -> NoReturn:
     text = printable(f"quadrille: {sentence}")
     Console(stderr=True).print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
     sys.exit(1)
-
-
-def _version() -> str:
-    """Return the version of the program; "unknown" in a source tree that is not installed."""
-    try:
-        return metadata.version("quadrille")
-    except metadata.PackageNotFoundError:
-        return "unknown (not installed)"
 
 
 def program() -> None:

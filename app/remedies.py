@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from tracker.compute.distribution import install_command
 from tracker.errors import Remedy, TrackerError
 
 
@@ -47,4 +48,7 @@ def _sentence(text: object, remedy: Remedy | None, column: int) -> str:
         remedy = remedy or text.remedy
     if remedy is None:
         return str(text)
-    return f"{text}; {phrases()[remedy.code][column].format(**remedy.fields)}"
+    fields = dict(remedy.fields)
+    if "extra" in fields:
+        fields["command"] = install_command(str(fields["extra"]))
+    return f"{text}; {phrases()[remedy.code][column].format(**fields)}"

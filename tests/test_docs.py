@@ -7,6 +7,7 @@ import sys
 import pytest
 import rooms_picture
 from architecture import FLOOR, ONLY_ROOMS, PAGE_ROOMS, ROOT, SCRIPTS, own_imports, page_imports, page_room, room_of
+from code_counts import git
 
 from app import __main__
 
@@ -67,6 +68,16 @@ def test_the_site_has_each_document_once():
     )
     places = [outside.get(page.relative_to(ROOT).as_posix(), page.name) for page in PAGES]
     assert sorted(listed) == sorted(places)
+
+
+def test_nobody_is_told_to_install_the_bare_name():
+    """`quadrille` alone is a distribution of somebody else; ours is `quadrille-mocap`."""
+    bare = re.compile(r"(?:pipx?|uv tool|uv pip|uvx) (?:install |run |-\S+ )*['\"]?quadrille(?![\w.-])")
+    assert bare.search("pip install 'quadrille[dask]'")
+    ends = (".md", ".py", ".toml", ".js", ".html", ".yml", ".cff", "Makefile")
+    names = [name for name in (git("ls-files") or "").split() if name.endswith(ends) and name != "tests/test_docs.py"]
+    assert [name for name in names if bare.search((ROOT / name).read_text("utf-8"))] == []
+    assert names or git("status") is None
 
 
 def test_targets_of_make_exist():

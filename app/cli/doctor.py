@@ -18,6 +18,7 @@ from platformdirs import user_cache_path, user_state_path
 
 from app.runtime.json_output import format_json
 from app.runtime.memory import WORKER_BYTES, free_bytes, n_cores
+from tracker.compute.distribution import DISTRIBUTION, install_command, program_version
 
 _EXTRAS = {
     "import": ("quadrille import of DeepLabCut HDF5, SLEAP and NWB", ("h5py", "sleap_io")),
@@ -56,7 +57,7 @@ def command(json: bool = False) -> None:
     if json:
         print(format_json(record(found)))
         return
-    print(f"quadrille {_version('quadrille')}, Python {platform.python_version()}, {platform.system()} on {_machine()}")
+    print(f"quadrille {program_version()}, Python {platform.python_version()}, {platform.system()} on {_machine()}")
     width = max(len(f.name) for f in found)
     for one in found:
         print(f"{one.state:8}{one.name:{width}}  {one.text}")
@@ -65,7 +66,7 @@ def command(json: bool = False) -> None:
 def record(found: list[Finding]) -> dict[str, Any]:
     """Return the findings as one JSON object."""
     return {
-        "quadrille": _version("quadrille"),
+        "quadrille": program_version(),
         "python": platform.python_version(),
         "system": platform.system(),
         "machine": _machine(),
@@ -153,7 +154,7 @@ def _extras() -> list[Finding]:
     found = []
     for extra, (use, modules) in _EXTRAS.items():
         missing = [m for m in modules if importlib.util.find_spec(m) is None]
-        text = f"{use}: {', '.join(missing)} not installed; pip install 'quadrille[{extra}]'" if missing else use
+        text = f"{use}: {', '.join(missing)} not installed; {install_command(extra)}" if missing else use
         found.append(Finding(f"extra {extra}", "missing" if missing else "ok", text))
     return found
 
@@ -169,7 +170,7 @@ def _extensions() -> list[Finding]:
     found = []
     for group, kind in zip(GROUPS, kinds, strict=True):
         for one in extensions(group, kind):
-            if one.package.startswith("quadrille "):
+            if one.package.startswith(f"{DISTRIBUTION} "):
                 continue
             odd = one.error or (one.printed and f"its module prints when it is loaded: '{one.printed}'")
             text = f"of {one.package}" + (f": {without_paths(odd)}" if odd else "")

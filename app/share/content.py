@@ -10,12 +10,12 @@ import numpy as np
 
 from app.drawing import curves
 from tracker.body.model import BodyModel
+from tracker.compute.distribution import program_version
 from tracker.evidence.images.working_view import WorkingView
 from tracker.geometry.cameras import Camera
 from tracker.interchange.exports.motion import ExportedMotion, PersonMotion
 from tracker.interchange.exports.provenance import pose_provenance
 from tracker.session.session import Session
-from tracker.session.store.edit_tree import program_version
 from tracker.session.store.records import FramePose
 
 

@@ -16,10 +16,10 @@ from tracker.annotation.edit_union import EditUnion, unite
 from tracker.annotation.numbered_settings import Numbered, join_numbered, numbered_settings, plain_settings
 from tracker.annotation.three_way import Conflict, Shown, join_pins, join_poses, pins_after, poses_after
 from tracker.body.model import BodyModel
+from tracker.compute.distribution import program_version
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.arrays import Array
 from tracker.session.store.edit_log import COLUMNS, NUMBERS, EditLog, LoggedEdit, PoseRow
-from tracker.session.store.edit_tree import program_version
 from tracker.session.store.identities import derived_uid
 from tracker.session.store.records import ModelRevision
 from tracker.session.store.task_log import CommentRow, Rows, StateRow, TaskRow

@@ -7,6 +7,7 @@ compiled.
 """
 
 __all__ = [
+    "distribution",
     "extensions",
     "float32",
     "interpretation",

@@ -6,7 +6,7 @@ from typing import Any
 
 from app.runtime.progress import Reporter
 from tracker.batch.manifest import Manifest
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 
 _LOOK_S = 0.5
 _CONNECT_S = 10
@@ -24,7 +24,7 @@ def run_on_cluster(manifest: Manifest, address: str, progress: Reporter) -> bool
         from distributed import Client
     except ImportError as error:
         raise TrackerError(
-            "expected the package distributed for --dask, found none; install it with: pip install 'quadrille[dask]'"
+            "expected the package distributed for --dask, found none", Remedy("install_extra", extra="dask")
         ) from error
     try:
         client = Client(address, timeout=_CONNECT_S)

@@ -84,7 +84,7 @@ def test_new_info_init_track_evaluate(run, tmp_path):
 
 
 def test_version(run):
-    assert run("--version") == (0, f"quadrille {metadata.version('quadrille')}\n", "")
+    assert run("--version") == (0, f"quadrille {metadata.version('quadrille-mocap')}\n", "")
 
 
 @pytest.mark.slow

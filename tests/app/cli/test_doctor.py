@@ -9,6 +9,7 @@ from command_line import output_of
 
 from app.cli import doctor
 from tracker.compute import extensions
+from tracker.compute.distribution import install_command
 
 
 @pytest.fixture
@@ -29,7 +30,7 @@ def test_missing_parts_are_named_with_their_command(run, monkeypatch):
     monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
     monkeypatch.setattr(doctor.sys, "platform", "linux")
     out = run("doctor")[1]
-    assert "pip install 'quadrille[dask]'" in out
+    assert install_command("dask") in out
     assert "browser of another machine" in out
 
 

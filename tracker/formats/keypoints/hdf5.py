@@ -39,7 +39,7 @@ class ReadingLimits(NamedTuple):
 LIMITS = ReadingLimits(300.0, 16 * np.dtype(float).itemsize * MAX_VALUES)
 """Tables of the largest size take 0.3 GB, and are held up to five times; libraries take up 0.5 GB."""
 
-_REMEDIES = {"install": Remedy("install_import"), "other format": Remedy("export_other_format")}
+_REMEDIES = {"install": Remedy("install_extra", extra="import"), "other format": Remedy("export_other_format")}
 
 
 class VideoHead(msgspec.Struct):

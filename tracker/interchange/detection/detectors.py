@@ -12,14 +12,14 @@ from tracker.interchange.detection.model_files import model_file
 def _blazepose(model: str, folder: Path) -> Detector:
     from tracker.interchange.detection.blazepose import BlazePose
 
-    require("ai_edge_litert", "BlazePose", "run", "ai-edge-litert")
+    require("ai_edge_litert", "BlazePose", "run", "detect")
     return BlazePose(model_file(folder, "pose_detection.tflite"), model_file(folder, f"pose_landmark_{model}.tflite"))
 
 
 def _onnx(model: str, folder: Path) -> Detector:
     from tracker.interchange.detection.onnx_pose import OnnxPose
 
-    require("onnxruntime", "ONNX files", "run", "onnxruntime")
+    require("onnxruntime", "ONNX files", "run", "detect-onnx")
     return OnnxPose([path if (path := Path(name)).is_file() else folder / name for name in model.split(",")])
 
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
 
+from tracker.compute.distribution import program_version
 from tracker.errors import FormatError, Remedy
 from tracker.files import write_text_atomic
 from tracker.formats.calibrations.writing import write_layout
@@ -37,7 +38,6 @@ from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions
 from tracker.interchange.exports.provenance import write_provenance
 from tracker.interchange.exports.views import Pictures, exported_cameras
-from tracker.session.store.edit_tree import program_version
 
 CHECKSUMS = "SHA256SUMS"
 """Name of the file that `sha256sum -c` reads."""

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.compute.distribution import program_version
 from tracker.geometry.arrays import Array
 from tracker.interchange.exports.motion import ExportedMotion, frames_text
 from tracker.interchange.exports.options import ExportOptions
 from tracker.interchange.exports.provenance import PoseProvenance, pose_provenance
-from tracker.session.store.edit_tree import program_version
 
 TO_FILL_IN = "TO BE FILLED IN"
 """Value of a field that only the owner knows."""

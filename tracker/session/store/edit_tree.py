@@ -8,10 +8,9 @@ stays in the log but is out of reach.
 import sqlite3
 from collections.abc import Collection
 from datetime import UTC, datetime
-from functools import cache
-from importlib import metadata
 from typing import Any
 
+from tracker.compute.distribution import program_version
 from tracker.errors import SessionError
 from tracker.session.store import rows
 from tracker.session.store.connection import Connection
@@ -200,12 +199,3 @@ def _chain(db: sqlite3.Connection, start: str, onward: str, parameter: int | Non
         (parameter,),
     )
     return [edit for (edit,) in rows]
-
-
-@cache
-def program_version() -> str:
-    """Return the version of the program; "unknown" in a source tree that is not installed."""
-    try:
-        return metadata.version("quadrille")
-    except metadata.PackageNotFoundError:  # run from the source tree without an installation
-        return "unknown"

@@ -72,7 +72,5 @@ def test_a_file_that_was_cut_is_noticed(tmp_path, monkeypatch):
 def test_a_missing_package_is_one_sentence(tmp_path):
     with pytest.raises(FormatError) as caught:
         optional_packages.require("no_such_package", "C3D")
-    assert str(caught.value) == (
-        "expected the package no_such_package to write C3D, found none; "
-        "install it with: pip install 'quadrille[export]'"
-    )
+    assert str(caught.value) == "expected the package no_such_package to write C3D, found none"
+    assert caught.value.remedy == Remedy("install_extra", extra="export")

@@ -181,7 +181,7 @@ def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
         (tmp_path / name).write_bytes(b"x")
         with pytest.raises(FormatError, match=f"needs the package {needed}, which is not installed") as caught:
             read_hdf5_apart(tmp_path / name)
-        assert caught.value.remedy == Remedy("install_import")
+        assert caught.value.remedy == Remedy("install_extra", extra="import")
 
 
 def test_a_library_that_hangs_or_dies(tmp_path, monkeypatch):
