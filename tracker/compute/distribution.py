@@ -2,7 +2,6 @@
 
 import json
 import sys
-from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from itertools import pairwise
@@ -27,29 +26,15 @@ def install_command(extra: str) -> str:
     An installer records itself as INSTALLER (PEP 376), and a clone that it links as direct_url.json (PEP 610). Tools
     that keep programs apart put each into a folder of its own.
     """
-    wanted, folders = f"'{DISTRIBUTION}[{extra}]'", set(pairwise(Path(sys.prefix).parts))
-    if _is_linked():
-        return f"{_pip()} install -e '.[{extra}]' in the folder of the sources"
+    try:
+        installed = metadata.distribution(DISTRIBUTION)
+        tool, origin = installed.read_text("INSTALLER"), installed.read_text("direct_url.json")
+    except metadata.PackageNotFoundError:
+        tool = origin = None
+    pip, wanted = "uv pip" if (tool or "").strip() == "uv" else "pip", f"'{DISTRIBUTION}[{extra}]'"
+    folders = set(pairwise(Path(sys.prefix).parts))
+    if json.loads(origin or "{}").get("dir_info", {}).get("editable"):
+        return f"{pip} install -e '.[{extra}]' in the folder of the sources"
     if ("pipx", "venvs") in folders:
         return f"pipx install --force {wanted}"
-    if ("uv", "tools") in folders:
-        return f"uv tool install {wanted}"
-    return f"{_pip()} install {wanted}"
-
-
-def _record(name: str) -> str:
-    """Return a file that the installer wrote; empty without one."""
-    with suppress(metadata.PackageNotFoundError):
-        return metadata.distribution(DISTRIBUTION).read_text(name) or ""
-    return ""
-
-
-def _pip() -> str:
-    return "uv pip" if _record("INSTALLER").strip() == "uv" else "pip"
-
-
-def _is_linked() -> bool:
-    """Return whether the program is a clone that is linked, not a copy."""
-    with suppress(ValueError, KeyError):
-        return bool(json.loads(_record("direct_url.json"))["dir_info"].get("editable"))
-    return False
+    return f"{'uv tool' if ('uv', 'tools') in folders else pip} install {wanted}"

@@ -24,7 +24,7 @@ OWN = "'quadrille-mocap[export]'"
         ("/home/ann/.local/share/pipx/venvs/quadrille-mocap", "pip", None, f"pipx install --force {OWN}"),
         ("/home/ann/.local/share/uv/tools/quadrille-mocap", "uv", None, f"uv tool install {OWN}"),
         ("/home/ann/.venv", "pip", LINKED, "pip install -e '.[export]' in the folder of the sources"),
-        ("/home/ann/.venv", None, "odd", f"pip install {OWN}"),
+        ("/home/ann/.venv", None, None, f"pip install {OWN}"),
     ],
 )
 def test_an_extra_is_installed_as_the_program_was(monkeypatch, prefix, installer, direct, expected):

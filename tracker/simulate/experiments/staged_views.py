@@ -1,7 +1,7 @@
 """Synthetic evidence: the contours of a posed body, or of a skinned person, in cameras that film nothing else."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -12,18 +12,15 @@ from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.label_image import part_labels
 from tracker.evidence.images.distance_transform import distance_image
 from tracker.evidence.images.silhouette_contour import trace_silhouette
-from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import (
-    DEFAULT_EDGES,
-    EdgeSettings,
     Silhouette,
     ViewEvidence,
     default_theta_px,
     thin_points,
 )
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.geometry.cameras import Camera, Region
+from tracker.geometry.cameras import Camera
 from tracker.simulate.people.skin import Skin
 from tracker.simulate.stage.rasterizer import cast
 
@@ -116,23 +113,10 @@ class StagedObserver(Observer):
         """Return 0 for each view: all pictures are of the time of the frame."""
         return (0.0,) * len(self._cameras)
 
-    def prefetch(
-        self,
-        k: int,
-        regions: Sequence[Region | None] | None = None,
-        with_static_edges: bool = False,
-        edges: EdgeSettings = DEFAULT_EDGES,
-    ) -> None:
+    def prefetch(self, k: int, *_: Any, **__: Any) -> None:
         """Do nothing: there is no footage to decode."""
 
-    def evidence(
-        self,
-        k: int,
-        regions: Sequence[Region | None] | None = None,
-        predicted_px: Sequence[FloatArray | None] | None = None,
-        static_edges: Sequence[StaticEdgeModel] | None = None,
-        edges: EdgeSettings = DEFAULT_EDGES,
-    ) -> tuple[ViewEvidence, ...]:
+    def evidence(self, k: int, *_: Any, **__: Any) -> tuple[ViewEvidence, ...]:
         """Return the evidence of frame k in each view: all contours, whatever is predicted."""
         if self._known[0] != k:
             self._known = (k, tuple(self._view(k, i) for i in range(len(self._cameras))))
