@@ -76,8 +76,7 @@ export class BoardCalibration extends DialogForm {
     const answer = await fetch("sessions/models").catch(() => null);
     const menu = byId("board-dictionary", HTMLSelectElement);
     if (!answer?.ok || menu.length > 1) return;
-    const { dictionaries } = await answer.json();
-    menu.append(...dictionaries.map((/** @type {string} */ name) => new Option(name)));
+    menu.append(...(await answer.json()).dictionaries.map((/** @type {string} */ name) => new Option(name)));
   }
 
   /** Forget the result of other fields. */

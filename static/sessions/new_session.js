@@ -72,7 +72,7 @@ export class NewSession extends DialogForm {
   }
 
   /**
-   * Show the form with a calibration.
+   * Show the form with a calibration that this program has written.
    *
    * @param {string} calibration its file
    * @param {string} up axis that points up
@@ -80,6 +80,7 @@ export class NewSession extends DialogForm {
   showWith(calibration, up) {
     if (!this.dialog.open) this.show();
     this.field("up").value = up;
+    this.field("poses").value = "world-to-camera";
     this.field("calibration").value = calibration;
     this.field("calibration").dispatchEvent(new Event("input", { bubbles: true }));
   }

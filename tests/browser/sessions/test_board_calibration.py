@@ -94,3 +94,4 @@ async def test_a_file_takes_the_place_of_a_description_and_a_failure_can_be_mend
     await page.click("#use-calibration")
     await page.locator("#new-session[open]").wait_for()
     assert await page.input_value("#new-calibration") == CALIBRATED["out"]
+    assert await page.input_value("#new-poses") == "world-to-camera"
