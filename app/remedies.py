@@ -48,7 +48,5 @@ def _sentence(text: object, remedy: Remedy | None, column: int) -> str:
         remedy = remedy or text.remedy
     if remedy is None:
         return str(text)
-    fields = dict(remedy.fields)
-    if "extra" in fields:
-        fields["command"] = install_command(str(fields["extra"]))
+    fields = {k: install_command(str(v)) if k == "extra" else v for k, v in remedy.fields.items()}
     return f"{text}; {phrases()[remedy.code][column].format(**fields)}"

@@ -36,5 +36,5 @@ def install_command(extra: str) -> str:
     if json.loads(origin or "{}").get("dir_info", {}).get("editable"):
         return f"{pip} install -e '.[{extra}]' in the folder of the sources"
     if ("pipx", "venvs") in folders:
-        return f"pipx install --force {wanted}"
+        return f"pipx runpip {DISTRIBUTION} install {wanted}"
     return f"{'uv tool' if ('uv', 'tools') in folders else pip} install {wanted}"

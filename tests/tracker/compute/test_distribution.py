@@ -2,6 +2,7 @@
 
 import json
 from importlib import metadata
+from types import SimpleNamespace
 
 import pytest
 
@@ -21,28 +22,26 @@ OWN = "'quadrille-mocap[export]'"
         ("/usr", "pip\n", None, f"pip install {OWN}"),
         ("/usr", "pip\n", COPIED, f"pip install {OWN}"),
         ("/usr", "uv", None, f"uv pip install {OWN}"),
-        ("/home/ann/.local/share/pipx/venvs/quadrille-mocap", "pip", None, f"pipx install --force {OWN}"),
+        (
+            "/home/ann/.local/share/pipx/venvs/quadrille-mocap",
+            "pip",
+            None,
+            f"pipx runpip quadrille-mocap install {OWN}",
+        ),
         ("/home/ann/.local/share/uv/tools/quadrille-mocap", "uv", None, f"uv tool install {OWN}"),
         ("/home/ann/.venv", "pip", LINKED, "pip install -e '.[export]' in the folder of the sources"),
         ("/home/ann/.venv", None, None, f"pip install {OWN}"),
     ],
 )
 def test_an_extra_is_installed_as_the_program_was(monkeypatch, prefix, installer, direct, expected):
-    class Installed:
-        def read_text(self, name):
-            return {"INSTALLER": installer, "direct_url.json": direct}[name]
-
+    records = {"INSTALLER": installer, "direct_url.json": direct}
     monkeypatch.setattr(distribution.sys, "prefix", prefix)
-    monkeypatch.setattr(metadata, "distribution", lambda name: Installed())
+    monkeypatch.setattr(metadata, "distribution", lambda name: SimpleNamespace(read_text=records.get))
     assert install_command("export") == expected
-    assert command_line_text("found none", Remedy("install_extra", extra="export")) == (
-        f"found none; install it with: {expected}"
-    )
+    said = command_line_text("found none", Remedy("install_extra", extra="export"))
+    assert said == f"found none; install it with: {expected}"
 
 
 def test_a_tree_that_is_not_installed_names_the_distribution(monkeypatch):
-    def missing(name):
-        raise metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(metadata, "distribution", missing)
-    assert install_command("dask").endswith("install 'quadrille-mocap[dask]'")
+    monkeypatch.setattr(distribution, "DISTRIBUTION", "not-there")
+    assert install_command("dask").endswith("install 'not-there[dask]'")

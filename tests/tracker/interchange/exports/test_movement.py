@@ -114,5 +114,5 @@ def test_a_missing_package_leaves_no_dataset(tmp_path, monkeypatch):
     session, _ = store_motion(tmp_path / "s", [MODELS["gavrila22"]], n_frames=2)
     monkeypatch.setattr(optional_packages, "import_module", missing)
     motion, paths = read_motion(session, (0,)), [tmp_path / "a.nc", tmp_path / "b.nc"]
-    with pytest.raises(FormatError, match="expected the package h5netcdf to write netCDF, found none; install it with"):
+    with pytest.raises(FormatError, match="expected the package h5netcdf to write netCDF, found none"):
         write_movement(motion, ExportOptions(), paths, lambda: None)
