@@ -73,7 +73,7 @@ def test_the_site_has_each_document_once():
 def test_nobody_is_told_to_install_the_bare_name():
     """`quadrille` alone is a distribution of somebody else; ours is `quadrille-mocap`."""
     bare = re.compile(r"(?:pipx?|uv tool|uv pip|uvx) (?:install |run |-\S+ )*['\"]?quadrille(?![\w.-])")
-    assert bare.search("pip install 'quadrille[dask]'")
+    assert bare.search(f"pip install '{'quadrille'}[dask]'")
     ends = (".md", ".py", ".toml", ".js", ".html", ".yml", ".cff", "Makefile")
     names = [name for name in (git("ls-files") or "").split() if name.endswith(ends) and name != "tests/test_docs.py"]
     assert [name for name in names if bare.search((ROOT / name).read_text("utf-8"))] == []
