@@ -175,9 +175,10 @@ def _frame_rows(
     """Yield the rows of one frame."""
     quality = found.qualities[person]
     assert quality is not None
-    worst, of_frame = np.nanmax([errors.get(n, np.nan) for n in LIMB_JOINTS]), confidence.frame_features(quality)
-    for limb, own in zip(limbs(model), of_frame, strict=True):
+    worst = np.nanmax([errors.get(n, np.nan) for n in LIMB_JOINTS])
+    for limb, of_limb in zip(limbs(model), quality.limbs, strict=True):
         error = max([errors[n] for n in _joints_of(model, limb.name) if n in errors], default=np.nan)
+        own = confidence.features(quality, of_limb)
         yield own, error, worst, person, found.frame, quality.is_unseen, bool(found.alternatives[person])
 
 

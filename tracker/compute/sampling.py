@@ -1,4 +1,6 @@
-"""Choose some of many items."""
+"""Choose some of many items, or part them."""
+
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,6 +9,12 @@ from numpy.typing import NDArray
 def spread_indices(n: int, most: int) -> NDArray[np.int64]:
     """Return indices of at most so many of n items, evenly spaced from the first to the last, ascending."""
     return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(np.int64))
+
+
+def without_gaps(ascending: Iterable[int]) -> list[NDArray[np.int64]]:
+    """Part whole numbers into stretches of successive ones."""
+    found = np.fromiter(ascending, np.int64)
+    return [part for part in np.split(found, np.flatnonzero(np.diff(found) > 1) + 1) if len(part)]
 
 
 def farthest_first(points: NDArray[np.float64], most: int, least: float = 0.0, fewest: int = 1) -> NDArray[np.int64]:

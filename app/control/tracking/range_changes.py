@@ -7,6 +7,7 @@ import numpy as np
 
 from app.control.session.session_state import SessionState
 from tracker.body.motion.interpolation import interpolate_pose
+from tracker.compute.sampling import without_gaps
 from tracker.estimation.posing.dof_series import move_dofs, smooth_dofs
 from tracker.geometry.arrays import Array
 from tracker.pipeline.seen_points import without_moved
@@ -70,7 +71,7 @@ def edited(
     source = "smoothed" if verb == "smooth" else "manual"
     own = session_state.free_sources(person, source, [model.dof_names[d] for d in dofs])
     changes = []
-    for stretch in np.split([*records], np.flatnonzero(np.diff([*records]) > 1) + 1) if records else ():
+    for stretch in without_gaps(records):
         old = [records[frame] for frame in stretch]
         before = np.stack([saver.revisions.in_present_body(person, r.values, r.model_revision) for r in old])
         if verb == "smooth":

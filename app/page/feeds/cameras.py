@@ -1,6 +1,6 @@
 """Updates for the inspector of a page on the cameras: the check of the calibration, and the clocks."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from app.messages.base import made_of
 from app.messages.cameras import CalibrationMessage, CameraCheck, CameraClock, ClocksMessage, ComparedMoment, FoundClock
 from app.state.calibration import CalibrationState, ClocksState
 from tracker.calibration.check.findings import CameraFinding
+from tracker.compute.sampling import without_gaps
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_correction import KINDS, in_units
 from tracker.pipeline.calibration_check import CalibrationCheck
@@ -49,11 +50,9 @@ def clocks(session: Session, found: ClocksState) -> ClocksMessage:
     return made_of(ClocksMessage, found, cameras=cameras, moment=moment)
 
 
-def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:
+def _intervals(frames: Iterable[int]) -> tuple[tuple[int, int], ...]:
     """Return the first and last frames of the intervals that frames, ascending, make up."""
-    found = np.asarray(frames, dtype=int)
-    parts = np.split(found, np.flatnonzero(np.diff(found) > 1) + 1)
-    return tuple((int(part[0]), int(part[-1])) for part in parts if len(part))
+    return tuple((int(part[0]), int(part[-1])) for part in without_gaps(frames))
 
 
 def _camera(found: CameraFinding, check: CalibrationCheck) -> CameraCheck:

@@ -15,6 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from tracker.compute.quantiles import known_median
+from tracker.compute.sampling import without_gaps
 from tracker.geometry.arrays import TINY, Array, IntArray, Mask
 
 Bones: TypeAlias = Sequence[tuple[Sequence[int], Sequence[int]]]
@@ -99,7 +100,7 @@ def _cut(a: PersonPath, b: PersonPath, near_m: float, begins: tuple[Mask, Mask],
         marks[at[near]] = True
     exchanged = np.full(len(common), np.inf)  # how far an exchange on the way to each frame moves them
     exchanged[1:] = np.where(np.diff(common) == 1, _apart(A[1:], B[:-1]) + _apart(B[1:], A[:-1]), np.inf)
-    for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else ():
+    for run in without_gaps(near):
         ways = np.arange(run[0], min(run[-1] + 2, len(common)))
         best = ways[np.argmin(np.nan_to_num(exchanged[ways], nan=np.inf))]
         if np.isfinite(exchanged[best]):

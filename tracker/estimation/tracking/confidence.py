@@ -171,11 +171,6 @@ def probabilities(log_odds: Array) -> Array:
     return np.asarray(1.0 / (1.0 + np.exp(-log_odds)))
 
 
-def frame_features(pose: PoseQuality) -> Array:
-    """Return the `features` of all limbs, (n_limbs, 8)."""
-    return np.array([features(pose, limb) for limb in pose.limbs])
-
-
 @lru_cache(maxsize=8)  # used several times for each frame
 def _log_odds(found: PoseQuality) -> Array:
     odds = np.array([STATUS_MODEL.weights @ features(found, x) + STATUS_MODEL.lost for x in found.limbs])

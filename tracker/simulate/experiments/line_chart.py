@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.geometry.arrays import Array, IntArray
+from tracker.compute.sampling import without_gaps
+from tracker.geometry.arrays import Array
 
 _SIZE, _MARGIN = (760, 260), (56, 14, 26, 40)
 """Width and height of a chart without its legend, and its margins left, right, top and bottom."""
@@ -66,7 +67,7 @@ def line_chart(title: str, x: Array, lines: Sequence[Line], x_label: str, y_labe
         )
     for i, line in enumerate(lines):
         color, dash = _COLORS[i % len(_COLORS)], ' stroke-dasharray="5 3"' if line.dashed else ""
-        for run in _runs(line.values):
+        for run in without_gaps(np.flatnonzero(np.isfinite(line.values))):
             points = " ".join(f"{u(float(x[k])):.1f},{v(float(line.values[k])):.1f}" for k in run)
             out.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="1.6"{dash}/>')
         at, y = left + i % _COLUMNS * (width - left - right) // _COLUMNS, _MARGIN[2] + _ROW * (i // _COLUMNS)
@@ -85,9 +86,3 @@ def _ticks(low: float, high: float) -> list[float]:
     step = 10.0 ** np.floor(np.log10((high - low) / _TICKS))
     step *= next(f for f in (1, 2, 5, 10) if (high - low) / (step * f) <= _TICKS + 1)
     return [round(float(t), 10) for t in np.arange(np.ceil(low / step) * step, high + 1e-9, step)]
-
-
-def _runs(values: Array) -> list[IntArray]:
-    """Return the indices of the stretches without gaps."""
-    at = np.flatnonzero(np.isfinite(values))
-    return [run for run in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1) if len(run)]
