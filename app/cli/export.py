@@ -17,7 +17,7 @@ from tracker.interchange.exports.export_format import ExportFormat
 from tracker.interchange.exports.formats import FORMATS, OPTIONS, find_format
 
 if TYPE_CHECKING:
-    from tracker.interchange.exports.dataset_card import RecordingSummary
+    from tracker.interchange.exports.datasets.card import RecordingSummary
     from tracker.interchange.exports.motion import Checked, ExportedMotion
 
 _FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.own.values())
@@ -60,6 +60,8 @@ class ExportArguments:
     """coco, dataset: the 17 keypoints of people, all points of the body, or both, which is the default."""
     pixels: Annotated[Literal["original", "undistorted"] | None, _choice("original|undistorted")] = None
     """openpose, masks, dataset: of the footage (default), or without distortion, with such pictures and cameras."""
+    mesh: Annotated[Literal["ply", "obj", "stl", "glb"] | None, _choice("ply|obj|stl|glb")] = None
+    """meshes, hulls: format of the files, by default ply."""
     split: Names = ()
     """dataset: shares of train, validation and test, such as 70:15:15; NAME=test for a recording; by default train."""
     distinct_people: bool = False
@@ -126,9 +128,9 @@ def _only(arguments: ExportArguments) -> "Checked | None":
 
 def _export_dataset(arguments: ExportArguments) -> None:
     """Write a dataset of several sessions, or of one with a split."""
-    from tracker.interchange.exports.dataset import export_dataset, plan_dataset
-    from tracker.interchange.exports.dataset_labels import DatasetRecording
-    from tracker.interchange.exports.dataset_splits import parse_splits, recording_names
+    from tracker.interchange.exports.datasets.dataset import export_dataset, plan_dataset
+    from tracker.interchange.exports.datasets.labels import DatasetRecording
+    from tracker.interchange.exports.datasets.splits import parse_splits, recording_names
     from tracker.interchange.exports.export_files import check_options
     from tracker.interchange.exports.motion import read_motion
     from tracker.session.frame_list import parse_frame_list
@@ -162,7 +164,7 @@ def _export_dataset(arguments: ExportArguments) -> None:
 def _dataset_summary(
     out: Path, sessions: Sequence[Path], summaries: "Sequence[RecordingSummary]", splits: Mapping[str, Sequence[str]]
 ) -> dict[str, Any]:
-    from tracker.interchange.exports.dataset_card import shared_people
+    from tracker.interchange.exports.datasets.card import shared_people
 
     split_of = {name: split for split, names in splits.items() for name in names}
     return {

@@ -15,6 +15,7 @@ from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
+from tracker.footage.animation_writer import AnimationWriter
 from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image
@@ -41,7 +42,7 @@ def write_overlay_video(
         motion: the poses; people who are not exported occlude, but are not drawn.
         options: `view` names one camera; without it, all views are tiles of a grid. `character` is a body that moves as
             the people do, beside each view.
-        path: the file.
+        path: the file, whose end names its kind.
         tick: called after each frame.
 
     Raises:
@@ -58,7 +59,11 @@ def write_overlay_video(
     even = (size[0] + size[0] % 2, size[1] + size[1] % 2)  # as H.264 requires
     with ExitStack() as stack:
         recording = stack.enter_context(Recording(session.cameras, indices=footage_indices()))
-        writer = stack.enter_context(VideoWriter(path, even, session.fps, motion.calibration_note))
+        writer = stack.enter_context(
+            VideoWriter(path, even, session.fps, motion.calibration_note)
+            if path.suffix == ".mp4"
+            else AnimationWriter(path, session.fps)
+        )
         for frame in motion.frames:
             picture = np.zeros((even[1], even[0], 3), np.uint8)
             drawn = drawn_paths(motion, frame, shown)

@@ -1,4 +1,4 @@
-"""The overlay video among the formats of `quadrille export`, by an entry point of `pyproject.toml`."""
+"""The overlay videos among the formats of `quadrille export`, by entry points of `pyproject.toml`."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,7 +17,14 @@ def _write(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[P
     write_overlay_video(motion, options, paths[0], tick)
 
 
-MP4 = ExportFormat(
-    "mp4", "overlay video (MP4)", (".mp4",), _write, frozenset(("view", "character")), gaps="shown without a body"
+def _overlay(name: str, title: str) -> ExportFormat:
+    options = frozenset(("view", "character"))
+    return ExportFormat(name, title, (f".{name}",), _write, options, gaps="shown without a body")
+
+
+MP4, GIF, WEBP = (
+    _overlay("mp4", "overlay video (MP4)"),
+    _overlay("gif", "overlay animation (GIF)"),
+    _overlay("webp", "overlay animation (WebP)"),
 )
-"""Overlay video, drawn as in the page."""
+"""Overlay videos, drawn as in the page."""

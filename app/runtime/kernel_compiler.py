@@ -10,7 +10,7 @@ from contextlib import suppress
 from tracker.compute.interpretation import interpret_modules
 from tracker.compute.kernel_cache import STAGES, compiled_stages, is_compiled
 
-COMMAND = (sys.executable, "-m", "app.bench.compile_kernels", "--background")
+COMMAND = (sys.executable, "-P", "-m", "app.bench.compile_kernels", "--background")
 _POSING = "posing"
 
 

@@ -1,14 +1,13 @@
 """Serve the page of a session from another program, such as a notebook, in a thread."""
 
-import io
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
+import imageio.v3 as iio
 import numpy as np
-from PIL import Image as PillowImage
 
 from app.export.overlay_video import draw_people
 from tracker.errors import TrackerError
@@ -92,9 +91,7 @@ class ServedPage:
 
     def png(self, camera: str) -> bytes:
         """Return `picture` as a PNG file, which a notebook shows."""
-        out = io.BytesIO()
-        PillowImage.fromarray(self.picture(camera)).save(out, "PNG")
-        return out.getvalue()
+        return bytes(iio.imwrite("<bytes>", self.picture(camera), extension=".png"))
 
     @property
     def _open(self) -> "Controller":

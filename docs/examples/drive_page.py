@@ -3,12 +3,12 @@
 import sys
 from pathlib import Path
 
-from app.server.notebook import serve
+import quadrille
 
 
 def main(folder: str, out: str) -> None:
     """Raise an arm of the first person, and save the picture of the first camera."""
-    with serve(folder) as page:
+    with quadrille.serve(folder) as page:
         print(f"the page is at {page.address}")
         session = page.session
         person = session.people[0]

@@ -5,14 +5,14 @@ import sys
 import cv2
 import numpy as np
 
-import tracker
+import quadrille
 
 WIDTH, HEIGHT = 800, 300
 
 
 def main(folder: str, joint: str, out: str) -> None:
     """Draw the height of a joint over the frames of a session of one person."""
-    poses = tracker.read_poses(folder)
+    poses = quadrille.read_poses(folder)
     height_m, error_m = poses.joint(joint)[:, 2], np.nan_to_num(poses.errors_m(joint))
     low, high = (height_m - error_m).min(), (height_m + error_m).max() + 1e-6
     x = np.interp(poses.times_s, [poses.times_s[0], poses.times_s[-1] + 1e-6], [20, WIDTH - 20])

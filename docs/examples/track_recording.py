@@ -2,16 +2,16 @@
 
 import sys
 
-import tracker
+import quadrille
 
 
 def main(folder: str, out: str) -> None:
     """Track a session and write its joints as TRC."""
-    found = tracker.find(folder)
+    found = quadrille.find(folder)
     print(*found.sentences, sep="\n")
-    done = tracker.track(folder, acquire_sizes=True, progress=lambda stage, share: None)
+    done = quadrille.track(folder, acquire_sizes=True, progress=lambda stage, share: None)
     print(f"{done.frames} frames tracked from frame {done.first_frame}: {done.statuses}")
-    tracker.export(folder, out, overwrite=True)
+    quadrille.export(folder, out, overwrite=True)
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ from command_line import SAMPLE
 from fake_tracker import FakeTracker
 from gestures import drag_on, wait_for
 
-from app import __main__
 from app.control.controller import Controller
+from app.main import main
 from app.session.frame_cache import FrameCache
 from app.storage.saver import Saver
 from tracker.estimation.fitting.gauss_newton import fit_to_points
@@ -64,7 +64,7 @@ def run(monkeypatch, capsys, tmp_path):
         monkeypatch.setattr(sys, "argv", ["quadrille", *map(str, words)])
         capsys.readouterr()
         try:
-            __main__.main()
+            main()
             status = 0
         except SystemExit as end:
             status = end.code or 0

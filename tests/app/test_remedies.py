@@ -11,7 +11,7 @@ from app.remedies import Phrases, command_line_text, page_text, phrases
 from tracker.errors import Remedy, SessionError, TrackerError
 
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
-OF_THE_COMMAND_LINE = ("app.cli", "app.bench", "app.__main__", "app.remedies")
+OF_THE_COMMAND_LINE = ("app.cli", "app.bench", "app.main", "app.remedies")
 OF_THE_START = {
     "app.server.access",  # options of `open`, checked before there is a page
     "app.server.address",

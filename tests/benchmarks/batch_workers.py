@@ -21,7 +21,7 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-import tracker
+import quadrille
 from tracker.evaluation.references import read_joints
 from tracker.pipeline.given_pose import set_pose_at_joints
 
@@ -79,7 +79,7 @@ def run(source: Path, n_workers: int, cores: set[int], words: argparse.Namespace
             f'frames = "0:{words.frames}"}}'
         )
         began, busy, used = time.monotonic(), busy_s(), used_s()
-        command = [sys.executable, "-m", "app", "batch", str(lab / "plan.toml"), "--workers", str(n_workers)]
+        command = [sys.executable, "-m", "quadrille", "batch", str(lab / "plan.toml"), "--workers", str(n_workers)]
         subprocess.run(
             command,
             check=True,
@@ -102,7 +102,7 @@ def main() -> None:
     data = words.data.resolve() / words.recording
     with tempfile.TemporaryDirectory() as name:
         source = Path(name) / "session"
-        session = tracker.new_session(
+        session = quadrille.new_session(
             source, sorted(data.glob("*.mp4")), data / "Calib.toml", background=data / "background"
         )
         set_pose_at_joints(session, 0, 0, read_joints(data / "ground_truth.trc", session.fps), fit_sizes=False)

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from looped_footage import forth_and_back, write_all
 
-import tracker
+import quadrille
 from tracker.batch.claims import read_holder
 from tracker.batch.manifest import Manifest
 from tracker.formats.trc import read_trc, write_trc
 
-PROGRAM = [sys.executable, "-m", "app"]
+PROGRAM = [sys.executable, "-m", "quadrille"]
 LOOK_S = 0.5
 NEAR = 15
 """Frames beside a seam that count as near it."""
@@ -122,10 +122,10 @@ def report(manifest: Manifest, memory: dict[str, tuple[float, float]]) -> None:
 
 def errors(session: Path, truth: Path, seams: list[int]) -> dict[str, Any]:
     """Return the mean error of the limb joints, mm: of all frames, at seams, near them; and the step across seams."""
-    known = tracker.evaluate(session, truth)
+    known = quadrille.evaluate(session, truth)
     by_frame = {f.frame: f.mean_mm for f in known.per_frame}
     near = {k for s in seams for k in range(s - NEAR, s + NEAR)}
-    poses = tracker.read_poses(session)
+    poses = quadrille.read_poses(session)
     steps = 1000 * np.linalg.norm(np.diff(poses.joints, axis=0), axis=2).max(axis=1)
     at = [int(np.flatnonzero(poses.frames == s)[0]) - 1 for s in seams]
     return {
@@ -153,7 +153,7 @@ def main() -> None:
         files = write_all(sorted(source.glob("*.mp4")), folder / "footage", words.frames)
         session = folder / "session"
         if not session.exists():
-            tracker.new_session(session, files, source / "Calib.toml", background=source / "background")
+            quadrille.new_session(session, files, source / "Calib.toml", background=source / "background")
         plan = folder / "plan.toml"
         plan.write_text(
             f'sessions = ["session"]\nsettings = {{frames = "0:{words.frames}", stretch = {words.stretch}, '
@@ -178,7 +178,7 @@ def main() -> None:
         store = (session / "annotations.sqlite").stat().st_size
         print(f"store: {store / 1e6:.0f} MB, {store / words.frames:.0f} bytes a frame")
         truth = folder / "truth.trc"
-        fps = tracker.open_session(session).fps
+        fps = quadrille.open_session(session).fps
         long_reference(source / "ground_truth.trc", truth, words.frames, fps)
         for title, value in errors(session, truth, [s.frame for s in result.seams]).items():
             print(f"{title}: {value}")

@@ -15,7 +15,7 @@ from command_line import SAMPLE
 from installed_packages import install
 from stored_motions import store_motion
 
-import tracker
+import quadrille
 from tracker.compute.extensions import GROUPS
 from tracker.evaluation.references import read_joints
 from tracker.pipeline.given_pose import set_pose_at_joints
@@ -35,7 +35,7 @@ def run(*words, path=()):
 def sample(tmp_path):
     """A copy of the bundled sample with a pose on its first frame."""
     folder = shutil.copytree(SAMPLE, tmp_path / "sample")
-    session = tracker.open_session(folder)
+    session = quadrille.open_session(folder)
     set_pose_at_joints(session, 0, 0, read_joints(SAMPLE / "truth.trc", session.fps), fit_sizes=False)
     return folder
 
@@ -76,10 +76,10 @@ def test_poses_are_drawn(tmp_path):
 
 @pytest.mark.slow
 def test_the_page_is_driven_from_a_program(sample, tmp_path):
-    before = tracker.read_poses(sample).joint("left_elbow")[0]
+    before = quadrille.read_poses(sample).joint("left_elbow")[0]
     out = run(EXAMPLES / "drive_page.py", sample, tmp_path / "a.png")
     assert "http://127.0.0.1:" in out or "http://localhost:" in out
-    poses = tracker.read_poses(sample)
+    poses = quadrille.read_poses(sample)
     assert poses.keyframes[0]
     assert abs(poses.joint("left_elbow")[0] - before).max() > 0.02
     assert cv2.imread(str(tmp_path / "a.png")).shape[2] == 3
@@ -88,8 +88,8 @@ def test_the_page_is_driven_from_a_program(sample, tmp_path):
 @pytest.mark.slow
 def test_a_strangers_metric_and_exporter_are_in_help_results_and_menu(packages, tmp_path):
     session, _ = store_motion(tmp_path / "s", [MODELS["gavrila38"]], n_frames=5)
-    tracker.export(session, tmp_path / "truth.trc")
-    app = ("-m", "app")
+    quadrille.export(session, tmp_path / "truth.trc")
+    app = ("-m", "quadrille")
     assert "roots: positions of the roots" in " ".join(run(*app, "export", "--help", path=[packages]).split())
     assert "jerk: mean jerk" in run(*app, "evaluate", "--help", path=[packages])
     out = run(*app, "evaluate", session.folder, "--reference", tmp_path / "truth.trc", path=[packages])
@@ -106,7 +106,7 @@ def test_packages_that_break_a_program_are_lines_of_the_doctor(tmp_path):
     points = "".join(f"[{group}]\nodd = odd:thing\n" for group in GROUPS)
     install(tmp_path, "odd", "print('odd text')\nraise SystemExit(3)", points)
     install(tmp_path, "broken", "", "[a]\nno equals sign\n")
-    found = {f["name"]: f for f in json.loads(run("-m", "app", "doctor", "--json", path=[tmp_path]))["findings"]}
+    found = {f["name"]: f for f in json.loads(run("-m", "quadrille", "doctor", "--json", path=[tmp_path]))["findings"]}
     odd = [found[f"{group.removeprefix('quadrille.')} odd"] for group in GROUPS]
     assert {(f["state"], f["text"]) for f in odd} == {("warning", "of odd 1.0: SystemExit: 3")}
     assert found["entry points"]["text"].startswith("those of broken 1.0 cannot be read: TypeError")
@@ -118,7 +118,7 @@ def test_a_command_loads_no_extension_that_it_does_not_use(tmp_path):
     install(tmp_path, "odd", "print('odd text')\nraise SystemExit(3)", points)
     install(tmp_path, "broken", "", "[a]\nno equals sign\n")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    words = [sys.executable, "-m", "app", "info", str(SAMPLE), "--json"]
+    words = [sys.executable, "-m", "quadrille", "info", str(SAMPLE), "--json"]
     done = subprocess.run(words, capture_output=True, text=True, env=environment)
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["frames"] == 50
@@ -127,7 +127,7 @@ def test_a_command_loads_no_extension_that_it_does_not_use(tmp_path):
 def test_an_extension_that_fails_is_left_out_and_named(packages, tmp_path):
     (packages / "jerk_metric.py").write_text("raise ValueError('of another age')")
     environment = {**os.environ, "PYTHONPATH": str(packages)}
-    words = [sys.executable, "-m", "app", "evaluate", "--help"]
+    words = [sys.executable, "-m", "quadrille", "evaluate", "--help"]
     done = subprocess.run(words, capture_output=True, text=True, env=environment)
     assert done.returncode == 0
     assert "'jerk' of jerk-metric 1.0 is left out: ValueError: of another age" in done.stderr

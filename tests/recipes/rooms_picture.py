@@ -21,7 +21,7 @@ HOUSE = {
         ["widgets", "starting", "share"],
     ],
     "app/  the viewer": [
-        ["__main__"],
+        ["main"],
         ["cli/calibration", "cli/observations"],
         ["cli/annotation", "cli/batches"],
         ["cli", "share"],
@@ -48,7 +48,7 @@ HOUSE = {
         ["calibration/self_calibration"],
         ["calibration/boards"],
         ["calibration/check"],
-        ["interchange/exports/like"],
+        ["interchange/exports/like", "interchange/exports/datasets"],
         ["interchange/exports", "interchange/plausibility", "interchange/detection"],
         ["interchange/observations"],
         ["estimation/posing", "estimation/initialization"],

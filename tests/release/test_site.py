@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-import tracker
+import quadrille
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,7 +47,7 @@ def test_each_document_is_a_page(site):
 
 def test_the_reference_has_each_name_of_the_library(site):
     text = (site / "reference.html").read_text("utf-8")
-    assert [name for name in tracker.__all__ if f'id="tracker.{name}"' not in text] == []
+    assert [name for name in quadrille.__all__ if f'id="quadrille.{name}"' not in text] == []
     assert "SessionError" in text  # the errors that a function raises
 
 

@@ -35,7 +35,7 @@ FOLDERS = {"app": "app", "tracker": "tracker", "static": "app/static", "sample_s
 DOCUMENTS = {"README.md", "CHANGELOG.md", "LICENSE", "SECURITY.md", "CITATION.cff"}
 EVERY_HELP = """
 import sys
-from app.__main__ import _COMMANDS, main
+from app.main import _COMMANDS, main
 assert len(_COMMANDS) > 20
 for name in _COMMANDS:
     sys.argv = ["quadrille", name, "--help"]

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-import tracker
+import quadrille
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.evaluation.references import read_joints
 from tracker.pipeline.given_pose import set_pose_at_joints
 
 pytestmark = pytest.mark.slow
-QUADRILLE = [sys.executable, "-m", "app"]
+QUADRILLE = [sys.executable, "-m", "quadrille"]
 PLAN = """
 sessions = ["r*"]
 settings = {acquire = false, frames = "0:4", export = ["csv"], options = {whole_run = false}}
@@ -33,7 +33,7 @@ def recordings(tmp_path_factory):
     """
     folder = tmp_path_factory.mktemp("batch")
     first = shutil.copytree(SAMPLE, folder / "r00")
-    session = tracker.open_session(first)
+    session = quadrille.open_session(first)
     set_pose_at_joints(session, 0, 0, read_joints(SAMPLE / "truth.trc", session.fps), fit_sizes=False)
     for i in range(1, 12):
         shutil.copytree(first, folder / f"r{i:02d}")
@@ -59,7 +59,7 @@ def batch(lab, *words):
 def poses_of(lab):
     """Joints of each recording that was tracked."""
     folders = [folder for folder in sorted(lab.glob("r*")) if folder.name not in ("r03", "r07")]
-    return {folder.name: tracker.read_poses(folder).joints for folder in folders}
+    return {folder.name: quadrille.read_poses(folder).joints for folder in folders}
 
 
 @pytest.fixture(scope="module")

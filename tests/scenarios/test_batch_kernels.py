@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 from command_line import SAMPLE
 
-import tracker
+import quadrille
 from tracker.evaluation.references import read_joints
 from tracker.pipeline.given_pose import set_pose_at_joints
 from tracker.session.session import save_session
@@ -26,9 +26,9 @@ settings = {acquire = false, frames = "0:2", options = {whole_run = false}}
 @pytest.fixture
 def lab(tmp_path):
     """Two hundred sessions of the same footage with a first pose."""
-    session = tracker.open_session(SAMPLE)
+    session = quadrille.open_session(SAMPLE)
     save_session(replace(session, folder=tmp_path / "r000"))  # with absolute paths of its footage
-    first = tracker.open_session(tmp_path / "r000")
+    first = quadrille.open_session(tmp_path / "r000")
     set_pose_at_joints(first, 0, 0, read_joints(SAMPLE / "truth.trc", first.fps), fit_sizes=False)
     for i in range(1, N_TASKS):
         shutil.copytree(tmp_path / "r000", tmp_path / f"r{i:03d}")
@@ -44,7 +44,7 @@ def compiled(cache):
 def test_two_hundred_short_tasks_compile_each_kernel_once(lab, tmp_path):
     cache = tmp_path / "kernels"
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    words = [sys.executable, "-m", "app", "batch", str(lab / "plan.toml"), "--workers", "2", "--json"]
+    words = [sys.executable, "-m", "quadrille", "batch", str(lab / "plan.toml"), "--workers", "2", "--json"]
     done = subprocess.run(words, capture_output=True, text=True, env=environment)
     report = json.loads(done.stdout)
     assert report["totals"]["done"] == N_TASKS

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-import tracker
+import quadrille
 from tracker.batch.manifest import Manifest
 from tracker.batch.plan import read_plan
 from tracker.evaluation.references import read_joints
@@ -37,7 +37,7 @@ def recordings(tmp_path_factory):
     """Eleven copies of the bundled sample with a first pose, and one with keyframes that is cut into stretches."""
     folder = tmp_path_factory.mktemp("batch")
     for name, frames in (("r00", (0,)), ("long", LONG)):
-        session = tracker.open_session(shutil.copytree(SAMPLE, folder / name))
+        session = quadrille.open_session(shutil.copytree(SAMPLE, folder / name))
         for frame in frames:
             joints = read_joints(SAMPLE / "truth.trc", session.fps)
             set_pose_at_joints(session, 0, frame, joints, fit_sizes=False)
@@ -54,13 +54,13 @@ def lab_of(recordings, folder):
 
 
 def start(lab):
-    words = [sys.executable, "-m", "app", "batch", str(lab / "plan.toml"), "--out", str(lab / "out"), "--work"]
+    words = [sys.executable, "-m", "quadrille", "batch", str(lab / "plan.toml"), "--out", str(lab / "out"), "--work"]
     log = (lab / "log.txt").open("ab")
     return subprocess.Popen(words, stdout=log, stderr=log, env={**os.environ, "QUADRILLE_THREADS": "1"})
 
 
 def poses_of(lab):
-    return {folder.name: tracker.read_poses(folder).joints for folder in [*sorted(lab.glob("r*")), lab / "long"]}
+    return {folder.name: quadrille.read_poses(folder).joints for folder in [*sorted(lab.glob("r*")), lab / "long"]}
 
 
 def finish(lab, manifest, n_kills, life_s):

@@ -36,7 +36,7 @@ def quadrille(folder, *words):
     program = [
         sys.executable,
         "-c",
-        f"import sys; sys.path.insert(0, {str(ROOT)!r}); from app.__main__ import main; main()",
+        f"import sys; sys.path.insert(0, {str(ROOT)!r}); from app.main import main; main()",
     ]
     done = subprocess.run([*program, *words], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -44,7 +44,7 @@ APART_PX = 6.0
 
 def quadrille(*words):
     done = subprocess.run(
-        [sys.executable, "-m", "app", *map(str, words)],
+        [sys.executable, "-m", "quadrille", *map(str, words)],
         cwd=ROOT, capture_output=True, text=True, env={**os.environ, "QUADRILLE_ANNOTATOR": "Anna"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

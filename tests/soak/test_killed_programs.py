@@ -104,7 +104,12 @@ async def test_edits_shown_as_saved_survive_sigkill(tmp_path, cases, report):
 
 def command(*words, **more):
     return subprocess.run(
-        [sys.executable, "-m", "app", *map(str, words)], cwd=ROOT, capture_output=True, text=True, timeout=120, **more
+        [sys.executable, "-m", "quadrille", *map(str, words)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        **more,
     )
 
 

@@ -75,7 +75,7 @@ def story(draw: random.Random, session: Path, out: Path) -> Iterator[Words]:
 
 def done(words: Words) -> str:
     """Run a command; return what is wrong with its end, "" if nothing is."""
-    line = [sys.executable, "-m", "app", *map(str, words)]
+    line = [sys.executable, "-m", "quadrille", *map(str, words)]
     ended = subprocess.run(line, capture_output=True, text=True, timeout=1200, check=False)
     last = ended.stderr.strip().splitlines()[-1:]
     is_said = ended.returncode == 1 and bool(last) and last[0].startswith("quadrille: ")

@@ -46,6 +46,7 @@ ROOMS = [
     "tracker.interchange.detection",
     "tracker.interchange.plausibility",
     "tracker.interchange.exports",
+    "tracker.interchange.exports.datasets",
     "tracker.interchange.exports.like",
     "tracker.calibration",
     "tracker.calibration.check",
@@ -90,7 +91,8 @@ ROOMS = [
     "app.cli.observations",
     "app.cli.batches",
     "app.cli.annotation",
-    "app.__main__",
+    "app.main",
+    "quadrille",
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}
 ONLY_ROOMS = {"tracker.estimation", "tracker.interchange", "tracker.calibration"}
@@ -103,7 +105,7 @@ OF_THE_SCREEN = {"app", "viser", "aiohttp", "tyro", "webbrowser", "asyncio"}
 def module_files():
     """Path of every module of the project by its dotted name."""
     files = {}
-    for package in ("tracker", "app"):
+    for package in ("tracker", "app", "quadrille"):
         for path in sorted((ROOT / package).rglob("*.py")):
             files[".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")] = path
     return files

@@ -6,7 +6,7 @@ import numpy as np
 from fake_detector import FakeDetector
 from observed_people import seen, true_motion
 
-from app.__main__ import main
+from app.main import main
 from tracker.footage.recording import Recording
 from tracker.interchange.detection.detector import Detector, DetectorKind
 from tracker.interchange.detection.detectors import DETECTORS

@@ -24,7 +24,7 @@ class Program:
         hears_errors: bool = False,
         has_token: bool = False,
         log: Path | None = None,
-        main: tuple[str, ...] = ("-m", "app"),
+        main: tuple[str, ...] = ("-m", "quadrille"),
     ) -> None:
         """Prepare it.
 

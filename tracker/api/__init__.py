@@ -1,4 +1,4 @@
-"""The library for other programs: ten functions, which `import tracker` offers, and the arrays that they return.
+"""The library for other programs: functions that `import quadrille` offers, and the arrays that they return.
 
 Imports all rooms of the tracker; none imports it. docs/library.md describes it.
 """

@@ -20,5 +20,6 @@ __all__ = [
     "robust_triangulation",
     "segment_distance",
     "shapes",
+    "surface_nets",
     "triangulation",
 ]

@@ -36,7 +36,17 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
     progress.say(f"{n_open} recordings, {n} {'worker' if n == 1 else 'workers'}")
     compile_kernels(progress)
     environment = {**os.environ, "QUADRILLE_THREADS": str(max(1, n_cores() // n))}
-    words = [sys.executable, "-m", "app", "batch", str(manifest.folder), "--out", str(manifest.folder), "--work"]
+    words = [
+        sys.executable,
+        "-P",
+        "-m",
+        "quadrille",
+        "batch",
+        str(manifest.folder),
+        "--out",
+        str(manifest.folder),
+        "--work",
+    ]
     logs = manifest.folder / "logs"
     logs.mkdir(exist_ok=True)
     workers = list[subprocess.Popen[bytes]]()
@@ -97,7 +107,7 @@ def compile_kernels(progress: Reporter) -> None:
 
     if not is_compiled():
         progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
-        subprocess.run([sys.executable, "-m", "app.bench.compile_kernels"], check=False)
+        subprocess.run([sys.executable, "-P", "-m", "app.bench.compile_kernels"], check=False)
 
 
 def _watch(manifest: Manifest, workers: list[subprocess.Popen[bytes]], progress: Reporter) -> None:

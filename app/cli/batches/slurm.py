@@ -23,7 +23,7 @@ _COMPILE = """#!/bin/sh
 #SBATCH --job-name={name}-kernels
 # Before the array: compiles the kernels into the folder that all its jobs use.
 export NUMBA_CACHE_DIR={kernels}
-exec {python} -m app.bench.compile_kernels
+exec {python} -P -m app.bench.compile_kernels
 """
 _MERGE = """#!/bin/sh
 #SBATCH --job-name={name}-table
@@ -49,7 +49,7 @@ def write_scripts(manifest: Manifest, plan: Path) -> str:
         "plan": shlex.quote(str(plan)),
         "kernels": shlex.quote(str(folder / "kernels")),
         "python": shlex.quote(sys.executable),
-        "command": f"{shlex.quote(sys.executable)} -m app",
+        "command": f"{shlex.quote(sys.executable)} -P -m quadrille",
     }
     for name, text in (("kernels.sh", _COMPILE), ("array.sh", _ARRAY), ("merge.sh", _MERGE)):
         write_text_atomic(folder / name, text.format(**values), mode=0o755)

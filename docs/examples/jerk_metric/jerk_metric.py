@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tracker.evaluation.metric import ComparedJoints, Metric
+from quadrille import ComparedJoints, Metric
 
 
 def jerk(joints: ComparedJoints) -> float:

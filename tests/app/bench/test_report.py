@@ -9,12 +9,12 @@ import pytest
 from command_line import SAMPLE
 from rich.console import Console
 
-from app.__main__ import main
 from app.bench import acquisition_rows, calibration_rows, contour_rows, diagnosis_rows, report, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.opencv_oracle import PaintedCost
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import read_crowd, read_frame
+from app.main import main
 from tracker.errors import TrackerError
 from tracker.session.assemble import DEFAULT_MODEL
 

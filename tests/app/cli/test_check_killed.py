@@ -24,7 +24,7 @@ CHILD = textwrap.dedent("""
     from contextlib import contextmanager
     from types import SimpleNamespace
     import numpy as np
-    from app.__main__ import main
+    from app.main import main
     from tracker.pipeline import calibration_check, posed_recording
     from tracker.session.store.connection import Connection
 

@@ -14,7 +14,7 @@ OF_OTHER_FORMATS = {"ezc3d", "xarray", "h5netcdf", "h5py", "pynwb", "ndx_pose", 
 """Packages that only some formats of exports need."""
 RUN = """
 import sys
-from app.__main__ import main
+from app.main import main
 
 sys.argv = ["quadrille", *sys.argv[1:]]
 main()

@@ -6,8 +6,8 @@ import pytest
 import tyro
 from command_line import assert_refused
 
-from app.__main__ import _COMMANDS
 from app.cli.arguments import gather_repeated, parse_common_or_pairs, parse_pairs, repeatable
+from app.main import _COMMANDS
 from tracker.errors import TrackerError
 
 

@@ -258,7 +258,7 @@ def test_a_busy_port(session):
     """In a process of its own, as it comes: nothing but the sentence, and no lock left behind."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-        words = [sys.executable, "-m", "app", "open", str(session), "--port", str(port), "--no-browser"]
+        words = [sys.executable, "-m", "quadrille", "open", str(session), "--port", str(port), "--no-browser"]
         done = subprocess.run(words, cwd=SAMPLE.parents[1], capture_output=True, text=True, timeout=120)
     # viser says on standard output that it stopped; what went wrong is said on standard error alone.
     assert_refused((done.returncode, "", done.stderr), [str(port), "--port"])
@@ -268,7 +268,7 @@ def test_a_busy_port(session):
 @pytest.mark.slow
 def test_a_reader_that_has_read_enough():
     """As `quadrille info S | head -1` where head is gone before the program writes."""
-    words = [sys.executable, "-m", "app", "info", str(SAMPLE)]
+    words = [sys.executable, "-m", "quadrille", "info", str(SAMPLE)]
     program = subprocess.Popen(words, cwd=SAMPLE.parents[1], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     program.stdout.close()
     assert program.stderr.read() == ""

@@ -50,7 +50,7 @@ def test_it_ends_with_its_status(ends, status):
 
 EXPORTING = """
 import sys, tempfile, time
-from app import __main__ as program
+from app import main as program
 
 def export(*_, **options):
     with tempfile.TemporaryDirectory(dir=sys.argv[-1]):

@@ -90,9 +90,7 @@ def test_threads_answer_where_a_process_cannot(monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "path", ["/static/main.js", "/static/../app/__main__.py", "/static/%2e%2e/pyproject.toml", "/ws"]
-)
+@pytest.mark.parametrize("path", ["/static/main.js", "/static/../app/main.py", "/static/%2e%2e/pyproject.toml", "/ws"])
 def test_nothing_else_is_read(doorway, path):
     assert get(doorway, path)[0] == 503
 
@@ -141,7 +139,7 @@ def test_nobody_listens_afterwards(monkeypatch, tmp_path):
 
 BEFORE_THE_DOORWAY = """
 import sys
-import app.__main__
+import app.main
 from app.cli import open
 from app.runtime.kernel_compiler import KernelCompiler
 from app.server.doorway import Doorway

@@ -42,7 +42,7 @@ def listening_ports(pid):
 @contextmanager
 def program(session, *options):
     """`quadrille open` as a user starts it; gives the process and the page's address."""
-    words = [sys.executable, "-m", "app", "open", str(session), "--no-browser", "--port", "0", *options]
+    words = [sys.executable, "-m", "quadrille", "open", str(session), "--no-browser", "--port", "0", *options]
     env = {**os.environ, "PYTHONUNBUFFERED": "1"}
     process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=env)
     try:

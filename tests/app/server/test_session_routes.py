@@ -122,7 +122,7 @@ def test_a_damaged_list_is_empty_and_written_again(folders):
 @pytest.mark.parametrize(
     ("original", "program"),
     [
-        (["python", "-m", "app", "open", "x"], ["-m", "app"]),
+        (["python", "-m", "quadrille", "open", "x"], ["-m", "quadrille"]),
         (["python3", "/bin/quadrille", "open", "x"], ["/bin/quadrille"]),
     ],
 )

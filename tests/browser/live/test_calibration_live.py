@@ -47,7 +47,7 @@ def tracked_copy(folder, changed):
     sources = ("manual",) * len(person.model.value_names)
     store.commit("place", [PoseChange(person.name, 0, PoseRecord(truth.values[0], sources, revision, keyframe=True))])
     store.close()
-    words = [sys.executable, "-m", "app", "track", str(folder), "--no-whole-run"]
+    words = [sys.executable, "-m", "quadrille", "track", str(folder), "--no-whole-run"]
     subprocess.run(words, cwd=ROOT, check=True, capture_output=True)
     return session
 

@@ -8,7 +8,7 @@ from bodies import MODELS
 from command_line import SAMPLE
 from stored_motions import store_motion
 
-import tracker
+import quadrille
 from tracker.api.sessions import frames_of
 from tracker.formats.pose_csv import read_pose_table
 from tracker.pipeline.given_pose import set_pose_from_table
@@ -22,7 +22,7 @@ def stored(tmp_path):
 
 def test_poses_are_arrays_with_their_frames_times_and_covariances(stored):
     session, truth = stored
-    poses = tracker.read_poses(session.folder, "bob")
+    poses = quadrille.read_poses(session.folder, "bob")
     assert poses.frames.tolist() == [0, 1, 2, 4, 5]
     assert np.allclose(poses.times_s, poses.frames / session.fps)
     assert poses.joints.shape == (5, len(poses.names), 3)
@@ -37,27 +37,27 @@ def test_poses_are_arrays_with_their_frames_times_and_covariances(stored):
 
 def test_a_range_of_frames_is_read_and_exported(stored, tmp_path):
     session, _ = stored
-    assert tracker.read_poses(session, "ann", range(2, 5)).frames.tolist() == [2, 3, 4]
-    (path,) = tracker.export(session, tmp_path / "ann.trc", people=["ann"], options={"units": "mm"})
-    assert tracker.evaluate(session, path, "ann").mpjpe_mm < 0.01
-    with pytest.raises(tracker.TrackerError, match="not to exist"):
-        tracker.export(session, path, people=["ann"])
+    assert quadrille.read_poses(session, "ann", range(2, 5)).frames.tolist() == [2, 3, 4]
+    (path,) = quadrille.export(session, tmp_path / "ann.trc", people=["ann"], options={"units": "mm"})
+    assert quadrille.evaluate(session, path, "ann").mpjpe_mm < 0.01
+    with pytest.raises(quadrille.TrackerError, match="not to exist"):
+        quadrille.export(session, path, people=["ann"])
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda s: tracker.read_poses(s), "name of a person"),
-        (lambda s: tracker.read_poses(s, "eve"), "ann, bob"),
-        (lambda s: tracker.read_poses(s, "ann", [9]), "frames from 0 to 5, found 9"),
-        (lambda s: tracker.export(s, "a.xyz"), "expected a format"),
-        (lambda s: tracker.export(s, "a.trc", options={"view": "C0"}), "expected no option 'view'"),
-        (lambda s: tracker.evaluate(s, "a.txt", "ann"), "expected a reference"),
-        (lambda s: tracker.open_session(s.folder / "none"), "none"),
+        (lambda s: quadrille.read_poses(s), "name of a person"),
+        (lambda s: quadrille.read_poses(s, "eve"), "ann, bob"),
+        (lambda s: quadrille.read_poses(s, "ann", [9]), "frames from 0 to 5, found 9"),
+        (lambda s: quadrille.export(s, "a.xyz"), "expected a format"),
+        (lambda s: quadrille.export(s, "a.trc", options={"view": "C0"}), "expected no option 'view'"),
+        (lambda s: quadrille.evaluate(s, "a.txt", "ann"), "expected a reference"),
+        (lambda s: quadrille.open_session(s.folder / "none"), "none"),
     ],
 )
 def test_wrong_arguments_are_a_sentence(stored, call, words):
-    with pytest.raises(tracker.TrackerError, match=words):
+    with pytest.raises(quadrille.TrackerError, match=words):
         call(stored[0])
 
 
@@ -68,21 +68,21 @@ def test_frames_at_one_distance_are_a_range(stored, frames):
 
 def test_a_name_alone_is_no_list_of_names(stored):
     with pytest.raises(TypeError, match=r"\['ann'\]"):
-        tracker.export(stored[0], "a.trc", people="ann")
+        quadrille.export(stored[0], "a.trc", people="ann")
 
 
 def test_footage_is_tracked_and_the_progress_stops_it(tmp_path):
     folder = shutil.copytree(SAMPLE, tmp_path / "s")
-    session = tracker.open_session(folder)
+    session = quadrille.open_session(folder)
     set_pose_from_table(session, 0, 0, read_pose_table(SAMPLE / "truth.csv"))
-    tracker.track(folder, frames=range(3), options={"whole_run": False})
-    assert tracker.read_poses(folder).frames.tolist() == [0, 1, 2]
+    quadrille.track(folder, frames=range(3), options={"whole_run": False})
+    assert quadrille.read_poses(folder).frames.tolist() == [0, 1, 2]
 
     def stop(stage, share):
         if share > 0.2:
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        tracker.track(folder, frames=range(40), options={"whole_run": False}, progress=stop)
-    with pytest.raises(tracker.TrackerError, match="expected options among"):
-        tracker.track(folder, options={"nothing": 1})
+        quadrille.track(folder, frames=range(40), options={"whole_run": False}, progress=stop)
+    with pytest.raises(quadrille.TrackerError, match="expected options among"):
+        quadrille.track(folder, options={"nothing": 1})

@@ -9,7 +9,7 @@ from bodies import MODELS
 from command_line import SAMPLE
 from stored_motions import store_motion
 
-import tracker
+import quadrille
 from tracker.api.work import Tracked
 from tracker.batch.manifest import Manifest
 from tracker.batch.plan import read_plan
@@ -24,7 +24,7 @@ from tracker.session.store.annotation_store import AnnotationStore
 def manifest(tmp_path):
     """A batch of one copy of the bundled sample with a first pose."""
     folder = shutil.copytree(SAMPLE, tmp_path / "a")
-    session = tracker.open_session(folder)
+    session = quadrille.open_session(folder)
     set_pose_at_joints(session, 0, 0, read_joints(SAMPLE / "truth.trc", session.fps), fit_sizes=False)
     plan = tmp_path / "plan.toml"
     plan.write_text(

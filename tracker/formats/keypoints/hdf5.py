@@ -121,7 +121,7 @@ def _answer(path: Path, folder: Path) -> ReadAnswer:
     # Each thread of a library for matrices would take up addresses, which are limited.
     environment = os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     environment |= {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
-    words = [sys.executable, "-m", "tracker.formats.keypoints.hdf5_process", str(path.resolve()), str(folder)]
+    words = [sys.executable, "-P", "-m", "tracker.formats.keypoints.hdf5_process", str(path.resolve()), str(folder)]
     subprocess.run(
         words, env=environment, timeout=LIMITS.seconds, capture_output=True, check=False, stdin=subprocess.DEVNULL
     )

@@ -26,7 +26,7 @@ def _by_writer(name: str, module: str = "writers") -> Writer:
     return write
 
 
-OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "pictures", "character")
+OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "pictures", "character", "mesh")
 """Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
 _FROM_1 = "counts from 1: frame {frame} of the session is"
@@ -45,6 +45,12 @@ _OWN: Mapping[str, ExportFormat] = {f.name: f for f in (
         axes="y-up", gaps="interpolated", one_body=True, has_rate=True),
     ExportFormat("glb", "animated skeleton (glTF)", (".glb",), _by_writer("write_animation"), axes="y-up",
         gaps="interpolated by viewers", one_body=True),
+    ExportFormat("meshes", "bodies as meshes (PLY, OBJ, STL, GLB)", ("_meshes",),
+        _by_writer("write_bodies", "mesh_writers"), _PLACE | {"mesh"}, gaps="left out", is_folder=True),
+    ExportFormat("hulls", "visual hulls as meshes (PLY, OBJ, STL, GLB)", ("_hulls",),
+        _by_writer("write_hulls", "mesh_writers"), _PLACE | {"mesh"}, gaps="written all the same", is_folder=True),
+    ExportFormat("scene", "one frame with cameras and pictures (glTF)", (".glb",),
+        _by_writer("write_scene", "mesh_writers"), axes="y-up", gaps="left out"),
     ExportFormat("c3d", "joint centers (C3D)", (".c3d",), _by_writer("write_person_c3d", "array_writers"), _PLACE,
         one_person=True, units="mm", has_rate=True, numbering=f"C3D {_FROM_1} frame {{number}} of the file"),
     ExportFormat("openpose", "keypoints (OpenPose)", ("_openpose",), _by_writer("write_points", "label_writers"),
@@ -58,8 +64,9 @@ _OWN: Mapping[str, ExportFormat] = {f.name: f for f in (
         frozenset(("axes",)), gaps="left as NaN", has_rate=True, holds_provenance=True),
     ExportFormat("npz", "poses and cameras (NPZ)", (".npz",), _by_writer("write_npz", "array_writers"),
         frozenset(("axes",)), gaps="left as NaN", holds_provenance=True),
-    ExportFormat("dataset", "dataset of pictures and labels", ("_dataset",), _by_writer("write_dataset", "dataset"),
-        frozenset(("keypoints", "pixels", "pictures")), gaps="left without people", is_folder=True),
+    ExportFormat("dataset", "dataset of pictures and labels", ("_dataset",),
+        _by_writer("write_dataset", "datasets.dataset"), frozenset(("keypoints", "pixels", "pictures")),
+        gaps="left without people", is_folder=True),
 )}
 # fmt: on
 FORMATS = Extended(_OWN, "quadrille.exporters", ExportFormat)

@@ -19,6 +19,7 @@ UnitName = Literal["m", "mm"]
 KeypointSet = Literal["all", "coco17", "body"]
 PicturesName = Literal["images", "video"]
 PixelsName = Literal["original", "undistorted"]
+MeshName = Literal["ply", "obj", "stl", "glb"]
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class ExportOptions:
     """Pixels of points and masks: those of the footage, or without lens distortion, with such pictures and cameras."""
     pictures: PicturesName = "images"
     """Dataset: an image of each exported frame, or the footage as it is."""
+    mesh: MeshName = "ply"
+    """Meshes: format of their files."""
     provenance: bool = False
     """Whether a file beside one that cannot hold it has the provenance of the poses."""
 

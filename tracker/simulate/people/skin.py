@@ -10,10 +10,10 @@ from scipy import sparse
 from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.surface_nets import surface_nets
 from tracker.simulate.people.anatomy import Lobe, bone_names, bone_poses
 from tracker.simulate.people.builds import MAN, Build
 from tracker.simulate.people.outfit import Outfit
-from tracker.simulate.people.surface_nets import surface_nets
 
 SPACING_M = 0.010
 """Spacing of the implicit surface's grid: about a pixel at four metres."""

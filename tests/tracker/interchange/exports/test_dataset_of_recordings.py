@@ -11,10 +11,10 @@ from pycocotools.coco import COCO
 from stored_motions import filmed, store_motion
 
 from tracker.errors import FormatError, RecordingError, SessionError, TrackerError
-from tracker.interchange.exports.dataset import export_dataset, plan_dataset
-from tracker.interchange.exports.dataset_card import format_card, shared_people
-from tracker.interchange.exports.dataset_labels import DatasetRecording
-from tracker.interchange.exports.dataset_splits import SPLITS, SplitChoice, divide, parse_splits, recording_names
+from tracker.interchange.exports.datasets.card import format_card, shared_people
+from tracker.interchange.exports.datasets.dataset import export_dataset, plan_dataset
+from tracker.interchange.exports.datasets.labels import DatasetRecording
+from tracker.interchange.exports.datasets.splits import SPLITS, SplitChoice, divide, parse_splits, recording_names
 from tracker.interchange.exports.motion import read_motion
 from tracker.interchange.exports.options import ExportOptions
 from tracker.session.store.annotation_store import AnnotationStore

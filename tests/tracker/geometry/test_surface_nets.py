@@ -1,7 +1,7 @@
 import numpy as np
 import trimesh
 
-from tracker.simulate.people.surface_nets import surface_nets
+from tracker.geometry.surface_nets import surface_nets
 
 
 def test_meshes_an_ellipsoid_closed_outward_and_in_place():

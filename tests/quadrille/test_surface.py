@@ -4,7 +4,7 @@ import dataclasses
 import inspect
 from pathlib import Path
 
-import tracker
+import quadrille
 from tracker.api.pose_series import PoseSeries
 from tracker.api.work import Found, Tracked
 from tracker.estimation.acquisition.from_contours import Acquisition
@@ -30,9 +30,9 @@ def arguments(function):
 def surface():
     """Name and arguments of each public function, and the fields of what they take and return."""
     lines = []
-    for name in sorted(tracker.__all__):
-        found = getattr(tracker, name)
-        lines.append(f"tracker.{name}{arguments(found) if inspect.isfunction(found) else ''}")
+    for name in sorted(quadrille.__all__):
+        found = getattr(quadrille, name)
+        lines.append(f"quadrille.{name}{arguments(found) if inspect.isfunction(found) else ''}")
     for kind in RESULTS:
         names = kind._fields if issubclass(kind, tuple) else [f.name for f in dataclasses.fields(kind)]
         lines += [f"{kind.__name__}.{name}" for name in names]
@@ -45,5 +45,5 @@ def test_the_surface_is_as_written_down():
 
 
 def test_a_name_that_is_not_there_is_refused_as_usual():
-    assert not hasattr(tracker, "tracks")
-    assert dir(tracker) == sorted(tracker.__all__)
+    assert not hasattr(quadrille, "tracks")
+    assert dir(quadrille) == sorted(quadrille.__all__)

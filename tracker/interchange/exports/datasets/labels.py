@@ -10,7 +10,7 @@ import msgspec
 from tracker.errors import FormatError
 from tracker.formats.keypoints.coco import CocoAnnotation, CocoCategory, CocoImage, segmentation, write_coco
 from tracker.geometry.cameras import Camera
-from tracker.interchange.exports.dataset_card import TO_FILL_IN, LabelCounts
+from tracker.interchange.exports.datasets.card import TO_FILL_IN, LabelCounts
 from tracker.interchange.exports.frame_views import FrameViews
 from tracker.interchange.exports.label_writers import OpenPoseFiles
 from tracker.interchange.exports.motion import ExportedMotion

@@ -28,9 +28,9 @@ from tracker.files import write_text_atomic
 from tracker.formats.calibrations.writing import write_layout
 from tracker.formats.file_names import identifier
 from tracker.interchange.exports.array_writers import write_npz
-from tracker.interchange.exports.dataset_card import LabelCounts, RecordingSummary, format_card, summarize
-from tracker.interchange.exports.dataset_labels import DatasetLabels, DatasetRecording, RecordingLabels, plan_labels
-from tracker.interchange.exports.dataset_splits import SplitChoice, divide
+from tracker.interchange.exports.datasets.card import LabelCounts, RecordingSummary, format_card, summarize
+from tracker.interchange.exports.datasets.labels import DatasetLabels, DatasetRecording, RecordingLabels, plan_labels
+from tracker.interchange.exports.datasets.splits import SplitChoice, divide
 from tracker.interchange.exports.export_files import FOLDER_PROVENANCE, is_export_folder, moved_at_end, unwritable
 from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.label_writers import write_views

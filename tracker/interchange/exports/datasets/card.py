@@ -17,7 +17,7 @@ from tracker.interchange.exports.provenance import PoseProvenance, pose_provenan
 
 TO_FILL_IN = "TO BE FILLED IN"
 """Value of a field that only the owner knows."""
-_TEMPLATE = resources.files("tracker").joinpath("interchange", "exports", "dataset_card.md")
+_TEMPLATE = resources.files("tracker").joinpath("interchange", "exports", "datasets", "card.md")
 
 
 class LabelCounts(NamedTuple):

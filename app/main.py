@@ -151,7 +151,3 @@ def program() -> None:
     limit_log()
     give_back_freed_memory()
     process_exit.run(main)
-
-
-if __name__ == "__main__":
-    program()

@@ -1,0 +1,48 @@
+"""Write pictures as an animation that plays in documents and messages: GIF or animated WebP."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+import imageio.v3 as iio
+import numpy as np
+from numpy.typing import NDArray
+
+MAX_WIDTH_PX = 640
+"""Width of the picture, px, at most: the text column of a web page has some 700."""
+_TICK_MS = 10
+"""Unit of the delays of GIF, ms. Viewers slow down a picture that is shown for one tick alone."""
+
+
+class AnimationWriter:
+    """A file that takes one image after the other and plays without end. Use it in a `with` statement."""
+
+    def __init__(self, path: Path, fps: float) -> None:
+        """Open a file, whose end names its kind, and the frame rate of the images, 1/s."""
+        self._path, self._fps = path, fps
+        self._step = int(np.ceil(2 * _TICK_MS * fps / 1000))
+        self._n_images, self._pictures = 0, list[NDArray[np.uint8]]()
+
+    def __enter__(self) -> Self:
+        """Return the writer itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        """Write the file; after an error, none."""
+        if kind is None:
+            ends_ms = 1000 * np.minimum(self._step * np.arange(1, len(self._pictures) + 1), self._n_images) / self._fps
+            delays_ms = _TICK_MS * np.diff(np.rint(ends_ms / _TICK_MS).astype(int), prepend=0)
+            duration = delays_ms.tolist() if len(delays_ms) > 1 else int(delays_ms[0])
+            iio.imwrite(self._path, self._pictures, plugin="pillow", duration=duration, loop=0)
+
+    def write(self, image: NDArray[np.uint8]) -> None:
+        """Append an image, (H, W, 3) RGB, reduced; of a high rate one of several is taken."""
+        if self._n_images % self._step == 0:
+            share = min(1.0, MAX_WIDTH_PX / image.shape[1])
+            size = (round(share * image.shape[1]), round(share * image.shape[0]))
+            reduced = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if share < 1 else image.copy()
+            self._pictures.append(np.asarray(reduced, dtype=np.uint8))
+        self._n_images += 1
