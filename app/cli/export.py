@@ -62,6 +62,8 @@ class ExportArguments:
     """openpose, masks, dataset: of the footage (default), or without distortion, with such pictures and cameras."""
     mesh: Annotated[Literal["ply", "obj", "stl", "glb"] | None, _choice("ply|obj|stl|glb")] = None
     """meshes, hulls: format of the files, by default ply."""
+    blur_faces: bool = False
+    """mp4, gif, webp, dataset, scene, undistorted pictures: blur the heads of all people who are known."""
     split: Names = ()
     """dataset: shares of train, validation and test, such as 70:15:15; NAME=test for a recording; by default train."""
     distinct_people: bool = False
@@ -82,6 +84,11 @@ class ExportArguments:
     """replace files that exist."""
     json: bool = False
     """print one JSON object."""
+
+    @property
+    def faces(self) -> str | None:
+        """The option of an export."""
+        return "blurred" if self.blur_faces else None
 
 
 def added_help() -> str:

@@ -14,6 +14,7 @@ from tracker.evaluation.judging.verdicts import LIMBS
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.faces import BlurredRecording, stored_people
 from tracker.session.session import Session
 
 _SHOWN = 12
@@ -30,7 +31,7 @@ figure { margin: 1.5rem 0; } figure img { height: 300px; margin-right: 4px; bord
 """
 
 
-def write_report(session: Session, name: str, found: Sequence[Judgement], path: Path) -> None:
+def write_report(session: Session, name: str, found: Sequence[Judgement], path: Path, blur_faces: bool = False) -> None:
     """Write the report of some judgements.
 
     Args:
@@ -38,13 +39,15 @@ def write_report(session: Session, name: str, found: Sequence[Judgement], path: 
         name: of the observations.
         found: the judgements, one for each person.
         path: the file; it appears complete or not at all.
+        blur_faces: whether to blur the heads of all people who are known.
     """
     body = [f"<h1>{html.escape(name)}, judged by the footage of {html.escape(session.name)}</h1>"]
     body.append(
         '<p><span class="imported">Imported joints</span>, <span class="off">limbs that are off</span>, '
         '<span class="tracked">joints by contours and colours</span>.</p>'
     )
-    with Recording(session.cameras) as recording:
+    footage = BlurredRecording(session, stored_people(session)) if blur_faces else Recording(session.cameras)
+    with footage as recording:
         for own in found:
             body += _person(own, recording, [c.camera for c in session.cameras])
     write_html(path, name, body, _STYLE)

@@ -16,10 +16,10 @@ from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
 from tracker.footage.animation_writer import AnimationWriter
-from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image
 from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.faces import recording_of
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions, load_character
 from tracker.session.session import Session
@@ -58,7 +58,7 @@ def write_overlay_video(
     size = (columns * tile[0], rows * tile[1])
     even = (size[0] + size[0] % 2, size[1] + size[1] % 2)  # as H.264 requires
     with ExitStack() as stack:
-        recording = stack.enter_context(Recording(session.cameras, indices=footage_indices()))
+        recording = stack.enter_context(recording_of(motion, options.faces, footage_indices()))
         writer = stack.enter_context(
             VideoWriter(path, even, session.fps, motion.calibration_note)
             if path.suffix == ".mp4"

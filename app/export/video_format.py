@@ -18,7 +18,7 @@ def _write(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[P
 
 
 def _overlay(name: str, title: str) -> ExportFormat:
-    options = frozenset(("view", "character"))
+    options = frozenset(("view", "character", "faces"))
     return ExportFormat(name, title, (f".{name}",), _write, options, gaps="shown without a body")
 
 

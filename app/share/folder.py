@@ -13,7 +13,9 @@ from app.share.overlay_lines import UNITS_PER_PX, compact, view_lines
 from app.share.pictures import GRADES, Encoder, choose_encoder
 from tracker.footage.recording import Recording
 from tracker.interchange.exports.export_files import moved_at_end, unwritable
+from tracker.interchange.exports.faces import recording_of
 from tracker.interchange.exports.motion import ExportedMotion
+from tracker.interchange.exports.options import FacesName
 
 _FILES = ("index.html", "page.js", "page.css", "data.js")
 """Files of a shared folder beside its pictures."""
@@ -33,6 +35,7 @@ def share(
     overwrite: bool = False,
     tick: Callable[[], None] = lambda: None,
     comments: Sequence[SharedComment] = (),
+    faces: FacesName = "shown",
 ) -> int:
     """Write a stretch of a session as a folder with index.html, or as one file.
 
@@ -43,6 +46,7 @@ def share(
         overwrite: whether to replace a file, or a folder that `share` has made. An empty folder is replaced anyway.
         tick: called after each frame; it may raise to stop, which leaves nothing behind.
         comments: of the session.
+        faces: as filmed, or blurred.
 
     Returns:
         The size, bytes.
@@ -57,7 +61,7 @@ def share(
         may_replace = None if is_file else (lambda path: is_empty or is_shared_folder(path))
         with (
             moved_at_end([out], overwrite or is_empty, may_replace) as temporary,
-            Recording(motion.session.cameras, indices=footage_indices()) as recording,
+            recording_of(motion, faces, footage_indices()) as recording,
         ):
             largest = Encoder(motion.session, GRADES[0])
             room = most_bytes - len(compact(describe(motion, largest.views, comments)))

@@ -75,6 +75,28 @@ def test_poses_are_drawn(tmp_path):
 
 
 @pytest.mark.slow
+def test_the_notebook_draws_its_figures(tmp_path, monkeypatch):
+    """Its cells run one after the other, in a folder with a session."""
+    store_motion(tmp_path / "walk", [MODELS["gavrila38"]], n_frames=8)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    names = {}
+    for cell in json.loads((EXAMPLES / "figures.ipynb").read_text("utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), names)
+    assert all(cv2.imread(str(tmp_path / name)).std() > 5 for name in ("wrists.png", "speeds.png"))
+
+
+@pytest.mark.slow
+def test_a_recording_of_rerun_has_all_cameras_and_joints(packages, tmp_path):
+    session, _ = store_motion(tmp_path / "s", [MODELS["gavrila38"]], n_frames=5, gaps={(0, 2)})
+    words = ("export", session.folder, "--format", "rerun", "--out", tmp_path / "a.rrd")
+    run("-m", "quadrille", *words, path=[packages])
+    shown = run("-m", "rerun", "rrd", "print", tmp_path / "a.rrd")
+    assert all(f"/world/{name}" in shown for name in (*session.camera_names, "ann/joints", "ann/bones"))
+
+
+@pytest.mark.slow
 def test_the_page_is_driven_from_a_program(sample, tmp_path):
     before = quadrille.read_poses(sample).joint("left_elbow")[0]
     out = run(EXAMPLES / "drive_page.py", sample, tmp_path / "a.png")

@@ -1,12 +1,18 @@
 """The stored poses of one person as arrays over frames."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody
+from tracker.formats.write_only.optional_packages import require
 from tracker.geometry.arrays import Array, IntArray
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,3 +61,37 @@ class PoseSeries:
         """
         self.joint(name)
         return np.asarray(np.sqrt(np.trace(self.covariances[:, self.names.index(name)], axis1=-2, axis2=-1)))
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a table with a row for each frame and joint: where it is and its expected error, metres.
+
+        Raises:
+            FormatError: pandas is not installed.
+        """
+        pandas = require("pandas", "a table of pandas", "make")
+        n_frames, n_joints = self.joints.shape[:2]
+        each = {"frame": self.frames, "time_s": self.times_s, "status": self.statuses, "keyframe": self.keyframes}
+        columns = {name: np.repeat(values, n_joints) for name, values in each.items()}
+        places = {f"{axis}_m": self.joints[..., i].ravel() for i, axis in enumerate("xyz")}
+        errors = np.sqrt(np.trace(self.covariances, axis1=-2, axis2=-1)).ravel()
+        return pandas.DataFrame({"joint": np.tile(self.names, n_frames), **columns, **places, "error_m": errors})
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return positions, metres, and covariances, m^2, over time, joint and axis.
+
+        Raises:
+            FormatError: xarray is not installed.
+        """
+        xarray = require("xarray", "a dataset of xarray", "make")
+        of_frames = {"frame": self.frames, "status": self.statuses, "keyframe": self.keyframes}
+        return xarray.Dataset(
+            {
+                "position": (("time", "joint", "axis"), self.joints),
+                "covariance": (("time", "joint", "axis", "axis_2"), self.covariances),
+            },
+            {
+                "time": self.times_s, "joint": list(self.names), "axis": list("xyz"), "axis_2": list("xyz"),
+                **{name: ("time", values) for name, values in of_frames.items()},
+            },
+            {"person": self.person, "units": "m"},
+        )  # fmt: skip

@@ -30,6 +30,8 @@ class ShareArguments:
     """A:B, half open; from the first to the last pose by default."""
     size: float = 30.0
     """largest size in megabytes: pictures are as large and good as it allows."""
+    blur_faces: bool = False
+    """blur the heads of all people who are known."""
     overwrite: bool = False
     """replace what an earlier share wrote there."""
     json: bool = False
@@ -58,7 +60,10 @@ def command(arguments: Annotated[ShareArguments, tyro.conf.arg(name="")]) -> Non
     require_files(at.session)
     motion = read_motion(at.session, at.people, frames)
     with Reporter(silent=arguments.json).over(len(motion.frames), "sharing") as tick:
-        n_bytes = share(motion, arguments.out, 1e6 * arguments.size, arguments.overwrite, tick, _comments(at.session))
+        n_bytes = share(
+            motion, arguments.out, 1e6 * arguments.size, arguments.overwrite, tick, _comments(at.session),
+            "blurred" if arguments.blur_faces else "shown",
+        )  # fmt: skip
     opened = arguments.out if arguments.out.suffix.lower() == ".html" else arguments.out / "index.html"
     found: dict[str, Any] = {
         "open": str(opened),

@@ -29,6 +29,8 @@ class JudgeArguments:
     """name of the imported observations."""
     report: OptionalPath = None
     """HTML file to write: the worst frames with pictures."""
+    blur_faces: bool = False
+    """blur the heads of all people who are known in the pictures of --report."""
     overwrite: bool = False
     """replace the file of --report."""
     json: bool = False
@@ -52,7 +54,7 @@ def command(arguments: Annotated[JudgeArguments, tyro.conf.arg(name="")]) -> Non
     found = judge_session(session, arguments.of, Reporter(silent=arguments.json))
     print(format_json(record(found)) if arguments.json else _format(found))
     if path is not None:
-        write_report(session, arguments.of, found, path)
+        write_report(session, arguments.of, found, path, arguments.blur_faces)
         if not arguments.json:
             print(f"wrote {path}")
 

@@ -35,6 +35,19 @@ def test_poses_are_arrays_with_their_frames_times_and_covariances(stored):
         poses.joint("elbow")
 
 
+@pytest.mark.slow
+def test_poses_are_tables_of_pandas_and_xarray(stored):
+    session, truth = stored
+    poses = quadrille.read_poses(session.folder, "bob")
+    table, dataset = poses.to_pandas(), poses.to_xarray()
+    row = table[(table.frame == 4) & (table.joint == "left_elbow")].iloc[0]
+    place = truth[1][4].joint_centers_world[truth[1][4].model.point_names.index("left_elbow")]
+    assert np.allclose(row[["x_m", "y_m", "z_m"]].astype(float), place)
+    assert (row.status, row.time_s) == ("lost", 4 / session.fps)
+    assert np.allclose(dataset.position.sel(joint="left_elbow", time=4 / session.fps), place)
+    assert np.allclose(dataset.covariance, poses.covariances, equal_nan=True)
+
+
 def test_a_range_of_frames_is_read_and_exported(stored, tmp_path):
     session, _ = stored
     assert quadrille.read_poses(session, "ann", range(2, 5)).frames.tolist() == [2, 3, 4]

@@ -9,6 +9,7 @@ __all__ = [
     "array_writers",
     "export_files",
     "export_format",
+    "faces",
     "formats",
     "frame_views",
     "keypoints",

@@ -26,7 +26,7 @@ def _by_writer(name: str, module: str = "writers") -> Writer:
     return write
 
 
-OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "pictures", "character", "mesh")
+OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "pictures", "character", "mesh", "faces")
 """Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
 _FROM_1 = "counts from 1: frame {frame} of the session is"
@@ -50,13 +50,13 @@ _OWN: Mapping[str, ExportFormat] = {f.name: f for f in (
     ExportFormat("hulls", "visual hulls as meshes (PLY, OBJ, STL, GLB)", ("_hulls",),
         _by_writer("write_hulls", "mesh_writers"), _PLACE | {"mesh"}, gaps="written all the same", is_folder=True),
     ExportFormat("scene", "one frame with cameras and pictures (glTF)", (".glb",),
-        _by_writer("write_scene", "mesh_writers"), axes="y-up", gaps="left out"),
+        _by_writer("write_scene", "mesh_writers"), frozenset(("faces",)), axes="y-up", gaps="left out"),
     ExportFormat("c3d", "joint centers (C3D)", (".c3d",), _by_writer("write_person_c3d", "array_writers"), _PLACE,
         one_person=True, units="mm", has_rate=True, numbering=f"C3D {_FROM_1} frame {{number}} of the file"),
     ExportFormat("openpose", "keypoints (OpenPose)", ("_openpose",), _by_writer("write_points", "label_writers"),
-        frozenset(("pixels",)), gaps="left without people", is_folder=True),
+        frozenset(("pixels", "faces")), gaps="left without people", is_folder=True),
     ExportFormat("masks", "masks of parts (PNG)", ("_masks",), _by_writer("write_masks", "mask_writers"),
-        frozenset(("pixels",)), gaps="left without people", is_folder=True),
+        frozenset(("pixels", "faces")), gaps="left without people", is_folder=True),
     ExportFormat("movement", "poses (movement, netCDF)", (".nc", "_views.nc"),
         _by_writer("write_movement", "array_writers"), frozenset(("axes",)), gaps="left as NaN", has_rate=True,
         holds_provenance=True),
@@ -65,7 +65,7 @@ _OWN: Mapping[str, ExportFormat] = {f.name: f for f in (
     ExportFormat("npz", "poses and cameras (NPZ)", (".npz",), _by_writer("write_npz", "array_writers"),
         frozenset(("axes",)), gaps="left as NaN", holds_provenance=True),
     ExportFormat("dataset", "dataset of pictures and labels", ("_dataset",),
-        _by_writer("write_dataset", "datasets.dataset"), frozenset(("keypoints", "pixels", "pictures")),
+        _by_writer("write_dataset", "datasets.dataset"), frozenset(("keypoints", "pixels", "pictures", "faces")),
         gaps="left without people", is_folder=True),
 )}
 # fmt: on

@@ -27,6 +27,7 @@ from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import floor_plane
 from tracker.geometry.surface_nets import surface_nets
 from tracker.interchange.exports.export_format import Tick
+from tracker.interchange.exports.faces import recording_of
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions, file_from_world
 
@@ -113,7 +114,7 @@ def write_scene(motion: ExportedMotion, options: ExportOptions, paths: Sequence[
         if frame in person.poses:
             for part, mesh in part_meshes(person.body(frame)).items():
                 scene.add_geometry(mesh, node_name=f"{name}_{part}", geom_name=f"{name}_{part}")
-    with Recording(motion.session.cameras) as recording:
+    with recording_of(motion, options.faces) as recording:
         for index, source in enumerate(motion.session.cameras):
             picture, camera = recording.read_view(index, frame), source.camera.pinhole
             corners = _corners(camera)

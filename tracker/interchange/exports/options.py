@@ -19,6 +19,7 @@ UnitName = Literal["m", "mm"]
 KeypointSet = Literal["all", "coco17", "body"]
 PicturesName = Literal["images", "video"]
 PixelsName = Literal["original", "undistorted"]
+FacesName = Literal["shown", "blurred"]
 MeshName = Literal["ply", "obj", "stl", "glb"]
 
 
@@ -41,6 +42,8 @@ class ExportOptions:
     """Pixels of points and masks: those of the footage, or without lens distortion, with such pictures and cameras."""
     pictures: PicturesName = "images"
     """Dataset: an image of each exported frame, or the footage as it is."""
+    faces: FacesName = "shown"
+    """Heads in pictures: as filmed, or blurred; see `tracker.interchange.exports.faces`."""
     mesh: MeshName = "ply"
     """Meshes: format of their files."""
     provenance: bool = False

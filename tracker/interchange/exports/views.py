@@ -13,10 +13,10 @@ from tracker.body.model import PosedBody
 from tracker.errors import RecordingError
 from tracker.evidence.contours.label_image import part_labels
 from tracker.files import write_text_atomic
-from tracker.footage.recording import Recording
 from tracker.formats.anipose import format_calibration
 from tracker.geometry.cameras import BEYOND_PX, MAX_PINHOLE_ANGLE, Camera
 from tracker.geometry.lens_tables import lens_of, undistortion_map
+from tracker.interchange.exports.faces import recording_of
 from tracker.interchange.exports.motion import ExportedMotion
 from tracker.interchange.exports.options import ExportOptions
 
@@ -35,19 +35,20 @@ def exported_cameras(motion: ExportedMotion, options: ExportOptions) -> tuple[Ca
 class Pictures:
     """Writes the pictures of frames to a folder: `images/CAMERA/000012.jpg` for frame 12 of the footage."""
 
-    def __init__(self, motion: ExportedMotion, cameras: Sequence[Camera], folder: Path) -> None:
+    def __init__(self, motion: ExportedMotion, options: ExportOptions, cameras: Sequence[Camera], folder: Path) -> None:
         """Open the footage.
 
         Args:
             motion: what is exported.
+            options: of the export.
             cameras: in the pixels of the pictures.
             folder: in which `images` appears.
 
         Raises:
-            RecordingError: the footage cannot be read.
+            TrackerError: the footage cannot be read, or its faces cannot be blurred.
         """
         self._sources, self._cameras, self._folder = motion.session.cameras, cameras, folder
-        self._recording = Recording(self._sources)
+        self._recording = recording_of(motion, options.faces)
         for camera in cameras:
             (folder / IMAGES / camera.name).mkdir(parents=True)
 
@@ -93,7 +94,7 @@ def undistorted_pictures(
         return
     cameras = exported_cameras(motion, options)
     write_text_atomic(folder / CALIBRATION, format_calibration(cameras))
-    with Pictures(motion, cameras, folder) as pictures:
+    with Pictures(motion, options, cameras, folder) as pictures:
         yield pictures
 
 

@@ -17,6 +17,11 @@ from tracker.interchange.exports.provenance import PoseProvenance, pose_provenan
 
 TO_FILL_IN = "TO BE FILLED IN"
 """Value of a field that only the owner knows."""
+_FACES = {
+    "shown": "as filmed",
+    "blurred": "heads are blurred where a pose, key points or a mask show them; look at the pictures all the same",
+}
+"""Sentences on the faces in the pictures."""
 _TEMPLATE = resources.files("tracker").joinpath("interchange", "exports", "datasets", "card.md")
 
 
@@ -115,6 +120,7 @@ def format_card(
         frames="; ".join(f"frames {s.frames} of {s.session}" for s in summaries),
         pictures={"images": "images", "video": "videos, whole"}[options.pictures],
         lens=lens,
+        faces=_FACES[options.faces],
         splits=_table(("split", "recordings", "names"), rows),
         choice=choice,
     )

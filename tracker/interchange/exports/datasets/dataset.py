@@ -117,6 +117,10 @@ def _check(options: ExportOptions) -> None:
         raise FormatError(
             "expected images with undistorted pixels, found video: footage is copied as it is", Remedy("export_images")
         )
+    if options.pictures == "video" and options.faces == "blurred":
+        raise FormatError(
+            "expected images with blurred faces, found video: footage is copied as it is", Remedy("export_images")
+        )
 
 
 def _write(folder: Path, plan: DatasetPlan, options: ExportOptions, tick: Tick) -> list[RecordingSummary]:
@@ -150,7 +154,7 @@ def _write_recording(
     with ExitStack() as stack:
         pictures = None
         if options.pictures == "images":
-            pictures = stack.enter_context(Pictures(motion, cameras, folder))
+            pictures = stack.enter_context(Pictures(motion, options, cameras, folder))
         else:
             _copy_footage(motion, folder / "videos")
         write_views(motion, cameras, pictures, labels.write, tick)
