@@ -11,6 +11,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import NamedTuple
 
+from tracker.compute import system
 from tracker.errors import SessionError, TrackerError
 
 
@@ -40,7 +41,7 @@ def open_regular(path: Path) -> BufferedReader:
         OSError: it is missing, a folder, or cannot be read.
     """
     check_regular(path)  # opening a device may have effects
-    number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    number = os.open(path, system.READ_FLAGS)
     try:
         _check_mode(os.fstat(number).st_mode, path)  # another file may have taken its place
         return os.fdopen(number, "rb")
@@ -90,7 +91,7 @@ def write_bytes_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
-        opened = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
+        opened = os.open(temporary, system.NEW_FLAGS, mode)
         with open(opened, "wb") as file:
             file.write(data)
             file.flush()

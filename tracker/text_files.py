@@ -19,6 +19,7 @@ from typing import Any
 
 import msgspec
 
+from tracker.compute import system
 from tracker.errors import TrackerError
 from tracker.files import open_regular
 
@@ -42,9 +43,6 @@ TABLE_BYTES = 1_000_000_000
 """Size above which a table of numbers is refused: an hour of 50 joints at 120 Hz, in digits."""
 _MAX_LINE = 1_000_000
 """Longest line of a table, characters."""
-
-
-_PIPE_OF_SHELL = re.compile(r"/dev/fd/\d+|/proc/self/fd/\d+")
 
 
 @dataclass(frozen=True)
@@ -212,7 +210,7 @@ def _open(path: Path) -> BufferedReader:
     Raises:
         OSError: it is neither, or cannot be read.
     """
-    return path.open("rb") if _PIPE_OF_SHELL.fullmatch(str(path)) else open_regular(path)
+    return path.open("rb") if system.PIPE_OF_SHELL.fullmatch(str(path)) else open_regular(path)
 
 
 @contextmanager

@@ -6,8 +6,6 @@ them from the cache. The kernels that a new user meets first come first (`kernel
 """
 
 import gc
-import multiprocessing
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -21,6 +19,7 @@ from app.session.samples import bundled
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.kernel_cache import compiled_mark, record_compiled, record_stage
 from tracker.compute.progress import result_of
+from tracker.compute.system import give_way, start_beside
 from tracker.errors import SessionError
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.estimation.posing.drag import drag
@@ -72,14 +71,13 @@ def _call_kernels(background: bool) -> None:
 
     In the background, a second process compiles the kernels of the evidence, at the priority of the page: its first
     cost waits for them, while it interprets what places bodies and traces contours. Then that process compiles those
-    that measure contours. It is a fork: importing the program takes as long as a tenth of its work.
+    that measure contours. It is a copy of this one where the system has them:
+    importing the program takes as long as a tenth of its work.
     """
     session = load_session(bundled("tango"))
-    fork = multiprocessing.get_context("fork")
-    beside = fork.Process(target=_compile_evidence, args=(session, background), daemon=True) if background else None
+    beside = start_beside(_compile_evidence, session, background) if background else None
     if beside is not None:
-        beside.start()
-        _be_nice()
+        give_way()
     try:
         bodies = _compile_posing(session)
         cameras = [c.camera for c in session.cameras]
@@ -108,18 +106,13 @@ def _compile_posing(session: Session) -> list[PosedBody]:
     return bodies
 
 
-def _be_nice() -> None:
-    if hasattr(os, "nice"):
-        os.nice(19)
-
-
 def _compile_evidence(session: Session, background: bool) -> None:
     """Compile the kernels of the evidence, and those that measure contours against it."""
     with Recording(session.cameras) as recording:
         views = Observer(session.cameras, recording).evidence(_FRAME)
     record_stage("evidence")
     if background:
-        _be_nice()
+        give_way()
     measure_nothing(views, tuple(p.model for p in session.people))
 
 

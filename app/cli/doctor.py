@@ -5,7 +5,6 @@ import os
 import platform
 import re
 import shutil
-import sys
 import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,9 +16,12 @@ from typing import Any
 from platformdirs import user_cache_path, user_state_path
 
 from app.runtime.json_output import format_json
-from app.runtime.memory import WORKER_BYTES, free_bytes, n_cores
 from tracker.compute.distribution import DISTRIBUTION, install_command, program_version
+from tracker.compute.system import HAS_BROWSER, free_bytes, n_cores
 
+WORKER_BYTES = 5 << 29
+"""Memory of a worker that finds people in four views of 640 x 480: 1.6 to 2.4 GB
+(`tests/benchmarks/long_recording.py`); 0.6 GB where it only tracks."""
 _EXTRAS = {
     "import": ("quadrille import of DeepLabCut HDF5, SLEAP and NWB", ("h5py", "sleap_io")),
     "detect": ("quadrille detect", ("ai_edge_litert",)),
@@ -145,7 +147,7 @@ def _codecs() -> Finding:
 
 def _browser() -> Finding:
     names = [name for name in _BROWSERS if shutil.which(name)]
-    if names or sys.platform in ("darwin", "win32"):
+    if names or HAS_BROWSER:
         return Finding("browser", "ok", ", ".join(names) or "that of the system")
     return Finding("browser", "warning", "none found here; open the printed address in a browser of another machine")
 

@@ -1,14 +1,12 @@
 """Compile missing kernels in a process of their own (`app.bench.compile_kernels`) while the program starts and runs."""
 
-import os
-import signal
 import subprocess
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 
 from tracker.compute.interpretation import interpret_modules
 from tracker.compute.kernel_cache import STAGES, compiled_stages, is_compiled
+from tracker.compute.system import end_apart, start_apart
 
 COMMAND = (sys.executable, "-P", "-m", "app.bench.compile_kernels", "--background")
 _POSING = "posing"
@@ -25,8 +23,8 @@ class KernelCompiler:
         """
         self._process: subprocess.Popen[bytes] | None = None
         if not is_compiled():
-            # Ctrl+C in a terminal reaches the whole process group; only this program may end the process.
-            self._process = subprocess.Popen(command, start_new_session=True)
+            # Ctrl+C in a terminal reaches all that it started; only this program may end the process.
+            self._process = start_apart(command)
             if _POSING not in compiled_stages():
                 interpret_modules("tracker.body.kinematics")
 
@@ -51,7 +49,5 @@ class KernelCompiler:
     def close(self) -> None:
         """End the process and what it has started. The kernels that it has compiled stay in the cache."""
         if self._process is not None and self._process.poll() is None:
-            with suppress(ProcessLookupError):
-                os.killpg(self._process.pid, signal.SIGTERM)
-            self._process.wait()
+            end_apart(self._process)
         interpret_modules()

@@ -1,15 +1,9 @@
 """Return freed memory to the system."""
 
-import ctypes
-import os
-import sys
 import threading
 import time
 
-_M_ARENA_MAX = -8
-"""Option of `mallopt` (malloc.h): largest number of heaps."""
-_PR_SET_THP_DISABLE = 41
-"""Option of `prctl` (linux/prctl.h), since Linux 3.15."""
+from tracker.compute.system import heap_trimmer
 
 
 def give_back_freed_memory(every_s: float = 5.0) -> None:
@@ -27,16 +21,13 @@ def give_back_freed_memory(every_s: float = 5.0) -> None:
     Args:
         every_s: interval, seconds.
     """
-    libc = ctypes.CDLL(None) if sys.platform.startswith("linux") else None
-    trim = getattr(libc, "malloc_trim", None)
-    if libc is None or trim is None:
+    trim = heap_trimmer()
+    if trim is None:
         return
-    libc.mallopt(_M_ARENA_MAX, os.cpu_count() or 1)
-    libc.prctl(_PR_SET_THP_DISABLE, 1, 0, 0, 0)  # old kernels refuse it: more memory is resident then
 
     def work() -> None:
         while True:
             time.sleep(every_s)
-            trim(0)  # releases the interpreter's lock
+            trim()
 
     threading.Thread(target=work, name="allocation", daemon=True).start()

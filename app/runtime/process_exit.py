@@ -10,12 +10,14 @@ from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
+from tracker.compute.system import ENDING_SIGNALS
+
 INTERRUPTED = 130
 """Status after SIGINT, as shells report it: 128 and the number of the signal."""
 
 
 class TerminationError(KeyboardInterrupt):
-    """SIGTERM or SIGHUP arrived: work stops and cleans up as after Ctrl+C."""
+    """A signal asked the program to end: work stops and cleans up as after Ctrl+C."""
 
     def __init__(self, number: int) -> None:
         """Note the signal."""
@@ -37,9 +39,9 @@ def run(main: Callable[[], None]) -> None:
         sys.stderr.flush()
         os._exit(status)
 
-    signal.signal(signal.SIGTERM, _terminate)
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
-        signal.signal(signal.SIGHUP, _terminate)
+    for number in ENDING_SIGNALS:
+        if signal.getsignal(number) != signal.SIG_IGN:  # nohup
+            signal.signal(number, _terminate)
     atexit.register(end)  # the first function registered is called last
     try:
         main()

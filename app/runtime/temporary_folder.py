@@ -1,11 +1,11 @@
 """Temporary folders of a running program. Making one removes the folders that killed programs left."""
 
-import os
 import shutil
 import tempfile
 from contextlib import suppress
 from pathlib import Path
 
+from tracker.compute import system
 from tracker.errors import SessionError
 from tracker.session.lock import LOCK_FILE, SessionLock
 
@@ -32,8 +32,7 @@ class TemporaryFolder:
 def _remove_abandoned(parent: Path) -> None:
     for folder in parent.glob(f"{_PREFIX}*"):
         with suppress(OSError, SessionError):  # it is in use, or goes meanwhile
-            status = folder.lstat()
-            is_mine = not hasattr(os, "getuid") or status.st_uid == os.getuid()
-            if is_mine and folder.is_dir() and not folder.is_symlink() and (folder / LOCK_FILE).is_file():
+            is_one = folder.is_dir() and not folder.is_symlink() and (folder / LOCK_FILE).is_file()
+            if is_one and system.is_mine(folder.lstat()):
                 with SessionLock(folder):
                     shutil.rmtree(folder, ignore_errors=True)

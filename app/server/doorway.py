@@ -5,11 +5,9 @@ little. The page holds nothing of the session, so it needs no token; Host and Or
 """
 
 import json
-import multiprocessing
 import os
 import signal
 import socket
-import sys
 import threading
 import webbrowser
 from contextlib import suppress
@@ -17,7 +15,7 @@ from dataclasses import replace
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from multiprocessing.context import ForkProcess
+from multiprocessing.process import BaseProcess
 from socketserver import BaseServer
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -29,12 +27,11 @@ from app.server.access import access_for
 from app.server.address import Serving, listen, page_address, port_of
 from app.server.static_files import KEPT, POLICY, PREFIX, PageFiles, connect_sources, static_folder
 from app.state.role import Role
+from tracker.compute.system import FORKS, start_beside
 
 STEPS = ("Loading the program", "Opening the session", "Preparing the views")
 _ICON = "icon.svg"
 _NOT_KEPT = "no-store"
-_FORKS = sys.platform == "linux"
-"""Whether a process of its own answers. Threads would take turns with the loading program, and hold it up."""
 _TIMEOUT_S = 2.0
 """Time for a request to arrive: browsers also open connections that they do not use."""
 _POLL_S = 0.02
@@ -76,7 +73,7 @@ class Doorway:
         self.port = port_of(self.sockets)
         self._servers = [_Server(each, self) for each in self.sockets]
         self._threads: list[tuple[_Server, threading.Thread]] = []
-        self._process: ForkProcess | None = None
+        self._process: BaseProcess | None = None
         self._steps = -1  # pipe to the process
 
     @property
@@ -92,12 +89,9 @@ class Doorway:
 
     def __enter__(self) -> Self:
         """Begin to answer."""
-        if _FORKS:
+        if FORKS:  # threads would take turns with the loading program, and hold it up
             reading, self._steps = os.pipe()
-            self._process = multiprocessing.get_context("fork").Process(
-                target=self._answer_until_closed, args=(reading,), daemon=True
-            )
-            self._process.start()
+            self._process = start_beside(self._answer_until_closed, reading)
             os.close(reading)
         else:
             self._start_threads()

@@ -1,28 +1,45 @@
-"""Start viser on a Unix socket that only this user can reach."""
+"""Start viser where only this program can reach it."""
 
 import contextlib
+import hmac
+import inspect
 import io
+import secrets
 import socket
 import tempfile
 from collections.abc import Generator
+from http import HTTPStatus
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import viser
 import websockets.asyncio.server
 
 from app.runtime.temporary_folder import TemporaryFolder
+from tracker.compute.system import HAS_UNIX_SOCKETS, MAX_SOCKET_PATH_BYTES, private_listener
 from tracker.errors import TrackerError
 
-_MAX_PATH_BYTES = 100  # the kernel's limit for the path of a Unix socket is 104 to 108 bytes
+SECRET = "X-Quadrille-Secret"
+"""Header of each request that viser answers."""
+
+
+class ViserPlace(NamedTuple):
+    """Where viser is reached."""
+
+    path: Path | None
+    """Its Unix socket; None where the system has none."""
+    port: int
+    """Its port on 127.0.0.1, if it has no socket."""
+    secret: str
+    """Value of the header `SECRET`."""
 
 
 class PrivateViser:
-    """A viser server that listens on no port.
+    """A viser server that only `ViserProxy` reaches, which forwards the requests that pass `Access`.
 
     viser answers every connection, and a browser lets every website connect to every port of this machine. A Unix
-    socket is out of reach for websites and, by the permissions of its folder, for other users. `ViserProxy` forwards
-    the requests that pass `Access`.
+    socket is out of reach for websites and, by the permissions of its folder, for other users. Systems without one get
+    a port. In both cases a request needs a header with a secret of this program, which no website can send.
     """
 
     def __init__(self) -> None:
@@ -31,17 +48,18 @@ class PrivateViser:
         A later `configure_theme` must pass `show_share_button=False` again.
 
         Raises:
-            TrackerError: viser did not use the socket; nothing listens then.
+            TrackerError: viser did not listen where it was told; nothing listens then.
         """
         self._folder = _private_folder()
-        self.socket_path = self._folder.path / "viser"
-        """The socket; only this user may open it."""
         try:
+            listener, path = private_listener(self._folder.path)
+            self.place = ViserPlace(path, 0 if path else listener.getsockname()[1], secrets.token_urlsafe(32))
             # viser prints its own address even with verbose=False; the page's address is the only one to open.
-            with _served_on(self.socket_path), contextlib.redirect_stdout(io.StringIO()):
+            with _served_on(listener, self.place.secret), contextlib.redirect_stdout(io.StringIO()):
                 self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
                 """The server, to build the scene with."""
-            if isinstance(self.server.get_port(), int):
+            found: object = self.server.get_port()
+            if isinstance(found, int) and found != self.place.port:
                 self.server.stop()
                 raise TrackerError(
                     "expected viser to listen on a private socket, found it on a port that every website can reach; "
@@ -61,25 +79,29 @@ class PrivateViser:
 def _private_folder() -> TemporaryFolder:
     """Make a folder that only this user may enter, with a path short enough for a socket."""
     folder = TemporaryFolder(tempfile.gettempdir())
-    if len(bytes(folder.path / "viser")) <= _MAX_PATH_BYTES:
+    if len(bytes(folder.path / "viser")) <= MAX_SOCKET_PATH_BYTES or not HAS_UNIX_SOCKETS:
         return folder
     folder.close()
     return TemporaryFolder("/tmp")
 
 
 @contextlib.contextmanager
-def _served_on(path: Path) -> Generator[None, None, None]:
-    """Make `websockets` serve on a Unix socket at `path`, whatever host and port its caller passes.
+def _served_on(listener: socket.socket, secret: str) -> Generator[None, None, None]:
+    """Make `websockets` serve on a socket, whatever host and port its caller passes, and ask for the secret.
 
     viser has no option for it. It starts the server before its constructor returns, so nothing else is served
     meanwhile.
     """
     original = websockets.asyncio.server.serve
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    listener.bind(str(path))
 
-    def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
-        return original(handler, sock=listener, **options)
+    def serve(handler: Any, host: str, port: int, process_request: Any, **options: Any) -> Any:
+        async def answer(connection: Any, request: Any) -> Any:
+            if not hmac.compare_digest(request.headers.get(SECRET, "").encode(), secret.encode()):
+                return connection.respond(HTTPStatus.FORBIDDEN, "")
+            found = process_request(connection, request)
+            return await found if inspect.isawaitable(found) else found
+
+        return original(handler, sock=listener, process_request=answer, **options)
 
     websockets.asyncio.server.serve = serve  # pyrefly: ignore[bad-assignment]
     try:

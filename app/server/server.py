@@ -20,6 +20,7 @@ from aiohttp.typedefs import Handler, Middleware
 from app.server import connections, viser_proxy
 from app.server.access import NO_TOKEN, Access, root_of
 from app.server.page_requests import ROLE, answer_errors
+from app.server.private_viser import ViserPlace
 from app.server.static_files import KEPT, POLICY, PREFIX, ROUTE, PageFiles, connect_sources
 from app.state.role import Role
 
@@ -47,19 +48,19 @@ class PaneEndpoint(Protocol):
         """Serve one page until its socket closes; it joins by a name, which may be empty."""
 
 
-def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: Path) -> web.Application:
+def create_app(panes: PaneEndpoint, viser: ViserPlace, access: Access, static: Path) -> web.Application:
     """Build the web application.
 
     Args:
         panes: answers the pane sockets, one call per page.
-        viser_socket: the Unix socket of viser.
+        viser: where it is reached.
         access: the check of every request.
         static: the folder of the page (`static_files.static_folder`).
     """
     app = web.Application(middlewares=[_guard(access), answer_errors])
     app[_SOCKETS] = weakref.WeakSet()
     app[_ROOTS] = access.roots
-    proxy, files = viser_proxy.ViserProxy(viser_socket), PageFiles(static)
+    proxy, files = viser_proxy.ViserProxy(viser), PageFiles(static)
 
     async def page(request: web.Request) -> web.StreamResponse:
         if access.token is None or "token" not in request.query:

@@ -7,6 +7,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from tracker.compute import system
 from tracker.files import write_text_atomic
 
 _NAME = "token"
@@ -37,12 +38,12 @@ def kept_token(folder: Path) -> str:
 def _read(path: Path) -> str | None:
     """Return a token that only this user could have written and read, and that is not too old."""
     try:
-        file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        file = system.open_unlinked(path)
     except OSError:
         return None
     with os.fdopen(file, "rb") as opened:
         found = os.fstat(file)
-        is_private = stat.S_ISREG(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+        is_private = stat.S_ISREG(found.st_mode) and system.is_private(found)
         if not is_private or not 0 <= time.time() - found.st_mtime < _KEPT_S:
             return None
         text = opened.read(_MAX_BYTES).decode("ascii", "replace")

@@ -1,7 +1,6 @@
 """Forward requests under `/viser/` to viser, which has no check of its own."""
 
 import asyncio
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 from urllib.parse import unquote
@@ -9,6 +8,8 @@ from urllib.parse import unquote
 import aiohttp
 from aiohttp import web
 from yarl import URL
+
+from app.server.private_viser import SECRET, ViserPlace
 
 # viser's client is one page that unpacks itself: inline script and style, WebAssembly, workers from blobs.
 POLICY = (
@@ -22,7 +23,6 @@ POLICY = (
 _PASSED_DOWN = ("Content-Type", "Content-Length", "Content-Encoding")
 _MAX_MESSAGE_BYTES = 256 << 20
 _HEARTBEAT_S = 20.0
-_ORIGIN = "http://viser"  # a name for the Host header; the connection goes to the socket
 
 Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
@@ -35,14 +35,19 @@ def is_viser(path: str) -> bool:
 class ViserProxy:
     """A reverse proxy to one viser server; an asynchronous context that owns its connections."""
 
-    def __init__(self, socket: Path) -> None:
-        self._socket_path = socket
+    def __init__(self, place: ViserPlace) -> None:
+        self._place = place
         self._session: aiohttp.ClientSession | None = None
 
     async def __aenter__(self) -> Self:
+        path, port, secret = self._place
+        connector = aiohttp.UnixConnector(str(path), limit=0) if path else aiohttp.TCPConnector(limit=0)
         # Bodies are forwarded as compressed as they arrive.
         self._session = aiohttp.ClientSession(
-            _ORIGIN, auto_decompress=False, connector=aiohttp.UnixConnector(path=str(self._socket_path), limit=0)
+            "http://viser" if path else f"http://127.0.0.1:{port}",
+            auto_decompress=False,
+            connector=connector,
+            headers={SECRET: secret},
         )
         return self
 

@@ -38,6 +38,7 @@ from app.session.frame_cache import FrameCache
 from app.session.recent_sessions import remember
 from app.storage import rescue
 from app.storage.saver import Saver
+from tracker.compute.system import ENDING_SIGNALS
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -122,7 +123,7 @@ def open_session(
         try:
             SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
-            app = create_app(PaneSocket(participants, offers), viser.socket_path, doorway.access, static_folder())
+            app = create_app(PaneSocket(participants, offers), viser.place, doorway.access, static_folder())
             ExportRoutes(session.folder).add_to(app)
             is_private = is_loopback(serving.host) and not serving.allow_hosts
             no_paths = refusal(is_private, serving.token)
@@ -186,8 +187,12 @@ async def _until_interrupted(serving: Coroutine[Any, Any, None], is_chosen: asyn
     task = asyncio.ensure_future(serving)
     choice = asyncio.ensure_future(is_chosen.wait())
     is_program = threading.current_thread() is threading.main_thread()  # signals are for programs alone
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if is_program else ():
-        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, *ENDING_SIGNALS) if is_program else ():
+        try:
+            loop.add_signal_handler(number, task.cancel)
+        except NotImplementedError:  # not of all systems
+            signal.signal(number, lambda *_: loop.call_soon_threadsafe(task.cancel))
     await asyncio.wait({task, choice}, return_when=asyncio.FIRST_COMPLETED)
     if not choice.cancel():
         await asyncio.sleep(_ANSWER_S)

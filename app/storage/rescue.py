@@ -18,6 +18,7 @@ from platformdirs import user_data_path
 
 from app.remedies import page_text
 from app.storage.rescue_file import Model, Rescue, UnsavedEdit, read_rescue, write_rescue
+from tracker.compute import system
 from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.session.folder import SESSION_FILE
 from tracker.session.store.annotation_store import AnnotationStore
@@ -173,7 +174,7 @@ def _places(folder: Path) -> Iterator[Path]:
 
 def _files(folder: Path, store_id: str) -> list[Path]:
     files = [p for place in dict.fromkeys(_places(folder)) for p in place.glob(f"{_prefix(store_id)}*.json")]
-    own = [p for p in files if not hasattr(os, "getuid") or p.lstat().st_uid == os.getuid()]
+    own = [p for p in files if system.is_mine(p.lstat())]
     return sorted((p for p in own if p.is_file() and not p.is_symlink()), key=lambda p: p.name)
 
 

@@ -648,7 +648,7 @@ async def main(port):
 
     scene = PrivateViser()
     access = access_for("127.0.0.1", token=False)
-    app: web.Application = create_app(FakeEndpoint(n_people=1), scene.socket_path, access, static_folder())
+    app: web.Application = create_app(FakeEndpoint(n_people=1), scene.place, access, static_folder())
     await serve_forever(app, listen("127.0.0.1", port), lambda: print(f"http://127.0.0.1:{port}/"))
 
 

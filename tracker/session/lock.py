@@ -9,7 +9,6 @@ reused process numbers and the safe replacement of a stale lock would remain.
 
 import json
 import os
-import sys
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -17,13 +16,11 @@ from types import TracebackType
 
 import msgspec
 
+from tracker.compute import system
 from tracker.errors import SessionError
 from tracker.files import read_regular, refuse_links
 from tracker.session.holder import Holder, is_alive, this_holder, this_system
 from tracker.validation import check
-
-if sys.platform != "win32":
-    import fcntl
 
 LOCK_FILE = "lock.json"
 
@@ -180,20 +177,16 @@ def _parse(data: bytes) -> Holder | None:
 
 def _have_alone(number: int) -> bool:
     """Keep other programs of this machine from having an open file alone, until it is closed; False if one has it."""
-    if sys.platform == "win32":
-        return True
     until = time.monotonic() + _WRITING_S
     while True:
         try:
-            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if time.monotonic() >= until:
-                return False
-            time.sleep(_LOOK_S)
+            if system.lock_at_once(number):
+                return True
         except OSError:  # a drive without such locks
             return True
-        else:
-            return True
+        if time.monotonic() >= until:
+            return False
+        time.sleep(_LOOK_S)
 
 
 def _describe(holder: Holder | None, path: Path) -> str:

@@ -8,9 +8,10 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from app.runtime.memory import WORKER_BYTES, free_bytes, n_cores
+from app.cli.doctor import WORKER_BYTES
 from app.runtime.progress import Reporter
 from tracker.batch.manifest import Manifest
+from tracker.compute.system import free_bytes, n_cores, start_apart
 from tracker.errors import TrackerError
 
 _LOOK_S = 0.5
@@ -53,7 +54,7 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
     try:
         for number in range(n):
             with (logs / f"worker_{number}.txt").open("ab") as log:
-                workers.append(subprocess.Popen(words, stdout=log, stderr=log, env=environment, start_new_session=True))
+                workers.append(start_apart(words, stdout=log, stderr=log, env=environment))
         _watch(manifest, workers, progress)
     except KeyboardInterrupt:
         _stop(workers)
@@ -72,22 +73,22 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
     return False
 
 
-def n_workers(wanted: int | None, n_tasks: int, cores: int, free: int | None) -> tuple[int, str]:
+def n_workers(wanted: int | None, n_tasks: int, cores: int, free: int) -> tuple[int, str]:
     """Return a number of workers that memory allows, and a sentence where it is smaller than asked for.
 
     Args:
         wanted: number asked for; one for each core by default.
         n_tasks: number of tasks that are left, each stretch being one.
         cores: of the machine.
-        free: memory that programs can still have, bytes; None where the system does not provide it.
+        free: memory that programs can still have, bytes.
     """
     asked = min(wanted or cores, max(1, n_tasks))
-    allowed = asked if free is None else max(1, free // WORKER_BYTES)
+    allowed = max(1, free // WORKER_BYTES)
     if allowed >= asked:
         return asked, ""
     return allowed, (
         f"{allowed} of {asked} workers are started: each may need {WORKER_BYTES / 1e9:.1f} GB, and "
-        f"{(free or 0) / 1e9:.1f} GB are free"
+        f"{free / 1e9:.1f} GB are free"
     )
 
 

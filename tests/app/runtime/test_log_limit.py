@@ -13,6 +13,7 @@ from aiohttp import web
 from app.runtime import log_limit
 from app.server import connections, server
 from app.server.access import Access
+from app.server.private_viser import ViserPlace
 from app.server.static_files import static_folder
 
 ODD = [
@@ -70,7 +71,8 @@ async def asked(port, request):
 
 @pytest.fixture
 async def port_and_socket():
-    runner = connections.LimitedRunner(server.create_app(None, static_folder() / "nobody", Access(), static_folder()))
+    nobody = ViserPlace(static_folder() / "nobody", 0, "")
+    runner = connections.LimitedRunner(server.create_app(None, nobody, Access(), static_folder()))
     await runner.setup()
     with listening() as one:
         await web.SockSite(runner, one).start()

@@ -65,7 +65,7 @@ def test_the_files_of_the_page_are_kept(doorway):
     assert PageFiles(static_folder()).index() == page.replace("<html data-starting", "<html", 1)
 
 
-@pytest.mark.skipif(not doorways._FORKS, reason="threads answer on this system")
+@pytest.mark.skipif(not doorways.FORKS, reason="threads answer on this system")
 def test_a_process_of_its_own_answers_and_ends_with_the_program(monkeypatch, tmp_path):
     """However the program ends: the port is free again."""
     code = "import os, sys; from app.server.doorway import Doorway; from app.server.address import Serving\n"
@@ -83,7 +83,7 @@ def test_a_process_of_its_own_answers_and_ends_with_the_program(monkeypatch, tmp
 
 def test_threads_answer_where_a_process_cannot(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    monkeypatch.setattr(doorways, "_FORKS", False)
+    monkeypatch.setattr(doorways, "FORKS", False)
     with Doorway(Serving(port=0, browser=False)) as doorway:
         doorway.show(STEPS[1])
         assert json.loads(get(doorway, "/starting.json")[2])["at"] == 1

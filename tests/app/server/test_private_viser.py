@@ -12,7 +12,9 @@ import viser
 import websockets.asyncio.server
 
 from app.server import private_viser
-from app.server.private_viser import PrivateViser
+from app.server.private_viser import SECRET, PrivateViser
+from tracker.compute import system
+from tracker.compute.system import IS_PORTABLE
 from tracker.errors import TrackerError
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -40,10 +42,10 @@ def listening_ports(pid):
 
 
 @contextmanager
-def program(session, *options):
+def program(session, *options, is_portable=IS_PORTABLE):
     """`quadrille open` as a user starts it; gives the process and the page's address."""
     words = [sys.executable, "-m", "quadrille", "open", str(session), "--no-browser", "--port", "0", *options]
-    env = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    env = {**os.environ, "PYTHONUNBUFFERED": "1", "QUADRILLE_PORTABLE": str(int(is_portable))}
     process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=env)
     try:
         address = next(line.partition(": ")[2].strip() for line in process.stdout if ": http://" in line)
@@ -75,14 +77,20 @@ async def scene_bytes(url, patience_s=1.0, **options):
 
 @on_linux
 @pytest.mark.parametrize(
-    "options", [pytest.param((), marks=pytest.mark.slow), ("--host", "0.0.0.0", "--allow-host", "lab.example.org")]
+    ("options", "is_portable"),
+    [
+        pytest.param((), False, marks=pytest.mark.slow),
+        pytest.param((), True, marks=pytest.mark.slow),
+        (("--host", "0.0.0.0", "--allow-host", "lab.example.org"), IS_PORTABLE),
+    ],
 )
-async def test_no_port_of_the_program_gives_the_scene_to_a_stranger(session, options):
-    with program(session, *options) as (process, address):
+async def test_no_port_of_the_program_gives_the_scene_to_a_stranger(session, options, is_portable):
+    with program(session, *options, is_portable=is_portable) as (process, address):
         ports = listening_ports(process.pid)
         _, _, rest = address.removeprefix("http://").partition(":")
         page_port, _, query = rest.partition("/")
-        assert ports == {int(page_port)}
+        assert len(ports) == 1 + is_portable  # without Unix sockets viser has one
+        assert int(page_port) in ports
         assert await scene_bytes(f"http://127.0.0.1:{page_port}/viser/{query}", 10.0) > SCENE_BYTES  # the page itself
         for port in ports:
             for path in ("/", "/viser", "/viser/", "/ws"):
@@ -101,17 +109,32 @@ async def pages(ports):
         ]
 
 
+@pytest.mark.slow
+async def test_a_port_of_viser_asks_for_the_secret(monkeypatch):
+    monkeypatch.setattr(system, "HAS_UNIX_SOCKETS", False)
+    started = PrivateViser()
+    try:
+        assert started.place.path is None
+        url = f"http://127.0.0.1:{started.place.port}/"
+        assert await scene_bytes(url) == await scene_bytes(url, headers={SECRET: "guessed"}) == 0
+        assert await scene_bytes(url, headers={SECRET: started.place.secret}) > 0
+        assert not any(b"viser" in part for part in await pages([started.place.port]))
+    finally:
+        started.stop()
+
+
 @on_linux
+@pytest.mark.skipif(IS_PORTABLE, reason="viser has a port")
 def test_viser_listens_on_no_port_and_only_its_user_may_enter(capfd):
     before = listening_ports(os.getpid())
     started = PrivateViser()
     try:
         assert listening_ports(os.getpid()) == before
-        assert started.socket_path.is_socket()
-        assert started.socket_path.parent.stat().st_mode & 0o777 == 0o700
+        assert started.place.path.is_socket()
+        assert started.place.path.parent.stat().st_mode & 0o777 == 0o700
     finally:
         started.stop()
-    assert not started.socket_path.parent.exists()
+    assert not started.place.path.parent.exists()
     assert "http" not in capfd.readouterr().out
 
 
@@ -130,11 +153,12 @@ def test_a_viser_that_does_not_take_the_socket_is_not_used(monkeypatch, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(IS_PORTABLE, reason="viser has no socket")
 def test_a_long_temporary_folder_is_avoided(monkeypatch, tmp_path):
     long = tmp_path / ("long" * 30)
     long.mkdir()
     monkeypatch.setattr(private_viser.tempfile, "tempdir", str(long))
     started = PrivateViser()
-    assert started.socket_path.is_socket()
+    assert started.place.path.is_socket()
     started.stop()
     assert list(long.iterdir()) == []

@@ -12,6 +12,7 @@ from yarl import URL
 from app.server import address, server
 from app.server.access import Access, Invitation, access_for
 from app.server.connections import LimitedRunner
+from app.server.private_viser import ViserPlace
 from app.server.static_files import static_folder
 from tracker.errors import TrackerError
 
@@ -69,7 +70,8 @@ async def fake_viser(tmp_path):
     fake = FakeViser()
     app = web.Application()
     app.router.add_get("/{path:.*}", fake.handle)
-    async with listening_at(app, tmp_path / "viser") as fake.socket_path:
+    async with listening_at(app, tmp_path / "viser") as path:
+        fake.place = ViserPlace(path, 0, "secret")
         yield fake
 
 
@@ -80,7 +82,7 @@ def access():
 
 @pytest.fixture
 async def port(fake_viser, access):
-    app = server.create_app(EchoPanes(), fake_viser.socket_path, access, static_folder())
+    app = server.create_app(EchoPanes(), fake_viser.place, access, static_folder())
     async with listening(app) as port:
         yield port
 
@@ -256,7 +258,7 @@ class TestToken:
             await echo(sock)
 
     async def test_everything_is_served_below_the_root_to_those_who_have_the_cookie(self, fake_viser):
-        app = server.create_app(EchoPanes(), fake_viser.socket_path, NAMED, static_folder())
+        app = server.create_app(EchoPanes(), fake_viser.place, NAMED, static_folder())
         async with running(LimitedRunner(app, NAMED.roots)) as port, aiohttp.ClientSession() as session:
             root, name = f"http://127.0.0.1:{port}{NAMED.root}", NAMED.cookie(f"127.0.0.1:{port}")
             for path in ("", "static/main.js", "viser/", "ws"):
@@ -349,7 +351,7 @@ async def _answer(_):
 @pytest.mark.parametrize("role", ["annotate", "review", "look"])
 async def test_a_shared_link_shows_the_session_and_no_more(fake_viser, role):
     access = access_for("127.0.0.1", share=True)
-    app = server.create_app(TellingPanes(), fake_viser.socket_path, access, static_folder())
+    app = server.create_app(TellingPanes(), fake_viser.place, access, static_folder())
     app.router.add_get("/sessions", _answer)
     async with running(LimitedRunner(app, access.roots)) as port, aiohttp.ClientSession() as client:
         start = f"http://127.0.0.1:{port}"

@@ -84,7 +84,7 @@ async def test_viser_runs_in_its_frame_behind_the_proxy(browser, endpoint, tmp_p
     errors = []
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     try:
-        app = create_app(endpoint, scene.socket_path, Access(), static_folder())
+        app = create_app(endpoint, scene.place, Access(), static_folder())
         KeyRoutes(tmp_path, has_token=True).add_to(app)
         async with listening(app) as port:
             await page.goto(f"http://127.0.0.1:{port}/")

@@ -7,13 +7,13 @@ import re
 import sys
 import warnings
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
+from tracker.compute.system import limit_memory
 from tracker.errors import FormatError, Remedy, TrackerError
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut_hdf5, patch_deeplabcut_hdf5, read_deeplabcut_hdf5
 from tracker.formats.keypoints.hdf5 import CHANGES, LIMITS, PATCHED, ReadAnswer, VideoHead
@@ -88,14 +88,6 @@ def check_datasets(path: Path) -> None:
         raise FormatError.mismatch(where, "all data in one file", f"{quoted(elsewhere[0])} in another")
 
 
-def limit_memory() -> None:
-    """Limit the memory of this process, where the system can."""
-    with suppress(ImportError, ValueError, OSError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (LIMITS.memory_bytes, LIMITS.memory_bytes))
-
-
 def _change(path: Path, folder: Path) -> None:
     """Replace points in the copy of a file.
 
@@ -168,5 +160,5 @@ def main(path: Path, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    limit_memory()
+    limit_memory(LIMITS.memory_bytes)
     main(Path(sys.argv[1]), Path(sys.argv[2]))

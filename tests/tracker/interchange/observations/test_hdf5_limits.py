@@ -79,7 +79,7 @@ def test_filters_of_plug_ins_are_refused(tmp_path):
 
 
 def allocate_beyond_the_limit():
-    hdf5_process.limit_memory()
+    hdf5_process.limit_memory(hdf5_process.LIMITS.memory_bytes)
     try:
         np.empty(LIMITS.memory_bytes, np.uint8)
     except MemoryError:
