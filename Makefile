@@ -21,7 +21,7 @@ PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sy
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install run test test-all test-quick test-library test-page test-slow kernels bench check lint types \
-	page-types format docs release clean
+	page-types format docs release demo clean
 
 install: $(VENV)/.installed
 
@@ -93,6 +93,11 @@ release: $(VENV)/.tested
 	$(BIN)/python -m build --outdir dist
 	QUADRILLE_RELEASE_DIST=dist QUADRILLE_RELEASE_PYTHONS="$(RELEASE_PYTHONS)" $(BIN)/python -m pytest -m slow tests/release
 	ls -l dist
+
+# A folder to look at without installing anything: it opens from a file or any web server.
+DEMO ?= dist/demo
+demo: kernels
+	$(BIN)/python tests/recipes/demo.py $(DEMO)
 
 clean:
 	rm -rf dist $(VENV) node_modules .ruff_cache .hypothesis

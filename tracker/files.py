@@ -11,7 +11,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import NamedTuple
 
-from tracker.compute import system
+from tracker import system
 from tracker.errors import SessionError, TrackerError
 
 

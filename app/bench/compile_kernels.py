@@ -19,7 +19,6 @@ from app.session.samples import bundled
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.kernel_cache import compiled_mark, record_compiled, record_stage
 from tracker.compute.progress import result_of
-from tracker.compute.system import give_way, start_beside
 from tracker.errors import SessionError
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.estimation.posing.drag import drag
@@ -33,6 +32,7 @@ from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
 from tracker.session.lock import SessionLock
 from tracker.session.session import Session, load_session
+from tracker.system import give_way, start_beside
 
 if TYPE_CHECKING:
     from tracker.estimation.chamfer.settings import TrackSettings

@@ -27,9 +27,9 @@ from app.bench.sample_frames import FRAME, read_crowd, read_frame
 from app.session.samples import sample_copy
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
+from tracker.formats.text_files import TextKind, read_json
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.simulate import Simulation, simulate
-from tracker.text_files import TextKind, read_json
 from tracker.validation import Number, check
 
 BASELINE = Path(__file__).with_name("baseline.json")

@@ -17,7 +17,7 @@ from platformdirs import user_cache_path, user_state_path
 
 from app.runtime.json_output import format_json
 from tracker.compute.distribution import DISTRIBUTION, install_command, program_version
-from tracker.compute.system import HAS_BROWSER, free_bytes, n_cores
+from tracker.system import HAS_BROWSER, free_bytes, n_cores
 
 WORKER_BYTES = 5 << 29
 """Memory of a worker that finds people in four views of 640 x 480: 1.6 to 2.4 GB

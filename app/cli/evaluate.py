@@ -1,6 +1,7 @@
 """`quadrille evaluate`: compare stored poses with a reference."""
 
 from dataclasses import asdict, dataclass
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -41,6 +42,11 @@ class EvaluateArguments:
     clock: OptionalClock = None
     """frames: each frame number of the joints is a frame of the session; time: rows lie at their Time. By default
     DataRate and Time are compared, and a contradiction is an error."""
+    marker_set: OptionalName = None
+    """the reference has markers of this set: plug-in-gait, cast, helen-hayes, or a TOML file. Joint centres are made of
+    them, and laid over the poses by the motion, in time and in space."""
+    report: OptionalPath = None
+    """with --marker-set: HTML file to write, with Bland-Altman plots of joints and angles."""
     align: Literal["none", "rigid-all"] = "none"
     """rigid-all moves the whole reference onto the estimate first."""
     json: bool = False
@@ -56,12 +62,49 @@ def command(arguments: Annotated[EvaluateArguments, tyro.conf.arg(name="")]) -> 
     from tracker.evaluation.references import placement, read_reference
 
     at = load_target(arguments.session, arguments.person, several=False)
+    if arguments.marker_set is not None:
+        print(_against_markers(at, arguments, arguments.marker_set))
+        return
+    if arguments.report is not None:
+        raise TrackerError("expected --report with --marker-set, found no marker set; add it, or leave the report out")
     path, known = arguments.reference, placement(at.session, arguments.first_frame, arguments.clock)
     reference = read_reference(path, at.session, at.people[0], arguments.joint_map, arguments.axes, known)
     if reference.motion is not None and (known.first_frame is not None or known.clock is not None):
         raise TrackerError(f"expected --first-frame and --clock with joints, found poses in '{path}'; leave them out")
     found = evaluate(at, reference, arguments.frames, arguments.align, arguments.axes, arguments.stride)
     print(format_json(found) if arguments.json else _format(found))
+
+
+def _against_markers(at: Target, arguments: EvaluateArguments, marker_set: str) -> str:
+    """Compare the poses of one person with the markers of a capture system; return the text to print."""
+    from app.export.agreement_report import write_report
+    from app.export.agreement_table import agreement_record
+    from tracker.evaluation.markers.agreement import compare_with_markers
+    from tracker.evaluation.markers.reference import read_marker_reference
+    from tracker.evaluation.references import stored_motion
+
+    given = {name for name in ("joint_map", "first_frame", "clock") if getattr(arguments, name) is not None}
+    if given or arguments.axes != "x,y,z" or arguments.align != "none":
+        raise TrackerError(
+            "expected --marker-set without --joint-map, --axes, --first-frame, --clock and --align: clock and axes are "
+            "found by the motion; leave them out"
+        )
+    session, (index,) = at
+    estimate = stored_motion(session, index).joints
+    read = read_marker_reference(arguments.reference, marker_set, estimate)
+    found = evaluate(at, read.reference, arguments.frames, "none", stride=arguments.stride)
+    frames = [error.frame for error in found["per_frame"]]
+    copies, agreement = compare_with_markers(estimate, read.reference.joints, found["person"], frames)
+    if arguments.report is not None:
+        write_report(copies, agreement, None, arguments.report)
+    if arguments.json:
+        more = {"lag_s": read.lag_s, "T_world_markers": read.T_world_markers.tolist()}
+        return format_json(found | more | {"agreement": agreement_record(copies, agreement, {}, "all", None)})
+    lines = [_format(found), "  angle               bias  limits of agreement"]
+    for name, angle in agreement.angles.items():
+        bias, low, high = map(degrees, (angle.limits.bias, angle.limits.lower, angle.limits.upper))
+        lines.append(f"  {name.replace('_', ' '):16} {bias:5.1f} deg {low:7.1f} to {high:.1f} deg")
+    return "\n".join([*lines, *([f"wrote {arguments.report}"] if arguments.report else [])])
 
 
 def added_help() -> str:

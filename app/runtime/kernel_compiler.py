@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from tracker.compute.interpretation import interpret_modules
 from tracker.compute.kernel_cache import STAGES, compiled_stages, is_compiled
-from tracker.compute.system import end_apart, start_apart
+from tracker.system import end_apart, start_apart
 
 COMMAND = (sys.executable, "-P", "-m", "app.bench.compile_kernels", "--background")
 _POSING = "posing"

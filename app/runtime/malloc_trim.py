@@ -3,7 +3,7 @@
 import threading
 import time
 
-from tracker.compute.system import heap_trimmer
+from tracker.system import heap_trimmer
 
 
 def give_back_freed_memory(every_s: float = 5.0) -> None:

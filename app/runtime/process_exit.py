@@ -10,7 +10,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
-from tracker.compute.system import ENDING_SIGNALS
+from tracker.system import ENDING_SIGNALS
 
 INTERRUPTED = 130
 """Status after SIGINT, as shells report it: 128 and the number of the signal."""

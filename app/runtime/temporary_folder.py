@@ -5,7 +5,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from tracker.compute import system
+from tracker import system
 from tracker.errors import SessionError
 from tracker.session.lock import LOCK_FILE, SessionLock
 

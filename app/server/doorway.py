@@ -27,7 +27,7 @@ from app.server.access import access_for
 from app.server.address import Serving, listen, page_address, port_of
 from app.server.static_files import KEPT, POLICY, PREFIX, PageFiles, connect_sources, static_folder
 from app.state.role import Role
-from tracker.compute.system import FORKS, start_beside
+from tracker.system import FORKS, start_beside
 
 STEPS = ("Loading the program", "Opening the session", "Preparing the views")
 _ICON = "icon.svg"

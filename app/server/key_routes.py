@@ -13,7 +13,7 @@ from app.remedies import page_text
 from app.server.page_requests import read_body, require_page
 from tracker.errors import SessionError
 from tracker.files import write_text_atomic
-from tracker.text_files import TextKind, read_toml
+from tracker.formats.text_files import TextKind, read_toml
 
 KEYS_FILE = "keys.toml"
 """Name of the file in the user's state folder: the keys of a command by its label, `"Track forward" = ["T"]`."""

@@ -16,8 +16,8 @@ import viser
 import websockets.asyncio.server
 
 from app.runtime.temporary_folder import TemporaryFolder
-from tracker.compute.system import HAS_UNIX_SOCKETS, MAX_SOCKET_PATH_BYTES, private_listener
 from tracker.errors import TrackerError
+from tracker.system import HAS_UNIX_SOCKETS, MAX_SOCKET_PATH_BYTES, private_listener
 
 SECRET = "X-Quadrille-Secret"
 """Header of each request that viser answers."""

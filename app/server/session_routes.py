@@ -18,7 +18,7 @@ from app.server.page_requests import ROLE, read_body, require_page
 from app.session.path_choice import TypedPath, completions, typed_path
 from app.session.recent_sessions import TABLE_FILE, recent_batches, recent_sessions
 from tracker.errors import SessionError, TrackerError
-from tracker.text_files import TextKind, read_json
+from tracker.formats.text_files import TextKind, read_json
 
 _BATCHES = 3
 """Number of batches that are listed."""

@@ -7,7 +7,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from tracker.compute import system
+from tracker import system
 from tracker.files import write_text_atomic
 
 _NAME = "token"

@@ -38,13 +38,13 @@ from app.session.frame_cache import FrameCache
 from app.session.recent_sessions import remember
 from app.storage import rescue
 from app.storage.saver import Saver
-from tracker.compute.system import ENDING_SIGNALS
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.pipeline.calibration_revisions import follow_history
 from tracker.session.session import Session
 from tracker.session.store.annotation_store import AnnotationStore
+from tracker.system import ENDING_SIGNALS
 
 _ANSWER_S = 0.3
 """Time for the answer to a page that has chosen another session."""

@@ -10,8 +10,8 @@ from msgspec import Meta
 
 from tracker.errors import SessionError, TrackerError
 from tracker.files import write_text_atomic
+from tracker.formats.text_files import TextKind, read_json
 from tracker.session.folder import SESSION_FILE
-from tracker.text_files import TextKind, read_json
 from tracker.validation import check
 
 _FILE, _BATCHES_FILE = "recent_sessions.json", "recent_batches.json"

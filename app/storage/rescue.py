@@ -18,7 +18,7 @@ from platformdirs import user_data_path
 
 from app.remedies import page_text
 from app.storage.rescue_file import Model, Rescue, UnsavedEdit, read_rescue, write_rescue
-from tracker.compute import system
+from tracker import system
 from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.session.folder import SESSION_FILE
 from tracker.session.store.annotation_store import AnnotationStore

@@ -42,7 +42,8 @@ HOUSE = {
     "tracker/  the library": [
         ["batch", "simulate"],
         ["api", "annotation"],
-        ["evaluation/judging", "evaluation/agreement"],
+        ["evaluation/judging", "evaluation/markers"],
+        ["evaluation/agreement"],
         ["evaluation"],
         ["pipeline"],
         ["calibration/self_calibration"],

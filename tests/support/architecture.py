@@ -55,6 +55,7 @@ ROOMS = [
     "tracker.pipeline",
     "tracker.evaluation",
     "tracker.evaluation.agreement",
+    "tracker.evaluation.markers",
     "tracker.evaluation.judging",
     "tracker.annotation",
     "tracker.api",

@@ -8,8 +8,8 @@ from pathlib import Path
 import tomli_w
 
 from tracker.files import write_text_atomic
+from tracker.formats.text_files import read_toml
 from tracker.interchange.observations.stored import DESCRIPTION, FOLDER, KIND
-from tracker.text_files import read_toml
 
 
 def copy_observations(source: Path, into: Path) -> list[str]:

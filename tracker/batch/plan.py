@@ -12,9 +12,9 @@ from msgspec import Meta
 from tracker.batch.table import Footage, Problem, Table, matches, read_table
 from tracker.errors import TrackerError
 from tracker.formats.file_names import file_stems
+from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.session.folder import SESSION_FILE
 from tracker.session.frame_list import parse_frame_list
-from tracker.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.validation import FilePath, Name, check
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from tracker.errors import TrackerError
 from tracker.files import entries_below, paths_in
+from tracker.formats.text_files import DOCUMENT_BYTES, LOST, TextKind, read_text
 from tracker.session.assemble import NewSession
-from tracker.text_files import DOCUMENT_BYTES, LOST, TextKind, read_text
 from tracker.validation import FilePath, FileStem, check
 
 _KIND = TextKind("table", DOCUMENT_BYTES, TrackerError)

@@ -12,7 +12,7 @@ from tracker.batch.stretches import Division, RecordingStretch, SeamRow
 from tracker.errors import Remedy, TrackerError
 from tracker.files import read_regular
 from tracker.formats.file_names import own_identifier
-from tracker.text_files import DOCUMENT_BYTES, TABLE_BYTES, TextKind, read_json
+from tracker.formats.text_files import DOCUMENT_BYTES, TABLE_BYTES, TextKind, read_json
 from tracker.validation import FileStem, check
 
 T = TypeVar("T")

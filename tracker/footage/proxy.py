@@ -26,8 +26,8 @@ from tracker.files import check_regular, open_regular, read_regular, write_text_
 from tracker.footage.frame_index import stamp_of
 from tracker.footage.image_file import decode_image
 from tracker.footage.video import Footage
+from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, read_json
 from tracker.geometry.arrays import Image
-from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
 from tracker.validation import check
 
 FOLDER = "proxies"

@@ -15,9 +15,9 @@ import tomli_w
 from tracker.errors import CalibrationError
 from tracker.files import write_text_atomic
 from tracker.formats.camera_section import check_names, read_entry
+from tracker.formats.text_files import TextKind, parse_toml, read_text
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.text_files import TextKind, parse_toml, read_text
 from tracker.validation import quoted
 
 KIND = TextKind("calibration", 4_000_000, CalibrationError)

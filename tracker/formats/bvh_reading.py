@@ -8,9 +8,9 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
+from tracker.formats.text_files import TABLE_BYTES, TextKind, read_lines
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
-from tracker.text_files import TABLE_BYTES, TextKind, read_lines
 from tracker.validation import MAX_NUMBER, FrameRate, check, quoted
 
 _KIND = TextKind("BVH file", TABLE_BYTES, FormatError, "export it again")

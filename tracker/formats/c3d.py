@@ -16,10 +16,10 @@ import numpy as np
 from tracker.errors import FormatError, Remedy
 from tracker.files import IrregularFileError, read_regular
 from tracker.formats.number_rows import MAX_NAMES, check_size
+from tracker.formats.text_files import TABLE_BYTES
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import METRES_BY_WORD
-from tracker.text_files import TABLE_BYTES
 from tracker.validation import MAX_NUMBER, FrameRate, check, quoted
 
 _BLOCK_BYTES = 512

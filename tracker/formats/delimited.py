@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tracker.errors import FormatError
-from tracker.text_files import TABLE_BYTES, TextKind, read_lines
+from tracker.formats.text_files import TABLE_BYTES, TextKind, read_lines
 
 _KIND = TextKind("table", TABLE_BYTES, FormatError, "export it again")
 _SEPARATORS = "\t;,"

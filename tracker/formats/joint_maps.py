@@ -13,8 +13,8 @@ from pathlib import Path
 import msgspec
 
 from tracker.errors import FormatError, Remedy
+from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml, read_toml
 from tracker.formats.trc import MarkerTable
-from tracker.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml, read_toml
 from tracker.validation import Name, check
 
 LIMB_JOINTS = tuple(

@@ -21,8 +21,8 @@ from msgspec import Meta
 from tracker.body.model import BodyModel
 from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
+from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml, read_text
 from tracker.geometry.arrays import TINY
-from tracker.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml, read_text
 from tracker.validation import UNPRINTABLE, Color, Name, Vector, check, check_version
 
 VERSION = 1

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from tracker.errors import FormatError
 from tracker.formats.delimited import head_cells
-from tracker.text_files import TABLE_BYTES, TextKind, read_json, read_lines
+from tracker.formats.text_files import TABLE_BYTES, TextKind, read_json, read_lines
 
 _TEXT = TextKind("file", TABLE_BYTES, FormatError)
 _HEAD_LINES = 12

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import yaml
 
-from tracker.text_files import LOST, MAX_NESTING, TextKind, refuse_lost
+from tracker.formats.text_files import LOST, MAX_NESTING, TextKind, refuse_lost
 from tracker.validation import quoted
 
 _OPENCV_HEADER = re.compile(r"\A\s*%YAML[: ][^\n]*\n")

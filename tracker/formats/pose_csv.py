@@ -25,8 +25,8 @@ from tracker.body.model import BodyModel
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
 from tracker.formats.number_rows import MAX_NAMES, NumberRows
+from tracker.formats.text_files import TABLE_BYTES, TextKind, read_lines, refuse_lost
 from tracker.geometry.arrays import Array
-from tracker.text_files import TABLE_BYTES, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_NUMBER, Name, check_version, quoted
 
 VERSION = 1

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
 from tracker.formats.number_rows import MAX_NAMES, MAX_TIME, NumberRows, not_a_number
+from tracker.formats.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
 from tracker.formats.text_patch import TextPatch
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import METRES_BY_WORD
-from tracker.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, FrameRate, check, quoted
 
 _KIND = TextKind("TRC file", TABLE_BYTES, FormatError, "export it again")

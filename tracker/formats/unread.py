@@ -11,7 +11,7 @@ import msgspec
 from tracker.errors import FormatError
 from tracker.files import open_regular
 from tracker.formats.observation_layout import Sample
-from tracker.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml
+from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, packaged_texts, parse_toml
 
 
 class Unread(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

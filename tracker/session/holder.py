@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 import msgspec
 from msgspec import Meta
 
-from tracker.compute import system
+from tracker import system
 from tracker.files import read_regular
 
 _Word: TypeAlias = Annotated[str, Meta(max_length=300)]

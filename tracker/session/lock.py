@@ -16,7 +16,7 @@ from types import TracebackType
 
 import msgspec
 
-from tracker.compute import system
+from tracker import system
 from tracker.errors import SessionError
 from tracker.files import read_regular, refuse_links
 from tracker.session.holder import Holder, is_alive, this_holder, this_system

@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from tracker.errors import SessionError
-from tracker.text_files import DOCUMENT_BYTES, TextKind, read_toml
+from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.validation import (
     MAX_FRAMES,
     Color,

@@ -11,8 +11,8 @@ from pathlib import Path
 from app.cli.doctor import WORKER_BYTES
 from app.runtime.progress import Reporter
 from tracker.batch.manifest import Manifest
-from tracker.compute.system import free_bytes, n_cores, start_apart
 from tracker.errors import TrackerError
+from tracker.system import free_bytes, n_cores, start_apart
 
 _LOOK_S = 0.5
 _END_S = 10.0

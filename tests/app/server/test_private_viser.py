@@ -13,9 +13,9 @@ import websockets.asyncio.server
 
 from app.server import private_viser
 from app.server.private_viser import SECRET, PrivateViser
-from tracker.compute import system
-from tracker.compute.system import IS_PORTABLE
+from tracker import system
 from tracker.errors import TrackerError
+from tracker.system import IS_PORTABLE
 
 ROOT = Path(__file__).resolve().parents[3]
 EVIL = "http://evil.example"

@@ -6,7 +6,7 @@ import pytest
 
 from tracker.errors import CalibrationError
 from tracker.formats.plain_data import parse_yaml
-from tracker.text_files import TextKind
+from tracker.formats.text_files import TextKind
 
 KIND = TextKind("calibration", 500_000, CalibrationError)
 

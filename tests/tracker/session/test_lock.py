@@ -11,7 +11,7 @@ from itertools import combinations
 import msgspec
 import pytest
 
-from tracker.compute import system
+from tracker import system
 from tracker.errors import SessionError
 from tracker.session import holder as holder_module
 from tracker.session import lock as lock_module
@@ -231,9 +231,7 @@ def test_a_container_with_the_same_host_name_does_not_steal_the_lock(tmp_path):
 def test_a_process_that_nobody_has_asked_for_its_status_is_dead():
     child = subprocess.Popen([sys.executable, "-c", "pass"])
     os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)
-    holder = msgspec.structs.replace(
-        holder_module.this_holder(), process=child.pid, started=system.start_of(child.pid)
-    )
+    holder = msgspec.structs.replace(holder_module.this_holder(), process=child.pid, started=system.start_of(child.pid))
     assert not holder_module.is_alive(holder)
     child.wait()
 

@@ -12,9 +12,9 @@ from msgspec import Meta
 
 from tracker.errors import CalibrationError
 from tracker.formats.camera_section import METRES
+from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import check_usual
-from tracker.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.validation import check
 
 KIND = TextKind("board", DOCUMENT_BYTES, CalibrationError)

@@ -11,7 +11,7 @@ from tracker.errors import CalibrationError
 from tracker.formats.anipose import KIND
 from tracker.formats.calibrations.foreign import name_binary
 from tracker.formats.plain_data import parse_json, parse_xml, parse_yaml, storage_data
-from tracker.text_files import parse_toml, read_text
+from tracker.formats.text_files import parse_toml, read_text
 from tracker.validation import quoted
 
 _TOML_LINE = re.compile(r"\[{1,2}[^\[\]{}\n]+\]{1,2}\s*(#.*)?|[\w.\"'-]+\s*=.*")

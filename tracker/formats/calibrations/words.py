@@ -4,7 +4,7 @@ import re
 from fnmatch import translate
 
 from tracker.formats.anipose import KIND
-from tracker.text_files import packaged_texts, parse_toml
+from tracker.formats.text_files import packaged_texts, parse_toml
 
 _TABLE = parse_toml(packaged_texts("formats", "calibrations")["words"], "words.toml", KIND)
 MEANINGS: dict[str, str] = {word: meaning for meaning, words in _TABLE["meanings"].items() for word in words.split()}

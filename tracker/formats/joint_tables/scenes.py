@@ -12,10 +12,10 @@ import numpy as np
 from tracker.errors import FormatError, Remedy
 from tracker.formats.number_rows import MAX_NAMES, check_size
 from tracker.formats.observation_layout import Sample
+from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, read_json
 from tracker.formats.trc import MarkerTable, mask_missing
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.lengths import METRES_BY_WORD
-from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
 from tracker.validation import MAX_FRAMES, Number, check
 
 Scenes: TypeAlias = list[tuple[Path, MarkerTable]]

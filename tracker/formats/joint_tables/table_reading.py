@@ -12,10 +12,10 @@ from tracker.errors import FormatError, Remedy
 from tracker.formats.delimited import Delimited, read_delimited
 from tracker.formats.joint_tables.columns import Columns, ColumnsOf
 from tracker.formats.number_rows import MAX_NAMES, MAX_TIME, NumberRows, check_size
+from tracker.formats.text_files import LOST
 from tracker.formats.trc import MarkerTable, mask_missing, stated_rate
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.lengths import METRES_BY_WORD
-from tracker.text_files import LOST
 from tracker.validation import MAX_NUMBER, quoted
 
 Series: TypeAlias = Mapping[str, tuple[IntArray, int]]

@@ -15,7 +15,7 @@ from tracker.errors import FormatError
 from tracker.formats.keypoints.picture_names import picture_names
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
 from tracker.formats.number_rows import MAX_NAMES, check_size
-from tracker.text_files import read_json
+from tracker.formats.text_files import read_json
 from tracker.validation import MAX_FRAMES, MAX_SIDE_PX, Name, Number, check
 
 _FrameNumber = Annotated[int, msgspec.Meta(ge=0, le=MAX_FRAMES, description=f"a whole number of at most {MAX_FRAMES}")]

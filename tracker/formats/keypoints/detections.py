@@ -16,8 +16,8 @@ from tracker.formats.joint_maps import joint_maps_of_size
 from tracker.formats.keypoints.openpose import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of, triples
 from tracker.formats.number_rows import MAX_NAMES, not_a_number
+from tracker.formats.text_files import read_json, read_lines
 from tracker.geometry.arrays import Array
-from tracker.text_files import read_json, read_lines
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, Name, Number, check
 
 _Place = tuple[Number, Number]

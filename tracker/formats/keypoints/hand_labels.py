@@ -15,7 +15,7 @@ from tracker.formats.keypoints.openpose import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
 from tracker.formats.number_rows import MAX_NAMES, check_size
 from tracker.formats.plain_data import parse_xml
-from tracker.text_files import read_json, read_text
+from tracker.formats.text_files import read_json, read_text
 from tracker.validation import MAX_FRAMES, MAX_SIDE_PX, Name, check, quoted
 
 Tables = list[tuple[tuple[str, ...], PictureTable]]

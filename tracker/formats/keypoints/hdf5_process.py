@@ -13,7 +13,6 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tracker.compute.system import limit_memory
 from tracker.errors import FormatError, Remedy, TrackerError
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut_hdf5, patch_deeplabcut_hdf5, read_deeplabcut_hdf5
 from tracker.formats.keypoints.hdf5 import CHANGES, LIMITS, PATCHED, ReadAnswer, VideoHead
@@ -24,6 +23,7 @@ from tracker.formats.keypoints.sleap_files import read_sleap
 from tracker.formats.keypoints.sleap_patching import is_analysis, patch_analysis, patch_project
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array
+from tracker.system import limit_memory
 from tracker.validation import quoted
 
 _PICTURES = re.compile(r"video\d*(/.*)?")

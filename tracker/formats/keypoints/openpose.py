@@ -13,8 +13,8 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.keypoints.picture_table import PicturePerson, text_of
+from tracker.formats.text_files import read_json
 from tracker.geometry.arrays import Array, IntArray
-from tracker.text_files import read_json
 from tracker.validation import Number, check
 
 _KIND = text_of("OpenPose")

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tracker.errors import FormatError
 from tracker.formats.number_rows import check_size
+from tracker.formats.text_files import TABLE_BYTES, TextKind
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.text_files import TABLE_BYTES, TextKind
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,4 +5,4 @@ Callers use `c3d.write_c3d`, `gltf.write_glb`,
 `movement_netcdf.write_dataset` and `indexed_png.write_indexed_png`.
 """
 
-__all__ = ["c3d", "gltf", "indexed_png", "movement_netcdf", "optional_packages"]
+__all__ = ["c3d", "gltf", "indexed_png", "movement_netcdf", "opensim_model", "optional_packages"]

@@ -22,10 +22,10 @@ from tracker.formats.keypoints.coco import (
     write_coco,
 )
 from tracker.formats.motion_csv import MotionRow, write_motion_csv
-from tracker.formats.opensim_model import write_mot, write_osim
 from tracker.formats.pose_csv import value_units
 from tracker.formats.trc import write_trc
 from tracker.formats.write_only.gltf import AnimatedBody, write_glb
+from tracker.formats.write_only.opensim_model import write_mot, write_osim
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.interchange.exports.export_format import Tick

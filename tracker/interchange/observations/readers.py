@@ -23,11 +23,11 @@ from tracker.formats.keypoints.json_patching import patch_coco, patch_openpose
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_files
 from tracker.formats.observation_layout import ObservationLayout, Sample
+from tracker.formats.text_files import TABLE_BYTES, TextKind, read_json
 from tracker.formats.trc import MarkerTable, patch_trc, read_trc
 from tracker.formats.unread import unread
 from tracker.interchange.observations.mask_files import MaskFiles
 from tracker.interchange.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
-from tracker.text_files import TABLE_BYTES, TextKind, read_json
 from tracker.validation import quoted
 
 _JSON = TextKind("file", TABLE_BYTES, FormatError, "export it again")

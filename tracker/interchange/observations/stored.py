@@ -25,6 +25,7 @@ from tracker.errors import SessionError
 from tracker.files import refuse_links, sync_folder, write_text_atomic
 from tracker.formats.joint_maps import format_joint_map, parse_joint_map
 from tracker.formats.number_rows import MAX_NAMES, MAX_VALUES
+from tracker.formats.text_files import TABLE_BYTES, TextKind, read_toml
 from tracker.geometry.arrays import DAMAGED_ARRAYS, Array
 from tracker.interchange.observations.observed import (
     ObservationSet,
@@ -34,7 +35,6 @@ from tracker.interchange.observations.observed import (
     checksum,
 )
 from tracker.session.session import Session
-from tracker.text_files import TABLE_BYTES, TextKind, read_toml
 from tracker.validation import FileStem, Name, check, check_version, quoted
 
 FOLDER = "observations"

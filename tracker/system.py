@@ -166,9 +166,8 @@ def end_apart(process: "subprocess.Popen[bytes]") -> None:
 
 def start_beside(work: Callable[..., None], *arguments: Any) -> Any:
     """Start work in a process that ends with this one: a copy where the system has them, else a new interpreter."""
-    process: Any = multiprocessing.get_context("fork" if FORKS else "spawn").Process(
-        target=work, args=arguments, daemon=True
-    )
+    context: Any = multiprocessing.get_context("fork" if FORKS else "spawn")
+    process = context.Process(target=work, args=arguments, daemon=True)
     process.start()
     return process
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tracker.errors import SessionError
-from tracker.text_files import (
+from tracker.formats.text_files import (
     MAX_NESTING,
     TABLE_BYTES,
     TextKind,

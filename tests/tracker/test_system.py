@@ -8,7 +8,7 @@ import sys
 import pytest
 from architecture import FILES
 
-from tracker.compute import system
+from tracker import system
 
 OF_ONE_SYSTEM = re.compile(
     r"\b(?:fcntl|msvcrt|psutil|ctypes|AF_UNIX|O_(?:NOFOLLOW|NONBLOCK|BINARY|CLOEXEC)|SIG(?:HUP|BREAK|KILL|CHLD)|killpg"
@@ -20,7 +20,7 @@ BOTH = pytest.mark.parametrize("is_linux", [system._IS_LINUX, False])
 
 def test_no_other_module_names_what_one_system_has():
     found = {name: OF_ONE_SYSTEM.findall(path.read_text("utf-8")) for name, path in FILES.items()}
-    assert {name for name, calls in found.items() if calls} == {"tracker.compute.system"}
+    assert {name for name, calls in found.items() if calls} == {"tracker.system"}
 
 
 @BOTH

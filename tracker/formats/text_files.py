@@ -19,7 +19,7 @@ from typing import Any
 
 import msgspec
 
-from tracker.compute import system
+from tracker import system
 from tracker.errors import TrackerError
 from tracker.files import open_regular
 
