@@ -14,6 +14,7 @@ from serving import listening
 
 from app.server.access import Access
 from app.server.key_routes import KEYS_FILE, KeyRoutes
+from app.server.private_viser import ViserPlace
 from app.server.server import create_app
 from app.server.static_files import static_folder
 
@@ -66,7 +67,7 @@ async def blank_viser(tmp_path_factory):
     runner = web.AppRunner(app, shutdown_timeout=0.1)
     await runner.setup()
     await web.UnixSite(runner, path).start()
-    yield path
+    yield ViserPlace(path, 0, "")
     await runner.cleanup()
 
 
@@ -100,7 +101,7 @@ async def server(blank_viser, tmp_path_factory):
 def keys_file(server):
     """The user's keys, which the page reads when it is loaded; there are none."""
     path = server.state_folder / KEYS_FILE
-    yield path
+    yield ViserPlace(path, 0, "")
     path.unlink(missing_ok=True)
 
 

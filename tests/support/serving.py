@@ -9,6 +9,7 @@ from aiohttp import web
 
 from app.server import server
 from app.server.access import Access
+from app.server.private_viser import ViserPlace
 from app.server.static_files import static_folder
 
 
@@ -16,6 +17,10 @@ async def answer(client, path, **headers):
     """Return status and text of an answer; bytes that are no text are replaced."""
     async with client.get(path, headers=headers) as response:
         return response.status, await response.text(errors="replace")
+
+
+NO_VISER = ViserPlace(Path("/nowhere/viser"), 0, "")
+"""A place at which nothing listens."""
 
 
 class Nobody:
@@ -46,7 +51,7 @@ class Page:
 @asynccontextmanager
 async def page_of(*routes, kind=Page):
     """Serve the program with some routes alone; gives its page."""
-    app = server.create_app(Nobody(), Path("/nowhere/viser"), Access(token="secret"), static_folder())
+    app = server.create_app(Nobody(), NO_VISER, Access(token="secret"), static_folder())
     for own in routes:
         own.add_to(app)
     async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:

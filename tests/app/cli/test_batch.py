@@ -89,7 +89,6 @@ def test_memory_bounds_the_workers_and_that_is_said(wanted, n_tasks, cores, free
     assert bool(note) == (n < min(wanted or cores, n_tasks))
     if note:
         assert f"{n} of {min(wanted or cores, n_tasks)} workers are started" in note
-    assert n_workers(wanted, n_tasks, cores, None) == (min(wanted or cores, n_tasks), "")
 
 
 def test_the_scripts_of_a_job_array_are_shell_and_name_what_is_there(run, plan):

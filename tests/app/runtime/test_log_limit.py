@@ -9,11 +9,11 @@ from contextlib import contextmanager
 
 import pytest
 from aiohttp import web
+from serving import NO_VISER
 
 from app.runtime import log_limit
 from app.server import connections, server
 from app.server.access import Access
-from app.server.private_viser import ViserPlace
 from app.server.static_files import static_folder
 
 ODD = [
@@ -71,8 +71,7 @@ async def asked(port, request):
 
 @pytest.fixture
 async def port_and_socket():
-    nobody = ViserPlace(static_folder() / "nobody", 0, "")
-    runner = connections.LimitedRunner(server.create_app(None, nobody, Access(), static_folder()))
+    runner = connections.LimitedRunner(server.create_app(None, NO_VISER, Access(), static_folder()))
     await runner.setup()
     with listening() as one:
         await web.SockSite(runner, one).start()

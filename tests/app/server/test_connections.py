@@ -5,7 +5,7 @@ from contextlib import closing
 
 import aiohttp
 import pytest
-from serving import running
+from serving import NO_VISER, running
 
 from app.server import connections, server
 from app.server.access import Access
@@ -26,7 +26,7 @@ def short_times(monkeypatch):
 
 
 def serving():
-    app = server.create_app(EchoPanes(), static_folder() / "nobody", Access(), static_folder())
+    app = server.create_app(EchoPanes(), NO_VISER, Access(), static_folder())
     return running(connections.LimitedRunner(app))
 
 

@@ -1,12 +1,11 @@
 import asyncio
 import re
 from contextlib import asynccontextmanager
-from pathlib import Path
 
 import aiohttp
 import pytest
 from aiohttp import web
-from serving import answer, listening, running
+from serving import NO_VISER, answer, listening, running
 from yarl import URL
 
 from app.server import address, server
@@ -16,7 +15,6 @@ from app.server.private_viser import ViserPlace
 from app.server.static_files import static_folder
 from tracker.errors import TrackerError
 
-NOBODY = Path("/nowhere/viser")
 NAMED = Access(frozenset({"lab.example.org"}), "secret", Invitation())
 
 
@@ -226,7 +224,7 @@ async def test_a_page_that_leaves_closes_its_viser_socket(client, fake_viser):
 
 
 async def test_without_viser_the_proxy_says_so(tmp_path):
-    app = server.create_app(EchoPanes(), tmp_path / "nobody", Access(), static_folder())
+    app = server.create_app(EchoPanes(), NO_VISER, Access(), static_folder())
     async with (
         listening(app) as port,
         aiohttp.ClientSession() as session,
@@ -319,7 +317,7 @@ def test_a_busy_port_is_refused_if_named_and_passed_over_if_not():
 async def test_serving_closes_its_sockets_at_the_end():
     ready = asyncio.get_running_loop().create_future()
     sockets = address.listen("127.0.0.1", 0)
-    app = server.create_app(EchoPanes(), NOBODY, Access(), static_folder())
+    app = server.create_app(EchoPanes(), NO_VISER, Access(), static_folder())
     task = asyncio.create_task(server.serve_forever(app, sockets, lambda: ready.set_result(True)))
     await asyncio.wait_for(ready, 20.0)
     url = address.page_address(Access(), "127.0.0.1", address.port_of(sockets))
