@@ -1,11 +1,11 @@
-"""Figures that several documents show are those of the recordings' table of docs/accuracy.md, where they are kept."""
+"""Figures of several documents are those of the recordings' table of docs/log/accuracy.md, where they are kept."""
 
 import re
 
 import numpy as np
 from architecture import ROOT
 
-KEPT_IN, ALL_ROWS = "docs/accuracy.md", "docs/measurements.md"
+KEPT_IN, ALL_ROWS = "docs/log/accuracy.md", "docs/measurements.md"
 
 
 def tables(page):

@@ -8,7 +8,7 @@ import pytest
 from architecture import ROOT
 
 BENCHMARKS = ROOT / "tests" / "benchmarks"
-DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
+DOCUMENTS = sorted((ROOT / "docs").rglob("*.md"))
 PLACE = re.compile(r"^<!-- table: (.+) -->$", re.MULTILINE)
 DOCUMENT = "# A\n\n<!-- table: a -->\n\nold\n\n<!-- end -->\n\nbetween\n\n<!-- table: a b -->\n<!-- end -->\n\nlast\n"
 
@@ -33,7 +33,7 @@ def test_each_table_has_a_benchmark_and_each_benchmark_a_place():
     assert sorted(places) == sorted(names)
 
 
-@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda p: p.name)
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_each_place_states_conditions_and_tree(page):
     text = page.read_text("utf-8")
     for name in PLACE.findall(text):

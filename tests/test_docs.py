@@ -11,11 +11,16 @@ from code_counts import git
 
 from app.main import main
 
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "sample_sessions").glob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "sample_sessions").glob("*.md")])
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)(#[^)]*)?\)")
 HEADING_LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)#([^)\s]+)\)")
 FILE = re.compile(r"`((?:app|tracker|static|tests|docs|sample_sessions)/[\w./-]+)`")
 COMMAND = re.compile(r"^ {4}(?:\.venv/bin/)?(quadrille\b(?:[^\\\n]|\\\n)*)", re.MULTILINE)
+
+
+def place_of(page):
+    """Path of a page from the root."""
+    return page.relative_to(ROOT).as_posix()
 
 
 def anchors(page):
@@ -34,13 +39,13 @@ def words_of(path):
         yield shlex.split(line.replace("\\\n", " "), comments=True)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+@pytest.mark.parametrize("page", PAGES, ids=place_of)
 def test_links_lead_somewhere(page):
     missing = [target for target, _ in LINK.findall(page.read_text("utf-8")) if not (page.parent / target).exists()]
     assert missing == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+@pytest.mark.parametrize("page", PAGES, ids=place_of)
 def test_links_to_headings_lead_to_one(page):
     links = [(target or page.name, name) for target, name in HEADING_LINK.findall(page.read_text("utf-8"))]
     missing = [link for link in links if link[0].endswith(".md") and link[1] not in anchors(page.parent / link[0])]
@@ -53,7 +58,7 @@ def test_anchors_are_those_that_the_host_makes(tmp_path):
     assert anchors(page) == {"what---paper-is", "a-b--c-xy_z", "same", "same-1"}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+@pytest.mark.parametrize("page", PAGES, ids=place_of)
 def test_files_that_are_named_exist(page):
     names = [name for name in FILE.findall(page.read_text("utf-8")) if "NAME" not in name]
     missing = [name for name in names if not (ROOT / name).exists()]
@@ -66,7 +71,7 @@ def test_the_site_has_each_document_once():
     outside = dict(
         re.findall(r'^    "(\S+\.md)": "(\S+\.md)"', (ROOT / "docs/site/hooks.py").read_text("utf-8"), re.MULTILINE)
     )
-    places = [outside.get(page.relative_to(ROOT).as_posix(), page.name) for page in PAGES]
+    places = [outside.get(place_of(page), place_of(page).removeprefix("docs/")) for page in PAGES]
     assert sorted(listed) == sorted(places)
 
 

@@ -54,7 +54,7 @@ PYTHON = [*FILES.values(), *sorted((ROOT / "tests").rglob("*.py"))]
 PROSE = [
     *PYTHON,
     *sorted(ROOT.glob("*.md")),
-    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
     *(STATIC / script for script in SCRIPTS),
     *sorted(STATIC.rglob("*.html")),
 ]

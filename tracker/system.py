@@ -186,7 +186,7 @@ def give_way() -> None:
 def private_listener(folder: Path) -> tuple[socket.socket, Path | None]:
     """Return a socket that listens for this program alone, and its path: in a folder that only this user may enter.
 
-    Without Unix sockets it is a port of this machine, and the path is None: whoever connects must know a secret.
+    Without Unix sockets it is a port of this machine, and the path is None: a request needs a secret.
     """
     if not HAS_UNIX_SOCKETS:
         return socket.create_server(("127.0.0.1", 0)), None

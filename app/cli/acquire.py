@@ -50,7 +50,7 @@ class AcquireArguments:
     dry_run: bool = False
     """show the sizes, but change nothing in the session."""
     json: bool = False
-    """print one JSON object; docs/acquisition.md lists its keys."""
+    """print one JSON object; docs/log/acquisition.md lists its keys."""
 
 
 def command(arguments: Annotated[AcquireArguments, tyro.conf.arg(name="")]) -> None:

@@ -31,8 +31,8 @@ class NewArguments:
     session: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="folder to make")]
     """folder to make."""
     calibration: Paths = ()
-    """file of all cameras, a folder, or a file for each camera, of a layout that docs/recordings.md lists; by default
-    the one beside a folder of videos."""
+    """file of all cameras, a folder, or a file for each camera, of a layout that docs/log/recordings.md lists; by
+    default the one beside a folder of videos."""
     videos: Paths = ()
     """video files or image folders, each named after its camera, or the folder of all; images are paired by their
     numbers. Of a folder of all, calibration, background and masks are taken, too."""

@@ -64,7 +64,7 @@ def _writing(out: Path) -> Generator[None, None, None]:
 
 
 def board_record(calibrated: "FilmedCalibration") -> dict[str, Any]:
-    """Return the result as plain data; docs/calibration.md lists its keys."""
+    """Return the result as plain data; docs/log/calibration.md lists its keys."""
     views, board, rig = calibrated.views, calibrated.found, calibrated.found.rig
     cameras = [
         {

@@ -1,5 +1,6 @@
 """Bring the documents of the repository's root into the site, and keep the links between both."""
 
+import posixpath
 import re
 from pathlib import Path
 
@@ -45,6 +46,6 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     def led(link: re.Match[str]) -> str:
         path = (ROOT / source.parent / link[1]).resolve().relative_to(ROOT)
         place = OUTSIDE.get(path.as_posix()) or path.as_posix().removeprefix("docs/")
-        return f"]({place}"
+        return f"]({posixpath.relpath(place, posixpath.dirname(page.file.src_uri))}"
 
     return LINK.sub(led, markdown)

@@ -1,4 +1,4 @@
-"""Measure what each piece of the tracker contributes (docs/decisions.md): `python tests/benchmarks/ablation.py`.
+"""Measure what each piece of the tracker contributes (docs/decisions/by_frame.md): `tests/benchmarks/ablation.py`.
 
 Every variant tracks the same recordings from the pose fitted to the true joints of frame 0: simulated scenes that this
 script makes itself (smooth-skinned people whose bones are not the model's, clutter, noise) and, with `--data DIR`, the
@@ -99,7 +99,7 @@ def conditions(clips: Sequence[Clip]) -> Conditions:
         settings="defaults but for what the row says, first pass alone. Each cell: mean "
         "error of the 12 limb joints in mm / lost frames (a limb joint off by more than 150 mm) / frames per second",
         chosen="those of evidence, fits, searches and tracking",
-        command="python tests/benchmarks/ablation.py --data DIR --write docs/decisions.md",
+        command="python tests/benchmarks/ablation.py --data DIR --write docs/decisions/by_frame.md",
     )
 
 

@@ -41,7 +41,7 @@ CONDITIONS = Conditions(
     "first pass alone, interpolated. *Lost:* frames with a joint off by more than 150 mm, by the same. *Seam and "
     "error:* rank correlation. Processor time: of the whole run, as a multiple of the first pass",
     chosen="rules of tracking; none of the passes from both keyframes",
-    command="python tests/benchmarks/between_keyframes.py SESSIONS --data DIR --write docs/annotation.md",
+    command="python tests/benchmarks/between_keyframes.py SESSIONS --data DIR --write docs/log/annotation.md",
 )
 
 

@@ -1,4 +1,4 @@
-"""Fit the weights of `estimation/tracking/confidence.py` and measure what statuses are worth (docs/accuracy.md).
+"""Fit the weights of `estimation/tracking/confidence.py` and measure what statuses are worth (docs/log/accuracy.md).
 
 Statuses follow from these weights in first passes, and searches of limbs do.
 

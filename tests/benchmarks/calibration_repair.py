@@ -1,4 +1,4 @@
-"""Measure what the check of cameras repairs (docs/calibration.md): `calibration_repair.py --data DIR`.
+"""Measure what the check of cameras repairs (docs/log/calibration.md): `calibration_repair.py --data DIR`.
 
 Calibrations are made wrong by known amounts, and recordings are tracked under them. Then `quadrille check --apply` and
 `quadrille track` take turns until nothing is named any more. Shifts in time are those of the pictures: a camera has
@@ -103,7 +103,7 @@ class Measured(NamedTuple):
 def conditions(footage: str, body: str, start: str) -> Conditions:
     """Return the conditions of a table."""
     chosen = "the rules of the check, as said above"
-    command = "python tests/benchmarks/calibration_repair.py --data DIR --write docs/calibration.md"
+    command = "python tests/benchmarks/calibration_repair.py --data DIR --write docs/log/calibration.md"
     return Conditions(footage, body, start, "defaults; tracking with `--no-whole-run`", chosen, command)
 
 

@@ -1,4 +1,4 @@
-"""Measure which camera the check names (docs/calibration.md): `python tests/benchmarks/camera_bumps.py --data DIR`.
+"""Measure which camera the check names (docs/log/calibration.md): `python tests/benchmarks/camera_bumps.py --data DIR`.
 
 One camera of a calibration is made wrong at random, so that the people's joints shift by a known amount in its
 picture. The recording is tracked under the wrong calibration, and `check_calibration` judges it. Recordings under their
@@ -62,7 +62,7 @@ FPS = 15.0
 GENERIC = ("broad_man",)
 """People whose bumped recordings are tracked with a body of height alone."""
 BODIES = ("acquired", "generic")
-COMMAND = "python tests/benchmarks/camera_bumps.py --data DIR --write docs/calibration.md"
+COMMAND = "python tests/benchmarks/camera_bumps.py --data DIR --write docs/log/calibration.md"
 
 
 class Bump(NamedTuple):

@@ -1,6 +1,6 @@
 """What mutual occlusion, joint refinement and the penalty on interpenetration are good for, by how near two people are.
 
-`python tests/benchmarks/closeness.py` writes a table of docs/decisions.md. Every variant tracks the same
+`python tests/benchmarks/closeness.py` writes a table of docs/decisions/by_frame.md. Every variant tracks the same
 simulated couples (smooth-skinned people whose bones are not the model's, in a furnished room, with noise) from the
 poses fitted to the true joints of frame 0. Accuracy is the mean error of the 12 limb joints of both; a frame of a
 person is lost when one of them is off by more than 150 mm.
@@ -97,7 +97,7 @@ def conditions(couples: Sequence[Clip]) -> Conditions:
         "error of the 12 limb joints of both in mm / lost frames of both / frames on which somebody is nearer to the "
         "other's joints",
         chosen="those of people near each other",
-        command="python tests/benchmarks/closeness.py --write docs/decisions.md",
+        command="python tests/benchmarks/closeness.py --write docs/decisions/by_frame.md",
     )
 
 

@@ -1,7 +1,7 @@
 """Tables that benchmarks write into the documents, between the lines `<!-- table: NAME -->` and `<!-- end -->`.
 
 A benchmark lists the names of its tables in `TABLES`. The first word of a name is the benchmark, the rest names its
-tables apart. `--write docs/accuracy.md` replaces exactly these blocks; without it, tables are only printed.
+tables apart. `--write docs/log/accuracy.md` replaces exactly these blocks; without it, tables are only printed.
 """
 
 import argparse
@@ -94,7 +94,7 @@ def benchmark_parser(description: str | None, needed: Sequence[str] = (), **fold
         parser.add_argument(f"--{name}", type=Path, required=name in needed, help=text)
     parser.add_argument(
         "--write", type=Path, nargs="+", default=[], metavar="DOC",
-        help="documents whose tables are replaced, such as docs/accuracy.md docs/measurements.md",
+        help="documents whose tables are replaced, such as docs/log/accuracy.md docs/measurements.md",
     )  # fmt: skip
     return parser
 

@@ -39,7 +39,7 @@ CONDITIONS = Conditions(
     settings="defaults, first pass → whole run",
     chosen="rules of tracking (recordings), the 10 nats of the colours (simulated people), the threshold of 5%, the "
     "median over the tracks, and the 15 mm by which joints lie elsewhere in people without known ones (recordings)",
-    command="python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR --write docs/accuracy.md "
+    command="python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR --write docs/log/accuracy.md "
     "docs/measurements.md",
 )
 TABLES = ("joint_errors sums", "joint_errors")

@@ -125,7 +125,7 @@ def main() -> None:
     conditions = CONDITIONS._replace(
         footage=CONDITIONS.footage.replace("25 or 15 frames/s", "25 or 15 frames/s and at 8"),
         settings="defaults",
-        command="python tests/benchmarks/keyframes_in_doubt.py --write docs/accuracy.md",
+        command="python tests/benchmarks/keyframes_in_doubt.py --write docs/log/accuracy.md",
     )
     show(given.write, TABLES[0], conditions, table(HEADS, rows, "keyframes that a person sets"))
 

@@ -55,7 +55,7 @@ CONDITIONS = Conditions(
     "mm (two people 30 mm) and no frame lost. Mean error over the limb joints, mm, and lost frames after so many "
     f"actions; at most {MAX_ACTIONS} actions. *At the end:* actions, error, and the expected error with its interval",
     chosen="rules of tracking on the recordings; none of the proposals",
-    command="python tests/benchmarks/next_click.py SESSION... --data DIR --scenes DIR --write docs/annotation.md",
+    command="python tests/benchmarks/next_click.py SESSION... --data DIR --scenes DIR --write docs/log/annotation.md",
 )
 
 

@@ -58,7 +58,7 @@ SCENES_ALONE = ("exercise", "reach_and_cross", "walk_in_place", "leaving")
 PEOPLE_ALONE = ("", "child_10")
 N_SEVERAL, N_ALONE = 60, 20
 """Frames of several people, and of those without names the first ones, on which one of them is alone."""
-COMMAND = "python tests/benchmarks/person_calibration.py --data DIR --write docs/calibration.md"
+COMMAND = "python tests/benchmarks/person_calibration.py --data DIR --write docs/log/calibration.md"
 
 
 class Compared(NamedTuple):

@@ -37,7 +37,7 @@ SEGMENTATIONS = {
 }
 MOTIONS = ("exercise", "dance", "reach_and_cross", "walk_in_place")
 FILMED_FRAMES = 24
-COMMAND = "python tests/benchmarks/silhouette_calibration.py --data DIR --write docs/calibration.md"
+COMMAND = "python tests/benchmarks/silhouette_calibration.py --data DIR --write docs/log/calibration.md"
 
 
 def silhouette_row(folder: Path, height_m: float | None, has_lenses: bool) -> list[str]:

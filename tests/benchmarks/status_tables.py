@@ -36,8 +36,8 @@ CONDITIONS = Conditions(
     settings="first passes. The statuses of a simulated person are by weights fitted to all other people, "
     "those of recordings by weights fitted to all simulated people",
     chosen="both thresholds (simulated people), rules of tracking (recordings)",
-    command="python tests/benchmarks/calibrate_status.py --data DIR --write docs/accuracy.md docs/measurements.md "
-    "docs/decisions.md",
+    command="python tests/benchmarks/calibrate_status.py --data DIR --write docs/log/accuracy.md "
+    "docs/measurements.md docs/decisions/tracking.md",
 )
 COUNTS = ("frames", "lost, flagged", "good, yet off", "flagged", "flagged, yet fine")
 EDGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)

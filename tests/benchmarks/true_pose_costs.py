@@ -1,8 +1,8 @@
 """Compare the cost of tracked poses with that of poses refined from the truth: is the search at fault, or the cost?
 
-`python tests/benchmarks/true_pose_costs.py --data DIR` writes a table of docs/decisions.md. Simulated people dance,
-and the recordings in DIR are added. Each is tracked with the generic body of the height that the true joints give, from
-the pose fitted to those of frame 0. On every frame the pose fitted to the true joints is refined twice on the same
+`python tests/benchmarks/true_pose_costs.py --data DIR` writes a table of docs/decisions/by_frame.md. Simulated people
+dance; the recordings in DIR are added. Each is tracked with the generic body of the height that the true joints give,
+from the pose fitted to those of frame 0. On every frame the pose fitted to the true joints is refined twice on the same
 evidence. Where this pose costs less than the tracked one, the search has missed it. The cost is that of contours, joint
 spreads and penetration, without the prediction. The poses lie in one valley where no pose on the straight line between
 them costs more than both. `--work DIR` keeps the simulated recordings.
@@ -159,7 +159,7 @@ CONDITIONS = Conditions(
     "tracked pose costs at most what the pose refined from the truth does. Of the other frames, those are counted "
     "where a barrier lies between the two poses; on the rest both lie in one valley",
     chosen="those of searches",
-    command="python tests/benchmarks/true_pose_costs.py --data DIR --write docs/decisions.md",
+    command="python tests/benchmarks/true_pose_costs.py --data DIR --write docs/decisions/by_frame.md",
 )
 
 

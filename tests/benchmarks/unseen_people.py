@@ -85,7 +85,7 @@ CONDITIONS = Conditions(
     start="pose fitted to the true joints of frame 0",
     settings="defaults, first pass → whole run",
     chosen="none",
-    command="python tests/benchmarks/unseen_people.py --write docs/accuracy.md",
+    command="python tests/benchmarks/unseen_people.py --write docs/log/accuracy.md",
 )
 SPARSE_CONDITIONS = CONDITIONS._replace(
     footage=CONDITIONS.footage.replace("25 or 15 frames/s", f"{SPARSE_FPS:.0f} frames/s")

@@ -58,7 +58,7 @@ def main():
         "nothing",
         "defaults",
         "none",
-        "python tests/benchmarks/volume_error.py --write docs/calibration.md",
+        "python tests/benchmarks/volume_error.py --write docs/log/calibration.md",
     )
     heads = ("rigs", "within 90%", "above", "below", "median true / expected", "median true, mm", "largest, mm")
     show(arguments.write, TABLES[0], conditions, table(heads, cells, "cameras"))

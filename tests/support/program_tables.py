@@ -6,7 +6,7 @@ from tracker.interchange.observations import readers
 
 
 def calibration_table():
-    """Table of `docs/recordings.md`."""
+    """Table of `docs/log/recordings.md`."""
     rows = ["| layout | recognized by | poses | unit |", "|---|---|---|---|"]
     for layout in calibrations.layouts():
         poses = f"`{layout.poses}`" if "=" in layout.poses else layout.poses
@@ -15,14 +15,14 @@ def calibration_table():
 
 
 def observation_table():
-    """Table of formats of `docs/observations.md`."""
+    """Table of formats of `docs/log/observations.md`."""
     unread = [row for row in readers.UNREAD if row not in joints.NOT_READ]
     cells = [f"{row.recognized_by}; not read: export {row.instead}" for row in unread]
     return _table([*readers.FORMATS.values(), *unread], [row.recognized_by for row in readers.FORMATS.values()] + cells)
 
 
 def joint_table():
-    """Table of joints in space of `docs/observations.md`."""
+    """Table of joints in space of `docs/log/observations.md`."""
     cells = [f"not read: export {row.instead}" for row in joints.NOT_READ]
     return _table([*joints.LAYOUTS, *joints.NOT_READ], [row.recognized_by for row in joints.LAYOUTS] + cells)
 

@@ -50,7 +50,7 @@ def new_session(
     Args:
         folder: to make; must not exist, or be empty.
         videos: video files or folders of images, each named after its camera.
-        calibration: file or folder of a layout that docs/recordings.md lists.
+        calibration: file or folder of a layout that docs/log/recordings.md lists.
         people: names of the people.
         background: folder of CAM.png or CAM.mp4 of the empty scene.
         model: preset of a body, or a .toml file of one.

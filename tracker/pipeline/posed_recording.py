@@ -24,7 +24,7 @@ from tracker.session.store.stored_poses import read_stored_poses
 
 N_FRAMES = 20
 """Frames of diverse poses that a check uses: with 3 the camera is found, with 20 its correction is known to 0.02
-degrees (docs/calibration.md)."""
+degrees (docs/log/calibration.md)."""
 MIN_FRAMES = 3
 """Fewest frames that a check uses."""
 

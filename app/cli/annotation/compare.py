@@ -44,7 +44,7 @@ class CompareArguments:
     overwrite: bool = False
     """replace the files of --csv, --report and --consensus."""
     json: bool = False
-    """print one JSON object; docs/annotation.md lists its keys."""
+    """print one JSON object; docs/log/annotation.md lists its keys."""
 
 
 def command(arguments: Annotated[CompareArguments, tyro.conf.arg(name="")]) -> None:

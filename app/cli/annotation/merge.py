@@ -18,7 +18,7 @@ _Copy = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(help_behavior_hint="
 def command(a: _Copy, b: _Copy, /, into: Path, tolerance_mm: float = TOLERANCE_MM, json: bool = False) -> None:
     """Join two copies of one session, such as those of two annotators, in a new session.
 
-    Both copies stay as they are. Poses that both annotated differently become tasks; docs/annotation.md has the rules.
+    Both copies stay as they are. Poses that both annotated differently become tasks; docs/log/annotation.md has rules.
 
     Args:
         a: session folder of one copy.

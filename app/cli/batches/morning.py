@@ -12,7 +12,7 @@ _EARLIER = "done with earlier settings of the plan; give the batch another --out
 
 
 def record(manifest: Manifest) -> dict[str, Any]:
-    """Return the results of a batch as one JSON object; docs/batch.md lists its keys."""
+    """Return the results of a batch as one JSON object; docs/log/batch.md lists its keys."""
     rows = summarize(manifest)
     sums = totals(manifest, rows)
     return {

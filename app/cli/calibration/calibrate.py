@@ -77,7 +77,7 @@ class CalibrateArguments:
     overwrite: bool = False
     """replace a file that exists."""
     json: bool = False
-    """print one JSON object; docs/calibration.md lists its keys."""
+    """print one JSON object; docs/log/calibration.md lists its keys."""
 
 
 def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) -> None:

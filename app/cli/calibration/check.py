@@ -35,7 +35,7 @@ class CheckArguments:
     apply: bool = False
     """correct the cameras that are named, if other frames confirm it; the page undoes it."""
     json: bool = False
-    """print one JSON object; docs/calibration.md lists its keys."""
+    """print one JSON object; docs/log/calibration.md lists its keys."""
 
 
 def command(arguments: Annotated[CheckArguments, tyro.conf.arg(name="")]) -> None:

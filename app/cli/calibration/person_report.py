@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def record_of(found: "PersonCalibration") -> dict[str, Any]:
-    """Return the result as plain data; docs/calibration.md lists its keys."""
+    """Return the result as plain data; docs/log/calibration.md lists its keys."""
     adjusted = found.adjusted
     joints = found.world.joints_world[np.isfinite(found.world.joints_world).all(axis=-1)]
     people, seen = found.identified, found.seen

@@ -38,7 +38,7 @@ class ImportArguments:
     files: Annotated[
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER|FILE ...", help_behavior_hint="")
     ]
-    """files of one format, or folders of them; docs/observations.md lists the formats."""
+    """files of one format, or folders of them; docs/log/observations.md lists the formats."""
     person: Names = ()
     """people of whom they are; all people by default. Points in space have one file for each, in this order."""
     joint_map: OptionalPath = None
@@ -73,7 +73,7 @@ class ImportArguments:
 
 
 def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> None:
-    """Import key points, joints or masks of another program. docs/observations.md describes formats and checks.
+    """Import key points, joints or masks of another program. docs/log/observations.md describes formats.
 
     It shows which view, frames and points were found. Files that contradict the session are refused. The cameras use
     imported masks as silhouettes; quadrille relink SESSION --no-masks goes back to their backgrounds.

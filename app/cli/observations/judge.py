@@ -34,7 +34,7 @@ class JudgeArguments:
     overwrite: bool = False
     """replace the file of --report."""
     json: bool = False
-    """print one JSON object; docs/observations.md lists its keys."""
+    """print one JSON object; docs/log/observations.md lists its keys."""
 
 
 def command(arguments: Annotated[JudgeArguments, tyro.conf.arg(name="")]) -> None:

@@ -18,7 +18,7 @@ KEYS = {
     "person", "frames", "views", "cost_before_px", "cost_after_px", "height_m", "sizes", "model", "evaluations",
     "voxels", "segments", "swings_deg", "notes",
 }  # fmt: skip
-"""Those that docs/acquisition.md lists."""
+"""Those that docs/log/acquisition.md lists."""
 
 
 @pytest.fixture

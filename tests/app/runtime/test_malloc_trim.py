@@ -9,6 +9,8 @@ import pytest
 
 pytestmark = pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="it is glibc's heaps that are trimmed")
 
+from tracker.system import IS_PORTABLE
+
 FREED = """
 import sys, time
 from pathlib import Path
@@ -91,6 +93,7 @@ def test_no_huge_page_fills_again_what_was_trimmed():
     assert output(HUGE_PAGES, "given back").split() == ["0"]
 
 
+@pytest.mark.skipif(IS_PORTABLE, reason="heaps stay as the C library has them")
 @pytest.mark.parametrize("how", ["given back", "kept"])
 def test_threads_share_as_many_heaps_as_there_are_processors(how):
     n_heaps = output(HEAPS, how).count("<heap nr=")

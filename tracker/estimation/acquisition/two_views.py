@@ -2,7 +2,7 @@
 
 The person faces one view, or turns the back to it, and is seen from the side in the other. The paper leaves open how
 parts are segmented, and in which steps they are searched. It assumes orthogonal views. The choices made here are in
-docs/acquisition.md.
+docs/log/acquisition.md.
 """
 
 from collections.abc import Mapping, Sequence

@@ -73,7 +73,7 @@ class FrameEstimator:
     def estimate(self, people: Sequence[int]) -> dict[int, PersonEstimate]:
         """Find the poses of some people and move them there."""
         # One after the other: where all are refined at once, each takes edges of people who are still off. That costs
-        # the second of `two_people` 1.8 mm and saves 8% of the processor time at most (docs/decisions.md).
+        # the second of `two_people` 1.8 mm and saves 8% of the processor time at most (docs/decisions/by_frame.md).
         fits = {p: self.move(p, self.problem.refine(p, self.bodies)) for p in people}
         self._refine_together(fits)
         self._converge(fits, people)

@@ -1,6 +1,6 @@
 """The tracker as GD96 describe it: its settings, and the body that it is for.
 
-The paper leaves some choices open; docs/trackers.md lists them with what is chosen here.
+The paper leaves some choices open; docs/log/trackers.md lists them with what is chosen here.
 """
 
 from functools import partial

@@ -1,6 +1,6 @@
 """The tracker as KRH08 describe it.
 
-The paper leaves some choices open; docs/trackers.md lists them with what is chosen here.
+The paper leaves some choices open; docs/log/trackers.md lists them with what is chosen here.
 """
 
 import numpy as np

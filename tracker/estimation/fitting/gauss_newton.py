@@ -44,7 +44,7 @@ JOINT_M = 0.005
 millimetres."""
 OTHER_BODY_M = 0.015
 """Standard deviation of a known joint of a body of other sizes, metres: joints of people and those of the built-in body
-differ by 1 to 4 cm (docs/decisions.md, Offsets of joint centres)."""
+differ by 1 to 4 cm (docs/decisions/body.md, Offsets of joint centres)."""
 MAX_ITERATIONS, TOLERANCE = 50, 1e-6
 """Largest number of iterations of a fit, and the step at which it ends, rad or metres, unless a caller gives others."""
 CLOSE_ENOUGH = 1e-3

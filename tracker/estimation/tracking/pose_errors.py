@@ -18,7 +18,7 @@ from tracker.geometry.arrays import TINY, Array, Mask
 SHARED_M = 0.006
 """Standard deviation along each axis with which sizes acquired from known joints determine the joints, metres. Of those
 of 13 simulated people, 88% lie in their 90% ellipsoids (`tests/benchmarks/joint_errors.py`); with half as much 55%,
-with twice as much 99%. The covariance of the sizes says 5 to 8 mm (docs/decisions.md)."""
+with twice as much 99%. The covariance of the sizes says 5 to 8 mm (docs/decisions/runs.md)."""
 SELDOM_NATS = 10.0
 """How much likelier the colours of the run must find a limb elsewhere until it is off as likely as not, nats. Of 3,354
 limbs of twelve simulated people in their place, 0.2% had more; of 83 that were put elsewhere by more than 20 cm, 88%

@@ -1,6 +1,6 @@
 """The tracker as MTHC01 describe it: its settings, and the body that it is for.
 
-The paper leaves some choices open; docs/trackers.md lists them.
+The paper leaves some choices open; docs/log/trackers.md lists them.
 """
 
 from functools import partial

@@ -11,8 +11,8 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, IntArray
 
 VOXEL_M = 0.025
-"""Edge of a voxel in which a person is found and measured, metres; errors of starts in docs/decisions.md are
-of this one."""
+"""Edge of a voxel in which a person is found and measured, metres; errors of starts in docs/decisions/first_poses.md
+are of this one."""
 MAX_VOXELS = 400_000_000
 """Largest number of voxels of a grid: 400 MB."""
 

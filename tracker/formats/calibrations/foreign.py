@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from tracker.errors import CalibrationError
 from tracker.formats.unread import begin_of, marks_of, unread
 
-EXPECTED = "a calibration of a layout that docs/recordings.md lists"
+EXPECTED = "a calibration of a layout that docs/log/recordings.md lists"
 
 
 def named(path: Path, found: str, advice: str) -> CalibrationError:

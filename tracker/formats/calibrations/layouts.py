@@ -1,4 +1,4 @@
-"""The table of all layouts of calibrations that are read. `docs/recordings.md` lists it."""
+"""The table of all layouts of calibrations that are read. `docs/log/recordings.md` lists it."""
 
 from functools import cache
 

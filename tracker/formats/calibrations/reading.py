@@ -228,7 +228,7 @@ def _reason(section: Section) -> str | None:
 def _nothing_usable(sections: dict[str, Section], document: Document) -> CalibrationError:
     """Return the error of a file all of whose cameras lack the same."""
     if not sections:
-        advice = "export it in a layout that docs/recordings.md lists"
+        advice = "export it in a layout that docs/log/recordings.md lists"
         return refuse(document, None, "one section for each camera", "none", advice)
     name, section = next(iter(sections.items()))
     if "refusal" in section:

@@ -82,7 +82,7 @@ def named_columns(table: Delimited) -> Columns:
     points = _triples(((("", m["name"] or ""), m["axis"], i) for i, m in found), cells, where)
     units = {(m["unit"] or "").lower() for _, m in found}
     if not points or len(units) != 1:
-        advice = "export positions of joints as one of the tables that docs/observations.md lists"
+        advice = "export positions of joints as one of the tables that docs/log/observations.md lists"
         expected = f"columns NAME_x, NAME_y, NAME_z of 1 to {MAX_NAMES} points in one unit"
         raise FormatError.mismatch(where, expected, quoted(cells[:4]), advice)
     others = {c: i for i, c in reversed([*enumerate(lower)]) if i not in dict(found)}

@@ -1,4 +1,4 @@
-"""The table of all layouts of joints in space that are known. `docs/observations.md` lists it."""
+"""The table of all layouts of joints in space that are known. `docs/log/observations.md` lists it."""
 
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -30,7 +30,7 @@ def write_person_c3d(motion: ExportedMotion, options: ExportOptions, paths: Sequ
 
 
 def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
-    """Write poses, joint centers, covariances, provenance and cameras as arrays of NumPy; docs/export.md lists them."""
+    """Write poses, joint centers, covariances, provenance and cameras as arrays; docs/log/export.md lists them."""
     found, (names, poses) = pose_arrays(motion, options, tick), pose_values(motion)
     bodies = {p.record.model_revision: p.body.model for one in motion.exported for p in one.poses.values()}
     arrays: dict[str, Any] = {

@@ -49,7 +49,7 @@ class PoseProvenance:
 
     @property
     def fields(self) -> dict[str, str | bool | int]:
-        """Everything that is known of the whole pose, by the name in files; docs/export.md lists it."""
+        """Everything that is known of the whole pose, by the name in files; docs/log/export.md lists it."""
         record = self.record
         return {
             "status": record.status,
@@ -136,7 +136,7 @@ def write_provenance(path: Path, motion: ExportedMotion, options: ExportOptions)
 
 
 def provenance_document(motion: ExportedMotion, options: ExportOptions) -> dict[str, Any]:
-    """Return the provenance of exported poses as it is written to JSON. docs/export.md describes the keys."""
+    """Return the provenance of exported poses as it is written to JSON. docs/log/export.md describes the keys."""
     R_file_world = file_from_world(motion.session, options.axes)[:3, :3]
     bodies: dict[str, Any] = {}
     people: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""The table of all layouts of key points, masks and joints of other programs. `docs/observations.md` lists it."""
+"""The table of all layouts of key points, masks and joints of other programs. `docs/log/observations.md` lists it."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -309,5 +309,5 @@ def _not_read(sample: Sample, advice: str) -> FormatError:
             return error
         keys = ", ".join(map(str, data)) if isinstance(data, dict) else ""
         found = f"JSON with the keys {quoted(keys)}" if keys else f"JSON with {quoted(data)}"
-    expected = "key points, joints or masks of a program that docs/observations.md lists"
+    expected = "key points, joints or masks of a program that docs/log/observations.md lists"
     return FormatError.mismatch(f"file {sample.path}", expected, found, f"{advice}export it in one of its formats")

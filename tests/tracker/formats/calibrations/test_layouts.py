@@ -179,7 +179,7 @@ def test_five_hundred_cameras(tmp_path):
 
 
 def test_the_document_lists_the_table():
-    text = (Path(__file__).resolve().parents[4] / "docs" / "recordings.md").read_text("utf-8")
+    text = (Path(__file__).resolve().parents[4] / "docs" / "log" / "recordings.md").read_text("utf-8")
     assert calibration_table() in text
 
 

@@ -264,7 +264,7 @@ def test_files_that_are_not_read_are_named(tmp_path):
 
 def test_the_table_for_documents():
     table = joint_table().splitlines()
-    text = (Path(__file__).resolve().parents[4] / "docs" / "observations.md").read_text("utf-8")
+    text = (Path(__file__).resolve().parents[4] / "docs" / "log" / "observations.md").read_text("utf-8")
     assert joint_table() in text
     assert len(table) == 2 + len(LAYOUTS) + len(NOT_READ)
     assert all(line.count("|") == 4 for line in table)

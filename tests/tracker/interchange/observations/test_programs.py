@@ -345,7 +345,7 @@ def test_stored_observations_keep_their_formats():
 def test_the_documents_list_all_programs():
     from architecture import ROOT
 
-    assert observation_table() in (ROOT / "docs" / "observations.md").read_text()
+    assert observation_table() in (ROOT / "docs" / "log" / "observations.md").read_text()
     assert all(row.instead for row in UNREAD)
 
 
