@@ -1,12 +1,11 @@
 """Make the animation of README: `python tests/recipes/animation.py docs/images/quadrille.webp`.
 
-Drives the page on a copy of the bundled sample of one person: a person is placed by dragging joints in two views, the
-search fits it, the recording is tracked, and a doubt of the run is shown. Ten seconds, seven pictures a second.
+Drives the page on a simulated dance, filmed by three cameras: a person is placed by dragging joints in two views, the
+search fits it, the recording is tracked, and a doubt of the run is shown. Some ten seconds, seven pictures a second.
 """
 
 import argparse
 import asyncio
-import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -15,18 +14,17 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 import imageio.v3 as iio
 from chromium import FLAGS, chromium_path
-from command_line import SAMPLE
+from demo import film_dance
 from page_driver import OPENED, handle_of, shows, to_client
 from playwright.async_api import Page, async_playwright
 from program import Program
 
 from tracker.evaluation.references import read_joints
 from tracker.footage.animation_writer import AnimationWriter
-from tracker.session.session import load_session
+from tracker.session.session import Session, load_session
 
 PICTURES_A_SECOND = 7
-FRAME = 25
-"""The frame on which the person is placed: both arms are bent forward."""
+WIDTH_PX = 1100
 TRUNK = ("left_hip", "right_hip", "left_shoulder", "right_shoulder")
 ARMS = ("left_elbow", "left_wrist", "right_elbow", "right_wrist")
 N_TRACKING = 24
@@ -45,10 +43,10 @@ class Film:
         self.pictures += [picture] * n
 
 
-async def place(film: Film, session) -> None:
+async def place(film: Film, session: Session) -> None:
     """Drag joints to where the truth is, in the first and the second view by turns."""
-    joints = read_joints(SAMPLE / "truth.trc", session.fps)
-    places = dict(zip(joints.names, joints.points[FRAME], strict=True))
+    joints = read_joints(session.folder / "truth.trc", session.fps)
+    places = dict(zip(joints.names, joints.points[0], strict=True))
     places["torso"] = (
         places["left_hip"] + places["right_hip"] + places["left_shoulder"] + places["right_shoulder"]
     ) / 4
@@ -67,14 +65,11 @@ async def place(film: Film, session) -> None:
         await page.wait_for_timeout(500)
 
 
-async def play(page: Page, session) -> list:
+async def play(page: Page, session: Session) -> list:
     """Go through placing, search, run and doubt; return the pictures."""
     film = Film(page)
     await shows(page, OPENED, 60)
-    await page.locator("#frame").fill(str(FRAME))
-    await page.keyboard.press("Enter")
-    await page.locator("#frame").blur()
-    await page.wait_for_timeout(3000)
+    await page.wait_for_timeout(9000)
     await film.take(4)
     await place(film, session)
     await page.keyboard.press("f")
@@ -91,30 +86,30 @@ async def play(page: Page, session) -> list:
     await shows(page, "quadrille.state.advice?.said[0]?.level !== 'work'", 300)
     await page.wait_for_timeout(1500)
     await film.take(5)
-    look = page.locator("#advice [data-deed=look]")
-    if await look.count():
-        await look.first.click()
-        await page.wait_for_timeout(2500)
-    await film.take(7)
+    await page.mouse.move(5, 5)
+    await page.keyboard.press("n")
+    await page.wait_for_timeout(2500)
+    await film.take(12)
     return film.pictures
 
 
 async def main(out: Path) -> None:
     """Make the animation."""
     with tempfile.TemporaryDirectory() as temporary:
-        folder = shutil.copytree(SAMPLE, Path(temporary) / "elbow_rotation")
+        folder = Path(temporary) / "dance"
+        film_dance(folder)
         program = Program(folder)
         async with async_playwright() as playwright:
             browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
             try:
                 await program.start()
-                page = await browser.new_page(viewport={"width": 1100, "height": 620}, color_scheme="dark")
+                page = await browser.new_page(viewport={"width": WIDTH_PX, "height": 620}, color_scheme="dark")
                 await page.goto(program.address)
                 pictures = await play(page, load_session(folder))
             finally:
                 await browser.close()
                 await program.stop()
-    with AnimationWriter(out, PICTURES_A_SECOND) as writer:
+    with AnimationWriter(out, PICTURES_A_SECOND, WIDTH_PX) as writer:
         for picture in pictures:
             writer.write(picture)
     print(f"{len(pictures)} pictures, {out.stat().st_size / 1e6:.1f} MB")

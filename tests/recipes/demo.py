@@ -78,11 +78,16 @@ def make_walk(folder: Path) -> None:
     run("track", folder, "--init", "auto", "--acquire")
 
 
-def make_doubts(folder: Path) -> None:
-    """Film a dance by three cameras, take the empty backgrounds away, and track it from its true first pose."""
+def film_dance(folder: Path) -> None:
+    """Film a dance by three cameras, without pictures of the empty room."""
     run("simulate", folder, "--scene", "dance", "--cameras", 3, "--frames", 40, "--seed", 5)
     session = load_session(folder)
     save_session(replace(session, cameras=tuple(replace(c, background=None) for c in session.cameras)))
+
+
+def make_doubts(folder: Path) -> None:
+    """Track the dance from its true first pose."""
+    film_dance(folder)
     run("init", folder, "--method", "joints", "--joints", folder / "truth.trc")
     run("track", folder)
 

@@ -18,9 +18,9 @@ _TICK_MS = 10
 class AnimationWriter:
     """A file that takes one image after the other and plays without end. Use it in a `with` statement."""
 
-    def __init__(self, path: Path, fps: float) -> None:
-        """Open a file, whose end names its kind, and the frame rate of the images, 1/s."""
-        self._path, self._fps = path, fps
+    def __init__(self, path: Path, fps: float, max_width_px: int = MAX_WIDTH_PX) -> None:
+        """Open a file, whose end names its kind, the frame rate of the images, 1/s, and the largest width."""
+        self._path, self._fps, self._max_width_px = path, fps, max_width_px
         self._step = int(np.ceil(2 * _TICK_MS * fps / 1000))
         self._n_images, self._pictures = 0, list[NDArray[np.uint8]]()
 
@@ -41,7 +41,7 @@ class AnimationWriter:
     def write(self, image: NDArray[np.uint8]) -> None:
         """Append an image, (H, W, 3) RGB, reduced; of a high rate one of several is taken."""
         if self._n_images % self._step == 0:
-            share = min(1.0, MAX_WIDTH_PX / image.shape[1])
+            share = min(1.0, self._max_width_px / image.shape[1])
             size = (round(share * image.shape[1]), round(share * image.shape[0]))
             reduced = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if share < 1 else image.copy()
             self._pictures.append(np.asarray(reduced, dtype=np.uint8))

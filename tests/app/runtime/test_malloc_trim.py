@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
-pytestmark = pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="it is glibc's heaps that are trimmed")
-
 from tracker.system import IS_PORTABLE
+
+pytestmark = pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="it is glibc's heaps that are trimmed")
 
 FREED = """
 import sys, time

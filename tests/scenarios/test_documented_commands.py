@@ -1,4 +1,4 @@
-"""The commands of README.md run as they stand, on a recording laid out as it describes."""
+"""The commands of docs/commands.md run as they stand, on a recording laid out as it describes."""
 
 import re
 import shlex
@@ -14,12 +14,12 @@ SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 CAMERAS = {"FRONT": "cam1", "RIGHT": "cam2", "BACK": "cam3"}
 COMMAND = re.compile(r"^ {4}quadrille (new|track|evaluate|export)\b((?:[^\\\n]|\\\n)*)", re.MULTILINE)
 FRAMES = "0:3"
-"""In place of README's longer range: the sample has 50 frames."""
+"""In place of the document's longer range: the sample has 50 frames."""
 
 
 @pytest.fixture
 def recording(tmp_path):
-    """Three cameras, their calibration, the empty scene and reference joints, named as in README."""
+    """Three cameras, their calibration, the empty scene and reference joints, named as there."""
     (tmp_path / "empty").mkdir()
     calibration = (SAMPLE / "calibration.toml").read_text("utf-8")
     for old, new in CAMERAS.items():
@@ -44,10 +44,10 @@ def quadrille(folder, *words):
 
 
 @pytest.mark.slow
-def test_readme_takes_a_recording_from_videos_to_an_error(recording):
+def test_commands_take_a_recording_from_videos_to_an_error(recording):
     found = [
         (command, shlex.split(rest.replace("\\\n", " ")))
-        for command, rest in COMMAND.findall((ROOT / "README.md").read_text("utf-8"))
+        for command, rest in COMMAND.findall((ROOT / "docs" / "commands.md").read_text("utf-8"))
     ]
     written = dict(found)
     assert written.keys() == {"new", "track", "evaluate", "export"}
