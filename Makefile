@@ -83,7 +83,7 @@ format: $(VENV)/.tested
 
 # The documents as a site, with the library's reference: below .venv, which git ignores.
 docs: $(VENV)/.documented
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir $(CURDIR)/$(SITE)
+	$(BIN)/python docs/site/build.py $(SITE)
 	@echo "file://$(CURDIR)/$(SITE)/index.html"
 
 # Wheel and sdist in dist/, installed and tried with each of RELEASE_PYTHONS; needs a package index.
