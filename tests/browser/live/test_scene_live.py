@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import command, shows, state_of, to_client
+from page_driver import command, drag_mouse, shows, state_of, to_client
 from program import started
 
 from tracker.body.model import PosedBody
@@ -223,10 +223,7 @@ async def test_the_image_follows_the_frame_and_a_turn_leaves_the_camera(live):
     await live.keyboard.press(".")
     await rested(live, lambda image: 100 < np.percentile(image, 99.9) < 150)
     scene = await live.locator("#scene").bounding_box()
-    await live.mouse.move(scene["x"] + 60, scene["y"] + 300)
-    await live.mouse.down()
-    await live.mouse.move(scene["x"] + 110, scene["y"] + 290, steps=4)
-    await live.mouse.up()
+    await drag_mouse(live, (scene["x"] + 60, scene["y"] + 300), (scene["x"] + 110, scene["y"] + 290), steps=4)
     await shows(live, "quadrille.state.state.snapped === null", 30)
     assert await live.locator(".pane.is-snapped").count() == 0
     await live.keyboard.press(",")
