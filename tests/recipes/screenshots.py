@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from stored_motions import put_poses
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
@@ -26,11 +27,9 @@ from program import ROOT, Program
 
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
-from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import Session, load_session, save_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 from tracker.simulate.record import Simulation, simulate
 
 SAMPLES = ROOT / "sample_sessions"
@@ -242,9 +241,7 @@ def place(session: Session, near: bool) -> None:
         if near:
             values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
             values = model.clip(values)
-        revision = store.add_model_revision(person.name, format_model(model))
-        pose = PoseRecord(values, ("manual",) * len(values), revision, keyframe=True)
-        store.commit("place", [PoseChange(person.name, 0, pose)])
+        put_poses(store, person, {0: values}, label="place", keyframe=True)
     store.close()
 
 

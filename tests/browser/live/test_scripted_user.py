@@ -16,15 +16,14 @@ from page_driver import command, handle_of, state_of, to_client
 from page_driver import shows as shows_within
 from program import ROOT, started, visited
 from scripted_user import TRUNK, ScriptedUser
+from stored_motions import store_poses
 
 from tracker.estimation.chamfer.settings import TrackSettings, pose_cost
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 pytestmark = pytest.mark.slow
 
@@ -46,14 +45,9 @@ async def folder(tmp_path_factory):
     """A session in which the body stands wrong on the frames to be posed."""
     folder = shutil.copytree(SAMPLE, tmp_path_factory.mktemp("user") / "session")
     session = load_session(folder)
-    model = session.people[0].model
-    store = AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision("person", format_model(model))
     for frame in (BY_DRAGS, BY_SLIDERS):
         values = user_of(session, frame).away()
-        pose = PoseRecord(values, ("manual",) * len(values), revision, keyframe=True)
-        store.commit(f"place, frame {frame}", [PoseChange("person", frame, pose)])
-    store.close()
+        store_poses(session, {frame: values}, label=f"place, frame {frame}", keyframe=True)
     return folder
 
 
