@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from page_driver import go_to, reloaded, shows, state_of
-from program import ROOT, started, visited
+from program import ROOT, SAMPLE, started, visited
 from stored_motions import store_poses
 
 from tracker.footage.recording import Recording
@@ -20,7 +20,6 @@ from tracker.session.session import load_session, save_camera_files
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 FRONT, LEFT = 0, 3
 FRAME = 12
 """The arms move fastest."""

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import command, frame_place, go_to, handle_of, shows, state_of
-from program import ROOT, visited
+from program import SAMPLE, visited
 from stored_motions import store_poses
 
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 START = 8
 """The arms are on their way up."""
 

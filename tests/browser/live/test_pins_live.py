@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import handle_of, shows, state_of, to_client
-from program import ROOT, started, visited
+from program import SAMPLE, started, visited
 from stored_motions import store_poses
 
 from tracker.evaluation.references import read_joints
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 FRAME = 0
 FRONT, RIGHT, BACK, LEFT = range(4)
 PINS = "quadrille.state.overlay.pins"

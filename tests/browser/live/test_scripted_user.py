@@ -14,7 +14,7 @@ import pytest_asyncio
 from first_poses import true_body, views_of
 from page_driver import command, handle_of, state_of, to_client
 from page_driver import shows as shows_within
-from program import ROOT, started, visited
+from program import ROOT, SAMPLE, started, visited
 from scripted_user import TRUNK, ScriptedUser
 from stored_motions import store_poses
 
@@ -27,7 +27,6 @@ from tracker.session.store.annotation_store import AnnotationStore
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 TANGO = ROOT / "sample_sessions" / "tango"
 BY_DRAGS, BY_SLIDERS = 0, 25
 """The frames that are posed: arms down, and both arms raised and bent."""
