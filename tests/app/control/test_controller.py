@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from gestures import FRONT, PAGE, drag, pixel_of, wait_for
+from gestures import PAGE, drag, grab, pixel_of, wait_for
 
 from tracker.errors import SessionError
 from tracker.estimation.chamfer.settings import TrackSettings
@@ -40,8 +40,7 @@ def test_the_cost_follows_a_drag(controller):
 
 def test_a_hand_that_holds_still_sees_what_the_pose_costs(controller):
     before = controller.state.cost_px
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     for seq, way in enumerate((10.0, 60.0, 120.0)):
         controller.dragging.move(PAGE, (start[0] + way, start[1]), seq)
     shown = controller.state.poses
@@ -61,8 +60,7 @@ def test_the_cost_of_what_has_been_let_go_is_not_touched(controller):
 
 def test_a_cancelled_drag_leaves_nothing(controller):
     values = controller.state.poses[0]
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     controller.dragging.move(PAGE, tuple(start + 40), 1)
     assert not np.array_equal(controller.state.poses[0], values)
     controller.dragging.cancel(PAGE)
@@ -73,8 +71,7 @@ def test_a_cancelled_drag_leaves_nothing(controller):
 def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
     monkeypatch.setattr("app.control.posing.dragging._CHECKPOINT_S", 0.0)
     controller = opened()
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     controller.dragging.move(PAGE, tuple(start + 40), 1)
     other = AnnotationStore(session / "annotations.sqlite", read_only=True)
     np.testing.assert_array_equal(other.pose("person", 0).values, controller.state.poses[0])
@@ -86,8 +83,7 @@ def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
 
 
 def test_another_page_cannot_move_what_this_one_holds(controller):
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     values = controller.state.poses[0]
     controller.dragging.move(PAGE + 1, tuple(start + 40), 1)
     controller.dragging.end(PAGE + 1)
