@@ -6,7 +6,6 @@ person in the footage: fitted to the true joints it stays 12 to 17 mm off.
 """
 
 import shutil
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -19,8 +18,7 @@ from scripted_user import TRUNK, ScriptedUser
 from stored_motions import store_poses
 
 from tracker.estimation.chamfer.settings import TrackSettings, pose_cost
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
@@ -231,8 +229,8 @@ def by_hand_px(session):
     """Cost of the poses made by hand that the sample keeps, px."""
     models = [p.model for p in session.people]
     poses = [read_pose_table(TANGO / f"first_pose_{p.name}.csv").values_for(p.model)[0] for p in session.people]
-    with closing(Recording(session.cameras)) as recording:
-        views = Observer(session.cameras, recording).evidence(BY_DRAGS)
+    with open_observer(session.cameras) as observer:
+        views = observer.evidence(BY_DRAGS)
     return pose_cost(views, models, poses, TrackSettings())(poses).total_px
 
 
