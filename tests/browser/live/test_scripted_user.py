@@ -6,6 +6,7 @@ person in the footage: fitted to the true joints it stays 12 to 17 mm off.
 """
 
 import shutil
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -72,12 +73,9 @@ class Hands:
 
     @property
     def values(self):
-        store = AnnotationStore(self._session.annotations_path, read_only=True)
-        try:
+        with closing(AnnotationStore(self._session.annotations_path, read_only=True)) as store:
             stored = store.pose(self._name, self.frame)
             return None if stored is None else stored.values
-        finally:
-            store.close()
 
     async def drag(self, camera, point, to_px):
         """Press on a joint's handle, carry it to a place in that view, let go."""

@@ -1,6 +1,7 @@
 """The frames of a video, listed beside: what is read meanwhile is what it would be otherwise."""
 
 import threading
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -26,11 +27,8 @@ def in_steps(monkeypatch):
 
 
 def whole(path):
-    video = VideoFile(path, "cam")
-    try:
+    with closing(VideoFile(path, "cam")) as video:
         return [video.read(k) for k in range(video.n_frames)]
-    finally:
-        video.close()
 
 
 @pytest.mark.parametrize("b_frames", [0, 3])
