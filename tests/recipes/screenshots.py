@@ -11,7 +11,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -230,19 +230,18 @@ def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
 def place(session: Session, near: bool) -> None:
     """Put everybody on frame 0, where the true joints are or a hand has put the dancers; near: arms a little off."""
     joints = None if len(session.people) > 1 else read_joints(session.folder / "truth.trc", session.fps)
-    store = AnnotationStore(session.annotations_path)
-    for person in session.people:
-        model = person.model
-        if joints is None:
-            values = read_pose_table(session.folder / f"first_pose_{person.name}.csv").values_for(model)[0]
-        else:
-            places = dict(zip(joints.names, joints.points[0], strict=True))
-            values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).pose
-        if near:
-            values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
-            values = model.clip(values)
-        put_poses(store, person, {0: values}, label="place", keyframe=True)
-    store.close()
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        for person in session.people:
+            model = person.model
+            if joints is None:
+                values = read_pose_table(session.folder / f"first_pose_{person.name}.csv").values_for(model)[0]
+            else:
+                places = dict(zip(joints.names, joints.points[0], strict=True))
+                values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).pose
+            if near:
+                values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
+                values = model.clip(values)
+            put_poses(store, person, {0: values}, label="place", keyframe=True)
 
 
 @asynccontextmanager
