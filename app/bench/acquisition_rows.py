@@ -10,8 +10,7 @@ from app.bench.sample_frames import FRAME, BenchFrame, pose_at
 from tracker.body.model import PosedBody
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
 from tracker.estimation.acquisition.size_parameters import SizeParameters
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array
 
@@ -30,8 +29,7 @@ def acquisitions(frame: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
     numbers = range(0, frame.session.n_frames, _EVERY)
     poses = {k: _off(frame, pose_at(frame.joints, body, k, frame.values)) for k in numbers}
     found = list[Acquisition]()
-    with Recording(frame.session.cameras) as recording:
-        observer = Observer(frame.session.cameras, recording)
+    with open_observer(frame.session.cameras) as observer:
 
         def run() -> None:
             bodies = {k: (PosedBody(body, pose),) for k, pose in poses.items()}

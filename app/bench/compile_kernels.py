@@ -26,7 +26,7 @@ from tracker.estimation.posing.grab import grab
 from tracker.estimation.search.chamfer_cost import ChamferCost, measure_nothing
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.part_edges import points_occluded
-from tracker.evidence.observer import Observer
+from tracker.evidence.observer import open_observer
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
@@ -89,8 +89,8 @@ def _call_kernels(background: bool) -> None:
             beside.join()
     if beside is None or beside.exitcode:
         _compile_evidence(session, background)
-    with Recording(session.cameras) as recording:
-        ChamferCost(Observer(session.cameras, recording).evidence(_FRAME), bodies).at_prediction()
+    with open_observer(session.cameras) as observer:
+        ChamferCost(observer.evidence(_FRAME), bodies).at_prediction()
     record_stage("cost")
     _call_tracking(session)
     record_stage("tracking")
@@ -108,8 +108,8 @@ def _compile_posing(session: Session) -> list[PosedBody]:
 
 def _compile_evidence(session: Session, background: bool) -> None:
     """Compile the kernels of the evidence, and those that measure contours against it."""
-    with Recording(session.cameras) as recording:
-        views = Observer(session.cameras, recording).evidence(_FRAME)
+    with open_observer(session.cameras) as observer:
+        views = observer.evidence(_FRAME)
     record_stage("evidence")
     if background:
         give_way()
@@ -165,8 +165,8 @@ def _call_others(session: Session) -> None:
     label_voxels(middle[None], [state_of(model, [body.values], 0.04, settings)], _VOXEL_M, settings.label_rule)
     overlap = SilhouetteOverlap(model, [s.mask for s in silhouettes], [s.camera for s in silhouettes], middle)
     overlap.added(body.kinematics.Ts_world_part[None], np.arange(len(model.parts)), overlap.nothing())
-    with Recording(sources) as recording:
-        observer, frames = Observer(sources, recording), [(k, (body,)) for k in range(_FRAME, _FRAME + _FRAMES)]
+    with open_observer(sources) as observer:
+        frames = [(k, (body,)) for k in range(_FRAME, _FRAME + _FRAMES)]
         learn_run(observer, frames)
         (view, *_) = observer.evidence(_FRAME)
     _, pieces = ContourResiduals([view], [body]).piece_sums(body.kinematics)
@@ -180,8 +180,8 @@ def _track(
     from tracker.estimation.tracking.subjects import Subjects
     from tracker.estimation.tracking.tracker import TrackingRun
 
-    with Recording(cameras) as recording:
-        run = TrackingRun(Observer(cameras, recording), Subjects.of(models), start, range(_FRAME, _FRAME + _FRAMES))
+    with open_observer(cameras) as observer:
+        run = TrackingRun(observer, Subjects.of(models), start, range(_FRAME, _FRAME + _FRAMES))
         for _ in ChamferTracker(settings).estimates(run):
             pass
 
@@ -201,8 +201,7 @@ def _estimate(
     from tracker.estimation.tracking.subjects import Subjects
 
     bodies = tuple(PosedBody(m, pose) for m, pose in zip(models, poses, strict=True))
-    with Recording(cameras) as recording:
-        observer = Observer(cameras, recording)
+    with open_observer(cameras) as observer:
         views = common_evidence(observer, _FRAME, [bodies], settings)
         known = learn_regions([LearningFrame(views, bodies)], observer.working_cameras, observer.empty_scenes())
         frame = known.frame(views, bodies)

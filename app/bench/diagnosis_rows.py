@@ -13,8 +13,7 @@ from tracker.calibration.check.diagnosis import Diagnosis, diagnose
 from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.tracking.view_regions import regions
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, corrected
 
@@ -59,8 +58,7 @@ def _true_poses(frame: BenchFrame) -> dict[int, Array]:
 def _seen(frame: BenchFrame, poses: Mapping[int, Array], correction: Array) -> list[ViewedFrame]:
     """Read frames on which people have their true poses, with a correction of the first camera."""
     session, out = frame.session, list[ViewedFrame]()
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         for k in np.linspace(2, session.n_frames - 3, _N_FRAMES).round().astype(int).tolist():
             body = PosedBody(frame.model, poses[k])
             first, *others = observer.evidence(k, regions(observer.working_cameras, [body]))

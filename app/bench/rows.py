@@ -21,9 +21,8 @@ from tracker.estimation.search.best_first import COARSE_SEARCH, SearchSettings, 
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.observer import Observer
+from tracker.evidence.observer import open_observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.pipeline.methods import make_tracker
@@ -321,8 +320,7 @@ def tracked_pipeline(
     n, spent = len(wanted), list[Array]()
 
     def run() -> None:
-        with Recording(session.cameras) as recording:
-            observer = Observer(session.cameras, recording)
+        with open_observer(session.cameras) as observer:
             tracked = make_tracker(settings).estimates(TrackingRun(observer, Subjects.of(models), first, wanted))
             next(tracked)  # opening the videos does not count
 

@@ -7,8 +7,7 @@ from app.bench.sample_frames import BenchFrame, pose_at
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.tracking.tracker import TrackingRun
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import Leg, TrackSession
 from tracker.pipeline.tracked_changes import RunChange, StoredPerson
@@ -32,8 +31,7 @@ def whole_run(frame: BenchFrame, yardstick: Yardstick) -> Row:
     start = [[pose_at(frame.joints, model, _FRAMES[0], frame.values)]]
 
     def run(settings: TrackSettings) -> None:
-        with Recording(session.cameras) as recording:
-            observer = Observer(session.cameras, recording)
+        with open_observer(session.cameras) as observer:
             leg = Leg(TrackingRun(observer, Subjects.of([model]), start, _FRAMES, session.fps))
             whole = TrackSession(make_tracker(settings), [leg], [StoredPerson("person", 1)], _Nowhere(), "bench")
             for step in whole.steps():

@@ -9,9 +9,8 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.search.chamfer_cost import ChamferCost
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
+from tracker.evidence.observer import open_observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
@@ -101,8 +100,8 @@ def read_crowd(folder: Path, frame: int) -> BenchCrowd:
     session = load_session(folder)
     joints = tuple(read_joints(folder / f"truth_{p.name}.trc", session.fps) for p in session.people)
     models = tuple(p.model for p in session.people)
-    with Recording(session.cameras) as recording:
-        views = Observer(session.cameras, recording).evidence(frame)
+    with open_observer(session.cameras) as observer:
+        views = observer.evidence(frame)
     return BenchCrowd(
         session, joints, views, models, tuple(pose_at(j, m, frame) for j, m in zip(joints, models, strict=True))
     )
@@ -113,8 +112,8 @@ def read_frame(folder: Path) -> BenchFrame:
     session = load_session(folder)
     joints = read_joints(folder / "truth.trc", session.fps)
     frame = min(FRAME, session.n_frames - 1)
-    with Recording(session.cameras) as recording:
-        views = Observer(session.cameras, recording).evidence(frame)
+    with open_observer(session.cameras) as observer:
+        views = observer.evidence(frame)
     model = session.people[0].model
     return BenchFrame(session, joints, views, model, pose_at(joints, model, frame))
 

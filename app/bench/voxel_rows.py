@@ -1,6 +1,7 @@
 """The row of the voxel tracker in `quadrille bench`."""
 
 import itertools
+from contextlib import closing
 
 import numpy as np
 
@@ -23,11 +24,8 @@ _MUST, _AIM = in_yardsticks(10), in_yardsticks(5)
 def voxel_frame(frame: BenchFrame, yardstick: Yardstick) -> Row:
     """Time one frame of the voxel tracker: predict, carve, label, update, assess; silhouettes are found before."""
     with Recording(frame.session.cameras) as recording:
-        finder = SilhouetteFinder(frame.session.cameras, recording)
-        try:
+        with closing(SilhouetteFinder(frame.session.cameras, recording)) as finder:
             silhouettes = [finder.silhouettes(k) for k in _FRAMES]
-        finally:
-            finder.close()
         start = pose_at(frame.joints, frame.model, _FRAMES[0])
         run = TrackingRun(
             Observer(frame.session.cameras, recording), Subjects.of([frame.model]), [start], _FRAMES, frame.session.fps

@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from app.state.state import State
 from tracker.errors import TrackerError
-
-_ALL_FRAMES = range(1 << 31)
+from tracker.session.store.records import ALL_FRAMES
 
 
 class TurnError(TrackerError):
@@ -102,5 +101,5 @@ def work_of(state: State) -> Work | None:
         what, people, frames = state.ranges.what, state.ranges.people, state.ranges.frames
         return Work(f"is {what} frames {frames[0]} to {frames[-1]}", people, frames)
     if state.finding.running:
-        return Work("finds people", None, _ALL_FRAMES)
+        return Work("finds people", None, ALL_FRAMES)
     return None

@@ -1,6 +1,6 @@
 /** Small pieces that the parts of the section share. */
 
-import { make } from "../widgets/elements.js";
+import { make, onSubmit } from "../widgets/elements.js";
 
 /**
  * Line that opens a form below it, with its content.
@@ -29,8 +29,7 @@ export function lineForm(name, action, send) {
   const enable = () => (button.disabled = !input.value.trim());
   enable();
   input.addEventListener("input", enable);
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
+  onSubmit(form, () => {
     const text = input.value.trim();
     if (!text) return;
     input.value = "";

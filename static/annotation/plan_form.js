@@ -1,6 +1,6 @@
 /** The form that plans frames: which, of whom, and for whom. */
 
-import { make } from "../widgets/elements.js";
+import { make, onSubmit } from "../widgets/elements.js";
 import { labelled } from "../inspector/parts.js";
 import { fold } from "./parts.js";
 
@@ -33,8 +33,7 @@ export function planForm({ store, send, say }) {
   };
   const refuse = (/** @type {string} */ text) => say(text, "error");
   form.addEventListener("input", enable);
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
+  onSubmit(form, () => {
     const by = /** @type {import("../model/protocol.js").PlanTasks["by"]} */ (way.input.value);
     const n = number.label.hidden ? 1 : Number(number.input.value.trim() || number.input.placeholder);
     if (!Number.isInteger(n) || n < 1 || n > 100000) return refuse(`Expected a whole number from 1, found “${number.input.value}”.`);

@@ -1,6 +1,6 @@
 /** Other copy: the poses of another annotator's copy of the session beside the own ones, and the choice between them. */
 
-import { make, textButton } from "../widgets/elements.js";
+import { make, onSubmit, textButton } from "../widgets/elements.js";
 import { postJson } from "../widgets/post_json.js";
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
@@ -86,8 +86,7 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
     isBusy = false;
     show();
   };
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
+  onSubmit(form, () => {
     if (input.value.trim()) void read();
   });
   form.addEventListener("input", () => show());

@@ -1,6 +1,6 @@
 /** Form that imports results of other programs: paths are read and checked, shown over the pictures, then stored. */
 
-import { make, textButton } from "../widgets/elements.js";
+import { make, onSubmit, textButton } from "../widgets/elements.js";
 import { capital, count } from "../widgets/text.js";
 import { postJson } from "../widgets/post_json.js";
 import { labelled } from "./parts.js";
@@ -123,10 +123,7 @@ export function importForm(store, paths, discard) {
     enable();
   };
 
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    void read();
-  });
+  onSubmit(form, () => void read());
   form.addEventListener("input", clear);
   enable();
   return {

@@ -204,19 +204,6 @@ export class Store {
     this.subscribe((changed) => facts.some((fact) => changed.has(fact)) && act());
   }
 
-  /**
-   * @param {keyof Facts} fact
-   * @param {() => void} act called once, when the fact is known
-   */
-  onceKnown(fact, act) {
-    let isDone = false;
-    this.subscribe(() => {
-      if (isDone || this.facts[fact] === null) return;
-      isDone = true;
-      act();
-    });
-  }
-
   #flush() {
     // Changes made by views are shown in the same animation frame.
     for (let round = 0; round < MAX_ROUNDS && this.#changed.size > 0; round += 1) {

@@ -3,7 +3,7 @@
  * with a shared link sends. The program refuses all others, too (app/messages/parsing.py).
  */
 
-import { hasSearch, hasTrack } from "./selectors.js";
+import { hasTrack } from "./selectors.js";
 
 /** @typedef {() => string | null} Reason */
 
@@ -21,7 +21,6 @@ export function unavailableReasons(store) {
     undo: here(() => (facts().state?.undo === null ? "Nothing to undo." : null)),
     redo: here(() => (facts().state?.redo === null ? "Nothing to redo." : null)),
     search: here(() => (facts().state?.job.running ? "A search is already running. Stop it first (Esc)." : null)),
-    stopSearch: here(() => (hasSearch(facts().state) ? null : "No search is running.")),
     track: here(() => (facts().state?.track.running ? "Tracking is already running. Stop it first (Esc)." : null)),
     tracking: here(() => (hasTrack(facts().state) ? null : "Nothing is being tracked. Track forward or backward first.")),
     range: here(() => (facts().range ? null : "No range is marked. Drag over the timeline with Shift to mark one.")),

@@ -1,6 +1,6 @@
 /** The field for the name by which a page joins. */
 
-import { make } from "../widgets/elements.js";
+import { make, onSubmit } from "../widgets/elements.js";
 
 const DOES = { host: "annotate", annotate: "annotate", review: "review", look: "look around" };
 
@@ -14,8 +14,7 @@ export function joinForm({ store, joinAs }, place) {
   const join = make("button", { type: "submit", title: "Work under this name, on a frame of your own (Enter)" }, "Join");
   const refusal = make("output", "join-refusal");
   const form = make("form", "join-form", label, input, join, refusal);
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
+  onSubmit(form, () => {
     joinAs(input.value.trim());
     input.blur();
   });

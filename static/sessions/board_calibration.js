@@ -1,6 +1,6 @@
 /** Dialog that calibrates cameras by footage of a board: the corners that were found, the expected error, and doubts. */
 
-import { button, byId, make, makeSvg } from "../widgets/elements.js";
+import { button, byId, make, makeSvg, onSubmit } from "../widgets/elements.js";
 import { DialogForm } from "./dialog_form.js";
 import { previewOf } from "./path_picker.js";
 
@@ -48,10 +48,7 @@ export class BoardCalibration extends DialogForm {
    */
   constructor(picker, use) {
     super("board-calibration", picker);
-    this.form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      void this.#run();
-    });
+    onSubmit(this.form, () => void this.#run());
     this.form.addEventListener("input", () => {
       this.propose("out", this.value("footage") && `${this.value("footage").replace(/\/+$/, "")}/calibration.toml`);
       this.#begin();

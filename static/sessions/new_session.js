@@ -3,7 +3,7 @@
  * checks are listed as they pass.
  */
 
-import { button, byId, make } from "../widgets/elements.js";
+import { button, byId, make, onSubmit } from "../widgets/elements.js";
 import { CameraCards } from "./camera_cards.js";
 import { DialogForm } from "./dialog_form.js";
 import { drawRig } from "./rig_drawing.js";
@@ -44,10 +44,7 @@ export class NewSession extends DialogForm {
       () => this.#begin(),
       (from, take) => picker.show("footage", from || this.value("footage"), take),
     );
-    this.form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      void this.#run(false);
-    });
+    onSubmit(this.form, () => void this.#run(false));
     this.form.addEventListener("input", (event) => this.#onInput(event.target));
     button("cancel-new-session", () => this.dialog.close());
     this.#openIt.addEventListener("click", () => {

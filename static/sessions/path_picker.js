@@ -1,6 +1,6 @@
 /** Dialog that chooses a file or folder of the program's machine. */
 
-import { button, byId, make } from "../widgets/elements.js";
+import { button, byId, make, onSubmit } from "../widgets/elements.js";
 
 /**
  * @typedef {{name: string, path: string, kind: "folder" | "session" | "video" | "file"}} Entry
@@ -29,10 +29,7 @@ export class PathPicker {
   #take = (/** @type {string} */ _path) => {};
 
   constructor() {
-    byId("path-picker-form", HTMLFormElement).addEventListener("submit", (event) => {
-      event.preventDefault();
-      void this.#go(this.#path.value);
-    });
+    onSubmit(byId("path-picker-form", HTMLFormElement), () => void this.#go(this.#path.value));
     this.#up.addEventListener("click", () => this.#contents?.parent && void this.#go(this.#contents.parent));
     this.#list.addEventListener("keydown", (event) => {
       if (event.key === "Backspace") this.#up.click();

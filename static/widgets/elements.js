@@ -92,6 +92,19 @@ export function onChange(field, act) {
 }
 
 /**
+ * Call a function when a form is submitted, instead of loading a page.
+ *
+ * @param {HTMLFormElement} form
+ * @param {() => void} run
+ */
+export function onSubmit(form, run) {
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    run();
+  });
+}
+
+/**
  * Find a button and call a function on click.
  *
  * @param {string} id

@@ -20,8 +20,7 @@ from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.contour_residuals import MatchSettings
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.model_toml import load_model
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
@@ -78,8 +77,8 @@ def measure(clip: Clip, settings: TrackSettings) -> tuple[float, int, float]:
     (model,), (reference,), cameras = clip.models, clip.references, clip.session.cameras
     if settings == VARIANTS[PAPER]:
         model = load_model(PAPER_BODY, model.height_m)
-    with Recording(cameras) as recording:
-        observer, start = Observer(cameras, recording), start_of(model, reference)
+    with open_observer(cameras) as observer:
+        start = start_of(model, reference)
         began = time.perf_counter()
         found = track_from(observer, [model], [start], clip.frames, settings)
         seconds = time.perf_counter() - began

@@ -34,9 +34,8 @@ from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.tracking import confidence
 from tracker.estimation.tracking.estimate import PoseEstimate
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
+from tracker.evidence.observer import open_observer
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.model_toml import format_model, load_model, parse_model
 from tracker.formats.trc import MarkerTable
@@ -151,8 +150,7 @@ def track(footage: Footage, models: Sequence[BodyModel], how: Pass) -> tuple[Lim
     cameras = cameras if how.background else [replace(c, background=None, masks=None) for c in cameras]
     settings = TrackSettings() if how.searched else replace(TrackSettings(), recover=None)
     frames = range(0, footage.n_frames, how.stride)
-    with Recording(cameras) as recording:
-        observer = Observer(cameras, recording)
+    with open_observer(cameras) as observer:
         found = track_from(observer, models, starts, frames, settings, footage.fps / how.stride)
     people = [_rows_of(p, found, models[p], footage.references[p]) for p in range(len(models))]
     return LimbRows(*(np.array(c) for c in zip(*itertools.chain(*people), strict=True))), found
@@ -205,8 +203,7 @@ def acquire(footage: Footage, models: Sequence[BodyModel], found: Sequence[PoseE
     people = [person, *(i for i in range(len(models)) if i != person)]
     bodies = {f.frame: tuple(PosedBody(models[i], f.poses[i]) for i in people) for f in good}
     placed = {0: place_joints(models[person], limb_joints(footage.references[person])[0])}
-    with Recording(footage.cameras) as recording:
-        observer = Observer(footage.cameras, recording)
+    with open_observer(footage.cameras) as observer:
         return acquire_from_contours(observer, bodies, 0, placed, AcquisitionSettings()).body
 
 

@@ -17,8 +17,7 @@ import numpy as np
 from acquisition import PLAYED, quadrille
 from doc_tables import Conditions, benchmark_parser, read_words, show, table
 
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.trc import MarkerTable, read_trc, write_trc
@@ -432,8 +431,8 @@ def body(data: Path, folder: Path) -> Measured:
     at = tracked(started(real, folder / "real", acquired))
     session = load_session(at)
     half = session.n_frames // 2
-    with Recording(session.cameras) as recording:
-        posed = PosedRecording.of_session(session, Observer(session.cameras, recording))
+    with open_observer(session.cameras) as observer:
+        posed = PosedRecording.of_session(session, observer)
         for words, used in (("first", range(half)), ("second", range(half, session.n_frames))):
             check = check_calibration(posed, used)
             scores = held_out_scores(replace(posed, lost={*posed.lost, *used}), check, session.n_frames)

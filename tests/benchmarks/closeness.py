@@ -16,8 +16,7 @@ from true_starts import Clip, read_simulated, track_from
 
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.simulate import Simulation, simulate
@@ -66,8 +65,7 @@ def measure(couple: Clip, settings: TrackSettings) -> Cell:
 def _tracked_from(couple: Clip, starts: Sequence[Array], settings: TrackSettings) -> Cell:
     """Track everybody from some poses, (n_values,) each, and compare."""
     session, frames = couple.session, couple.frames
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         found = track_from(observer, couple.models, starts, frames, settings)
     errors, lost, swapped = [], 0, 0
     for i, model in enumerate(couple.models):

@@ -18,6 +18,7 @@ import numpy as np
 from acquisition import quadrille
 from between_keyframes import errors
 from doc_tables import benchmark_parser, read_words, show, table, work_folder
+from stored_motions import put_poses
 from unseen_people import CONDITIONS, SCENES, SPARSE, Scene, acquired
 
 from tracker.body.limbs import limbs
@@ -25,11 +26,9 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.fitting.hypothesis import distance_m
 from tracker.evaluation.references import read_joints
-from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 from tracker.session.store.stored_poses import StoredPose, read_stored_poses
 
 TABLES = ("keyframes_in_doubt",)
@@ -99,11 +98,7 @@ def statuses(scene: Scene, folder: Path) -> Iterator[tuple[str, str]]:
             again = Path(shutil.copytree(at, Path(scratch) / kind))
             path = load_session(again).annotations_path
             with closing(AnnotationStore(path)) as store:
-                revision = store.add_model_revision(person.name, format_model(person.model))
-                records = {
-                    k: PoseRecord(pose, ("manual",) * len(pose), revision, keyframe=True) for k, pose in poses.items()
-                }
-                store.commit("by hand", [PoseChange(person.name, k, record) for k, record in records.items()])
+                put_poses(store, person, poses, label="by hand", keyframe=True)
             quadrille("track", again)
             found = read_stored_poses(path, person.name, person.model)
             yield from ((kind, found[k].record.status) for k in poses)

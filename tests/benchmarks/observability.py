@@ -21,8 +21,7 @@ from tracker.estimation.chamfer.tracker import ChamferTracker
 from tracker.estimation.fitting.observability import OBSERVABLE_M, OBSERVABLE_RAD, ContourNoise, observe_pose
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.tracking.tracker import TrackingRun
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.pose_csv import read_pose_table
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
@@ -96,8 +95,7 @@ def track(folder: Path, name: str) -> Tracked:
     session = load_session(folder / name)
     model = session.people[0].model
     truth = read_pose_table(folder / name / "truth.csv").values_for(model)
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         run = TrackingRun(observer, Subjects.of([model]), [truth[0]], range(session.n_frames), session.fps)
         poses = [e.poses[0] for e in ChamferTracker().estimates(run)]
     errors = np.array([model.difference(p, t) for p, t in zip(poses, truth, strict=True)])

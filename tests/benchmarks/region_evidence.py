@@ -37,9 +37,8 @@ from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.pose_errors import SELDOM_NATS
 from tracker.estimation.tracking.view_regions import regions
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
+from tracker.evidence.observer import Observer, open_observer
 from tracker.evidence.view_evidence import EdgeSettings
-from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session, load_session
 from tracker.session.store.stored_poses import read_stored_poses
@@ -162,8 +161,7 @@ def _first_limbs(models: Sequence[BodyModel]) -> list[int]:
 
 def rows(tracked: Tracked, is_displaced: bool) -> Iterator[list[str]]:
     """Yield the cells of each person, in the order of `HEADS`."""
-    with Recording(tracked.session.cameras) as recording:
-        observer = Observer(tracked.session.cameras, recording)
+    with open_observer(tracked.session.cameras) as observer:
         bodies = displaced(tracked, observer) if is_displaced else tracked.bodies
         measured = measure(tracked, bodies, observer)
     for i, first in enumerate(_first_limbs(tracked.models)):

@@ -25,8 +25,7 @@ from tracker.estimation.by_frame.settings import trust
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import Observer, open_observer
 from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
 from tracker.session.assemble import DEFAULT_MODEL
@@ -106,8 +105,7 @@ def measure(dancer: Dancer, settings: TrackSettings) -> list[FrameResult]:
     """Track a recording, and compare the poses of each frame."""
     model, start = dancer.model, fit_to_points(dancer.model, dancer.joints[0], centers=True).pose
     session = dancer.session
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         frames = range(session.n_frames)
         found = {f.frame: f for f in track_from(observer, [model], [start], frames, settings, session.fps)}
         frames = [k for k in found if k in dancer.joints and k > 0]

@@ -18,8 +18,7 @@ from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.tracking.tracker import TrackingRun
 from tracker.estimation.trajectory.hypotheses import all_together, through
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import Leg, TrackSession
@@ -58,8 +57,8 @@ def estimated(folder):
         return assess(search, solved, first, *others)
 
     run_estimate.assessed_path = assessed
-    with Recording(session.cameras) as recording:
-        observer, subjects = Observer(session.cameras, recording), Subjects.of([model])
+    with open_observer(session.cameras) as observer:
+        subjects = Subjects.of([model])
         leg = Leg(TrackingRun(observer, subjects, [[start]], range(session.n_frames), session.fps))
         run = TrackSession(make_tracker(TrackSettings()), [leg], [StoredPerson("person", 1)], Nowhere(), "picture")
         for step in run.steps():

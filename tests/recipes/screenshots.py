@@ -11,11 +11,12 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from stored_motions import put_poses
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
@@ -26,11 +27,9 @@ from program import ROOT, Program
 
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
-from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import Session, load_session, save_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 from tracker.simulate.record import Simulation, simulate
 
 SAMPLES = ROOT / "sample_sessions"
@@ -231,21 +230,18 @@ def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
 def place(session: Session, near: bool) -> None:
     """Put everybody on frame 0, where the true joints are or a hand has put the dancers; near: arms a little off."""
     joints = None if len(session.people) > 1 else read_joints(session.folder / "truth.trc", session.fps)
-    store = AnnotationStore(session.annotations_path)
-    for person in session.people:
-        model = person.model
-        if joints is None:
-            values = read_pose_table(session.folder / f"first_pose_{person.name}.csv").values_for(model)[0]
-        else:
-            places = dict(zip(joints.names, joints.points[0], strict=True))
-            values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).pose
-        if near:
-            values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
-            values = model.clip(values)
-        revision = store.add_model_revision(person.name, format_model(model))
-        pose = PoseRecord(values, ("manual",) * len(values), revision, keyframe=True)
-        store.commit("place", [PoseChange(person.name, 0, pose)])
-    store.close()
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        for person in session.people:
+            model = person.model
+            if joints is None:
+                values = read_pose_table(session.folder / f"first_pose_{person.name}.csv").values_for(model)[0]
+            else:
+                places = dict(zip(joints.names, joints.points[0], strict=True))
+                values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).pose
+            if near:
+                values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
+                values = model.clip(values)
+            put_poses(store, person, {0: values}, label="place", keyframe=True)
 
 
 @asynccontextmanager

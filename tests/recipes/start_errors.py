@@ -13,8 +13,7 @@ import numpy as np
 from tracker.errors import TrackerError
 from tracker.estimation.initialization.frame_trials import find_first_poses
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.session import load_session
 
@@ -28,8 +27,7 @@ def main() -> None:
     arguments = options.parse_args()
     session = load_session(arguments.session)
     references = [read_joints(path, session.fps, None, "x,y,z") for path in arguments.references]
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         rows = []
         for frame in range(0, session.n_frames, arguments.every):
             try:

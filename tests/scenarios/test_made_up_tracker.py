@@ -10,6 +10,7 @@ import pytest
 import tyro
 from command_line import SAMPLE
 from fake_tracker import STEP_M, Walker
+from stored_motions import put_poses
 
 from app.cli.track import arguments_class, settings_of
 from app.control.tracking import track_settings
@@ -21,13 +22,11 @@ from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.method import Method, Option, PaperMode
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.formats.model_toml import format_model
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain
 from tracker.pipeline.methods import METHODS, all_options
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 
 @dataclass(frozen=True)
@@ -60,9 +59,7 @@ def test_the_chain_drives_it(sonar, tmp_path):
     sink = SimpleNamespace(report=lambda stage, share, text="": None, take=lambda run, step: None)
     with closing(AnnotationStore(session.annotations_path)) as store, Recording(session.cameras) as recording:
         values = session.people[0].model.neutral()
-        revision = store.add_model_revision("person", format_model(session.people[0].model))
-        record = PoseRecord(values, ("manual",) * len(values), revision)
-        store.commit("put", [PoseChange("person", 2, record)])
+        put_poses(store, session.people[0], {2: values})
         plan = TrackPlan(range(5), (0,), SonarSettings())
         run_chain(ChainPlan(plan), StoredSession(session, store, Observer(session.cameras, recording)), sink)
         assert [row.frame for row in store.frames("person")] == [0, 1, 2, 3, 4]

@@ -20,13 +20,12 @@ from chromium import FLAGS, chromium_path
 from memory import memory_mb
 from page_driver import command, dragging, shows
 from playwright.async_api import async_playwright
-from program import ROOT, started, visited
+from program import SAMPLE, started, visited
 
 from app.state.page_view import LAYERS
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 HOUR_S = 3600.0
 JUDGED_S = 1800.0
 """A shorter soak is not judged by its memory."""

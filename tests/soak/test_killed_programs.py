@@ -17,13 +17,12 @@ from contextlib import asynccontextmanager, closing, suppress
 import aiohttp
 import pytest
 from page_driver import until
-from program import ROOT, Program
+from program import ROOT, SAMPLE, Program
 
 from tracker.session.store.annotation_store import AnnotationStore
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 N_FRAMES = 50
 STEP_CM = 0.01
 """Each edit sets the body's x to another multiple of it, so that a stored value names its edit."""

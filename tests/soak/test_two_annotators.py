@@ -12,13 +12,12 @@ from contextlib import closing
 
 import aiohttp
 import pytest
-from program import ROOT, Program
+from program import SAMPLE, Program
 
 from tracker.session.store.annotation_store import AnnotationStore
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 STEP_CM = 0.01
 SEED = 7
 N_LISTED = 12

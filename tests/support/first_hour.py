@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import numpy as np
-from page_driver import frame_place, state_of
+from page_driver import drag_mouse, frame_place, state_of
 from scripted_user import TRUNK, ScriptedUser
 
 from tracker.errors import FormatError
@@ -153,10 +153,7 @@ class Hour:
         start, end = [await frame_place(self.page, frame, 1 / 3, is_whole=True) for frame in (first, last)]
         self.stranger.stages[-1].mouse += 1
         await self.page.keyboard.down("Shift")
-        await self.page.mouse.move(*start)
-        await self.page.mouse.down()
-        await self.page.mouse.move(*end, steps=4)
-        await self.page.mouse.up()
+        await drag_mouse(self.page, start, end, steps=4)
         await self.page.keyboard.up("Shift")
         await self.stranger.until(f"quadrille.state.range?.first === {first} && quadrille.state.range.last === {last}")
 

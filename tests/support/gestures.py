@@ -20,9 +20,15 @@ def pixel_of(controller, point, camera=FRONT, person=0):
     return controller.session.cameras[camera].camera.pinhole.project(place)
 
 
-def drag(controller, point, by, camera=FRONT, person=0):
+def grab(controller, point, camera=FRONT, person=0):
+    """Take a joint in the hand, and return its pixel."""
     start = pixel_of(controller, point, camera, person)
     controller.dragging.begin(PAGE, camera, person, point, tuple(start))
+    return start
+
+
+def drag(controller, point, by, camera=FRONT, person=0):
+    start = grab(controller, point, camera, person)
     for t in (0.5, 1.0):
         controller.dragging.move(PAGE, tuple(start + t * np.array(by)), int(10 * t))
     controller.dragging.end(PAGE)

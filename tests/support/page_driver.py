@@ -117,6 +117,18 @@ async def point_of_curve(page, index, frame):
     raise AssertionError(f"no point of curve {index} on frame {frame} can be dragged")
 
 
+async def drag_mouse(page, start, end, steps=3, button="left"):
+    await page.mouse.move(*start)
+    await page.mouse.down(button=button)
+    await page.mouse.move(*end, steps=steps)
+    await page.mouse.up(button=button)
+
+
+async def turn_wheel(page, at, by_px):
+    await page.mouse.move(*at)
+    await page.mouse.wheel(0, by_px)
+
+
 async def drag_up(page, at, by_px):
     """Drag from a place upwards, and hold the button."""
     await page.mouse.move(*at)

@@ -10,6 +10,7 @@ from pathlib import Path
 from page_driver import shows
 
 ROOT = Path(__file__).resolve().parents[2]
+SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 N_ROLES = 3
 """Links of `--share`."""
 

@@ -1,5 +1,6 @@
 """Sessions with random poses in the store: several people, gaps, lost frames, distorted views and a fisheye."""
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +33,19 @@ def random_poses(model, n, seed, sigma_rad=0.5):
     start, end = (sigma * rng.normal(size=model.n_dofs) for _ in range(2))
     shares = np.linspace(0.0, 1.0, n)
     return np.array([model.clip(model.retract(model.neutral(), start + t * (end - start))) for t in shares])
+
+
+def put_poses(store, person, poses, source="manual", label="put", **more):
+    """Store poses of a person by frame; `more` are further fields of each."""
+    revision = store.add_model_revision(person.name, format_model(person.model))
+    records = {k: PoseRecord(values, (source,) * len(values), revision, **more) for k, values in poses.items()}
+    store.commit(label, [PoseChange(person.name, k, record) for k, record in records.items()])
+
+
+def store_poses(session, poses, person=None, **more):
+    """Store poses of a person, by default of the first one, in the annotations of a session; see `put_poses`."""
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        put_poses(store, person or session.people[0], poses, **more)
 
 
 def store_motion(folder, models, n_frames=8, gaps=(), lost=(), seed=0, up="z", names=("ann", "bob", "cid")):

@@ -8,9 +8,8 @@ import pytest
 from tracker.body.model import BodyModel
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
+from tracker.evidence.observer import open_observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
 
@@ -32,8 +31,8 @@ def sample_folder():
 @pytest.fixture(scope="session")
 def real_frame(sample_folder):
     session = load_session(sample_folder)
-    with Recording(session.cameras) as recording:
-        views = Observer(session.cameras, recording).evidence(25)
+    with open_observer(session.cameras) as observer:
+        views = observer.evidence(25)
     joints = read_joints(sample_folder / "truth.trc", session.fps)
     model = session.people[0].model
     return RealFrame(model, fit_to_points(model, dict(zip(joints.names, joints.points[25], strict=True))).pose, views)

@@ -6,8 +6,9 @@ frame. If that frame's regions are known in time, it also extracts the features 
 
 import threading
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -300,3 +301,14 @@ class Observer:
             camera, scale, box[:2], filmed.size, edges.found, segments, sample_segments(segments), smooth, silhouette,
             ahead,
         )  # fmt: skip
+
+
+@contextmanager
+def open_observer(cameras: Sequence[CameraSource]) -> Generator[Observer, None, None]:
+    """Open the footage of cameras, and yield an observer of it.
+
+    Raises:
+        RecordingError: the footage or a background cannot be read.
+    """
+    with Recording(cameras) as recording:
+        yield Observer(cameras, recording)

@@ -17,7 +17,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.geometry.lenses import coefficient_counts, count_words
-from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
+from tracker.validation import MAX_NUMBER, MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
 
 Units = Literal["m", "cm", "mm"]
 METRES = {unit: METRES_BY_WORD[unit] for unit in get_args(Units)}
@@ -35,7 +35,7 @@ _Pixels: TypeAlias = Annotated[float, Meta(ge=1, le=MAX_SIDE_PX, multiple_of=1)]
 _Size: TypeAlias = Annotated[
     tuple[_Pixels, _Pixels], Meta(description="width and height in whole pixels, from 1 to 32767,")
 ]
-_Focal: TypeAlias = Annotated[float, Meta(ge=1, le=1e9)]
+_Focal: TypeAlias = Annotated[float, Meta(ge=1, le=MAX_NUMBER)]
 _Zero: TypeAlias = Annotated[float, Meta(ge=0, le=0)]
 _One: TypeAlias = Annotated[float, Meta(ge=1, le=1)]
 _Rodrigues: TypeAlias = Annotated[

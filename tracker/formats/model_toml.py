@@ -18,6 +18,7 @@ import numpy as np
 import tomli_w
 from msgspec import Meta
 
+from tracker.body.dimensions import HEIGHT_LIMITS_M
 from tracker.body.model import BodyModel
 from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
@@ -35,7 +36,10 @@ PRESETS = tuple(_PRESET_TEXTS)
 
 _KIND = TextKind("body model", DOCUMENT_BYTES, ModelError)
 
-_Height: TypeAlias = Annotated[float, Meta(ge=0.3, le=3.0, description="a height of 0.3 to 3 metres")]
+_LOWEST_M, _HIGHEST_M = HEIGHT_LIMITS_M
+_Height: TypeAlias = Annotated[
+    float, Meta(ge=_LOWEST_M, le=_HIGHEST_M, description=f"a height of {_LOWEST_M:g} to {_HIGHEST_M:g} metres")
+]
 _Fraction: TypeAlias = Annotated[float, Meta(ge=-10, le=10)]
 _Position: TypeAlias = Annotated[
     tuple[_Fraction, _Fraction, _Fraction], Meta(description="3 finite numbers, fractions of the height,")

@@ -77,7 +77,8 @@ def quaternion_log(wxyz: Array) -> Array:
     q = np.where(q[..., :1] < 0, -q, q)
     s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(s, q[..., :1])
-    factor = np.where(s < 1e-8, 2.0, angle / np.where(s < 1e-8, 1.0, s))
+    small = s < 1e-8
+    factor = np.where(small, 2.0, angle / np.where(small, 1.0, s))
     return factor * q[..., 1:]
 
 

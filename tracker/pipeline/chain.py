@@ -17,8 +17,7 @@ from tracker.estimation.acquisition.from_contours import Acquisition, Acquisitio
 from tracker.estimation.fitting.gauss_newton import PointTargets
 from tracker.estimation.initialization.first_pose import FirstPoses
 from tracker.estimation.initialization.frame_trials import Trying
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import Observer, open_observer
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
 from tracker.pipeline.calibration_revisions import follow_history, outdated_sizes
@@ -304,5 +303,5 @@ def open_stored_session(session: Session) -> Generator[StoredSession, None, None
     require_files(session)
     with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
         session = follow_history(session, store)
-        with Recording(session.cameras) as recording:
-            yield StoredSession(session, store, Observer(session.cameras, recording).in_time())
+        with open_observer(session.cameras) as observer:
+            yield StoredSession(session, store, observer.in_time())

@@ -10,8 +10,7 @@ from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
 from tracker.estimation.acquisition.from_joints import height_from_joints, pose_at_joints
 from tracker.estimation.fitting.gauss_newton import fit_to_points
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, has_preset_sizes
 from tracker.formats.pose_csv import PoseTable
@@ -147,8 +146,7 @@ def _acquire(session: Session, person: Person, joints: MarkerTable) -> Acquisiti
     known = pose_at_joints(person.model, joints, sorted(k for k in spread if k < n))
     if not known.bodies:
         raise TrackerError("fitting sizes needs a frame with at least 4 joints of the limbs, found none")
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         return acquire_from_contours(observer, known.bodies, 0, known.placed, settings)
 
 

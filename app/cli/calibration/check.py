@@ -65,8 +65,7 @@ def check(session: "Session", frames: range, n: int, options: tuple[bool, bool],
         TrackerError: there are fewer than two cameras, or too few frames with poses; or the correction does not hold on
             other frames.
     """
-    from tracker.evidence.observer import Observer
-    from tracker.footage.recording import Recording
+    from tracker.evidence.observer import open_observer
     from tracker.pipeline.body_acquisition import generic_doubt, with_acquired_bodies
     from tracker.pipeline.calibration_check import check_calibration, held_out_scores
     from tracker.pipeline.posed_recording import PosedRecording
@@ -74,12 +73,12 @@ def check(session: "Session", frames: range, n: int, options: tuple[bool, bool],
 
     require_files(session)
     acquires, applies = options
-    with Recording(session.cameras) as recording, progress.share("checking the cameras") as advance:
+    with open_observer(session.cameras) as observer, progress.share("checking the cameras") as advance:
 
         def report(stage: str, share: float, text: str = "", /) -> None:
             advance(share)
 
-        posed = PosedRecording.of_session(session, Observer(session.cameras, recording).in_time())
+        posed = PosedRecording.of_session(session, observer.in_time())
         if acquires:
             posed = with_acquired_bodies(posed, session, report)
         found = check_calibration(posed, frames, n, report)

@@ -68,13 +68,12 @@ def judge_session(session: "Session", name: str, progress: Reporter) -> list["Ju
     from app.cli.track_report import ChainProgress
     from tracker.estimation.chamfer.settings import TrackSettings
     from tracker.evaluation.judging.judge import judge
-    from tracker.evidence.observer import Observer
-    from tracker.footage.recording import Recording
+    from tracker.evidence.observer import open_observer
     from tracker.session.relink import require_files
 
     require_files(session)
-    with Recording(session.cameras) as recording, ChainProgress(progress) as sink:
-        return judge(session, Observer(session.cameras, recording).in_time(), name, TrackSettings(), sink)
+    with open_observer(session.cameras) as observer, ChainProgress(progress) as sink:
+        return judge(session, observer.in_time(), name, TrackSettings(), sink)
 
 
 def record(found: list["Judgement"]) -> dict[str, Any]:

@@ -148,10 +148,9 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
         assert after[k].sources == ("tracked",) * 22
         assert after[k].settings["method"] == "chamfer"
         assert after[k].cost_px > 0
-    store = AnnotationStore(session / "annotations.sqlite")
-    assert store.undo() == "track frames 0:4"  # one entry, however many frames
-    assert [row.frame for row in store.frames("person")] == [0, 2]
-    store.close()
+    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+        assert store.undo() == "track frames 0:4"  # one entry, however many frames
+        assert [row.frame for row in store.frames("person")] == [0, 2]
 
 
 def test_the_contour_method_reports_its_normal_matrices(run, session):
@@ -357,9 +356,8 @@ def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
 
 def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
     assert run("init", session, "--method", "poses", "--poses", SAMPLE / "truth.csv", "--frame", "3")[0] == 0
-    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
-    record = store.pose("person", 3)
-    store.close()
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+        record = store.pose("person", 3)
     assert record.keyframe
     assert set(record.sources) == {"imported"}
     assert np.allclose(record.values, read_pose_table(SAMPLE / "truth.csv").values[3])
@@ -396,11 +394,10 @@ def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
     other = Path(shutil.copytree(SAMPLE, tmp_path / "other"))
     for folder in (session, other):
         run("init", folder, "--joints", SAMPLE / "truth.trc")
-    store = AnnotationStore(other / "annotations.sqlite")
-    record = store.pose("person", 0)
-    moved = record.values + np.pad([0.03, 0.0, 0.04], (0, 19))
-    store.commit("move", [PoseChange("person", 0, type(record)(moved, record.sources, record.model_revision))])
-    store.close()
+    with closing(AnnotationStore(other / "annotations.sqlite")) as store:
+        record = store.pose("person", 0)
+        moved = record.values + np.pad([0.03, 0.0, 0.04], (0, 19))
+        store.commit("move", [PoseChange("person", 0, type(record)(moved, record.sources, record.model_revision))])
     summary = json.loads(run("evaluate", session, "--reference", other, "--json")[1])
     assert summary["mpjpe_mm"] == pytest.approx(50)
     assert summary["axis_error_deg"] == pytest.approx(0, abs=1e-6)

@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 from bodies import MODELS
 from command_line import assert_refused, output_of
-from stored_motions import random_poses, store_motion
+from stored_motions import put_poses, random_poses, store_motion
 
 from tracker.estimation.fitting.gauss_newton import PointTargets, solve
 from tracker.formats.joint_maps import JOINTS
-from tracker.formats.model_toml import format_model
 from tracker.formats.trc import read_trc
-from tracker.session.session import create_session
+from tracker.session.session import Person, create_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 N, BIAS_M = 30, 0.008
 MODEL = MODELS["gavrila22"]
@@ -30,10 +28,8 @@ POSES[:, MODEL.value_names.index("left_elbow.extension")] = 1.2  # a bent arm ca
 def annotate(folder, person, poses, model=MODEL, keyframe=True):
     """Store poses by frame as an annotator's work."""
     with closing(AnnotationStore(folder / "annotations.sqlite")) as store:
-        revision = store.add_model_revision(person, format_model(model))
         source = "manual" if keyframe else "tracked"
-        records = {f: PoseRecord(p, (source,) * len(p), revision, keyframe=keyframe) for f, p in poses.items()}
-        store.commit("Annotate", [PoseChange(person, f, record) for f, record in records.items()])
+        put_poses(store, Person(person, model, ""), poses, source, "Annotate", keyframe=keyframe)
 
 
 def with_elbow_off(pose):

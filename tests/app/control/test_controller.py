@@ -2,10 +2,11 @@
 
 import threading
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
-from gestures import FRONT, PAGE, drag, pixel_of, wait_for
+from gestures import PAGE, drag, grab, pixel_of, wait_for
 
 from tracker.errors import SessionError
 from tracker.estimation.chamfer.settings import TrackSettings
@@ -40,8 +41,7 @@ def test_the_cost_follows_a_drag(controller):
 
 def test_a_hand_that_holds_still_sees_what_the_pose_costs(controller):
     before = controller.state.cost_px
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     for seq, way in enumerate((10.0, 60.0, 120.0)):
         controller.dragging.move(PAGE, (start[0] + way, start[1]), seq)
     shown = controller.state.poses
@@ -61,8 +61,7 @@ def test_the_cost_of_what_has_been_let_go_is_not_touched(controller):
 
 def test_a_cancelled_drag_leaves_nothing(controller):
     values = controller.state.poses[0]
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     controller.dragging.move(PAGE, tuple(start + 40), 1)
     assert not np.array_equal(controller.state.poses[0], values)
     controller.dragging.cancel(PAGE)
@@ -73,12 +72,10 @@ def test_a_cancelled_drag_leaves_nothing(controller):
 def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
     monkeypatch.setattr("app.control.posing.dragging._CHECKPOINT_S", 0.0)
     controller = opened()
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     controller.dragging.move(PAGE, tuple(start + 40), 1)
-    other = AnnotationStore(session / "annotations.sqlite", read_only=True)
-    np.testing.assert_array_equal(other.pose("person", 0).values, controller.state.poses[0])
-    other.close()
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as other:
+        np.testing.assert_array_equal(other.pose("person", 0).values, controller.state.poses[0])
     controller.dragging.move(PAGE, tuple(start + 60), 2)
     controller.dragging.cancel(PAGE)
     assert controller.state.undo is None
@@ -86,8 +83,7 @@ def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
 
 
 def test_another_page_cannot_move_what_this_one_holds(controller):
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     values = controller.state.poses[0]
     controller.dragging.move(PAGE + 1, tuple(start + 40), 1)
     controller.dragging.end(PAGE + 1)
@@ -135,9 +131,8 @@ def test_values_nobody_touched_keep_their_source(session, controller):
     controller.search.step()
     wait_for(lambda: controller.state.search.evaluations and not controller.state.search.running)
     drag(controller, "left_wrist", (10.0, 0.0))
-    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
-    sources = store.pose("person", 0).sources
-    store.close()
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+        sources = store.pose("person", 0).sources
     names = controller.models[0].value_names
     assert sources[names.index("left_elbow.extension")] == "manual"
     assert set(sources[:5]) <= {"manual", "searched"}
@@ -176,9 +171,8 @@ def test_a_stopped_search_keeps_the_best_so_far_on_disk(session, controller):
     controller.activities.stop()
     assert not controller.state.search.running
     assert controller.state.search.kind == "search"  # it stands, and can go on
-    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
-    np.testing.assert_array_equal(store.pose("person", 0).values, controller.state.poses[0])
-    store.close()
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+        np.testing.assert_array_equal(store.pose("person", 0).values, controller.state.poses[0])
     evaluations = controller.state.search.evaluations
     controller.search.step()
     wait_for(lambda: controller.state.search.evaluations > evaluations)

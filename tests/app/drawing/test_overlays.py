@@ -82,11 +82,13 @@ def rows_sorted(segments_px):
     return rows[np.lexsort(rows.T)]
 
 
+def traced_in_second_view(controller):
+    body = PosedBody(controller.session.people[0].model, controller.state.poses[0])
+    return occluding_contours.trace([body], controller.session.cameras[1].camera.pinhole)
+
+
 def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
-    state, session = controller.state, controller.session
-    traced = occluding_contours.trace(
-        [PosedBody(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole
-    )
+    state, session, traced = controller.state, controller.session, traced_in_second_view(controller)
     assert 0 < traced.occluded.sum() < len(traced.occluded)
     paths = drawn(controller, state, view=view_of("contours", "hidden"))
     for kind, those in (("hidden", traced.occluded), ("model", ~traced.occluded)):
@@ -110,10 +112,7 @@ def test_contours_by_part_are_the_same_pieces_in_the_parts_colours(controller):
 
 @pytest.mark.parametrize("by_part", [False, True])
 def test_each_contour_names_its_side(controller, by_part):
-    state, session = controller.state, controller.session
-    traced = occluding_contours.trace(
-        [PosedBody(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole
-    )
+    state, session, traced = controller.state, controller.session, traced_in_second_view(controller)
     names = np.array([part.name for part in session.people[0].model.parts])[traced.parts[~traced.occluded]]
     paths = kinds_of(drawn(controller, state, view=view_of("contours", by_part=by_part)), "model", camera=1)
     for side in ("left", "right"):

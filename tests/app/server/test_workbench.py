@@ -105,12 +105,11 @@ def test_unsaved_edits_are_kept_offered_and_written(open_with, session, run, pla
     found = stored(session)[0]
     np.testing.assert_array_equal(found.values, edit_on_a_full_disk.values)  # to the bit
     assert found.keyframe
-    store = AnnotationStore(session / "annotations.sqlite")
-    assert [p.point for p in store.pins("person", 0)] == ["left_wrist"]
-    assert [entry.label for entry in store.history()] == [
-        "set pin left wrist in FRONT, frame 0", "drag left wrist, frame 0", "drag torso, frame 0",
-    ]  # fmt: skip
-    store.close()
+    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+        assert [p.point for p in store.pins("person", 0)] == ["left_wrist"]
+        assert [entry.label for entry in store.history()] == [
+            "set pin left wrist in FRONT, frame 0", "drag left wrist, frame 0", "drag torso, frame 0",
+        ]  # fmt: skip
     assert open_with(lambda controller: None) == []
 
 

@@ -16,7 +16,7 @@ from app.state.page_view import View
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.camera_exchange import find_exchange
-from tracker.evidence.observer import Observer
+from tracker.evidence.observer import open_observer
 from tracker.footage.recording import Recording
 from tracker.footage.video import open_footage
 from tracker.interchange.exports.motion import ExportedMotion, PersonMotion, StoredPose
@@ -39,8 +39,8 @@ def session(made, tmp_path):
 @pytest.fixture(scope="module")
 def observer(made):
     loaded = load_session(made)
-    with Recording(loaded.cameras) as recording:
-        yield Observer(loaded.cameras, recording)
+    with open_observer(loaded.cameras) as observer:
+        yield observer
 
 
 @pytest.mark.slow

@@ -4,9 +4,7 @@ import shutil
 
 import pytest
 import pytest_asyncio
-from program import ROOT, started, visited
-
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
+from program import SAMPLE, started, visited
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -9,20 +9,17 @@ import cv2
 import numpy as np
 import pytest
 from page_driver import go_to, reloaded, shows, state_of
-from program import ROOT, started, visited
+from program import ROOT, SAMPLE, started, visited
+from stored_motions import store_poses
 
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
-from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, corrected
 from tracker.session.session import load_session, save_camera_files
-from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 FRONT, LEFT = 0, 3
 FRAME = 12
 """The arms move fastest."""
@@ -41,12 +38,8 @@ def tracked_copy(folder, changed):
     session = changed(load_session(folder))
     session = save_camera_files(session, session.cameras)
     write_calibration(folder / "calibration.toml", [c.camera for c in session.cameras])
-    person = session.people[0]
-    truth, store = read_pose_table(SAMPLE / "truth.csv"), AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision(person.name, format_model(person.model))
-    sources = ("manual",) * len(person.model.value_names)
-    store.commit("place", [PoseChange(person.name, 0, PoseRecord(truth.values[0], sources, revision, keyframe=True))])
-    store.close()
+    truth = read_pose_table(SAMPLE / "truth.csv")
+    store_poses(session, {0: truth.values[0]}, label="place", keyframe=True)
     words = [sys.executable, "-m", "quadrille", "track", str(folder), "--no-whole-run"]
     subprocess.run(words, cwd=ROOT, check=True, capture_output=True)
     return session
@@ -110,7 +103,7 @@ async def previewed(page):
 
 
 async def tracked_again(page):
-    await page.get_by_role("button", name="Track again").click()
+    await page.locator("#advice").get_by_role("button", name="Track again").click()
     await shows(page, "!quadrille.state.state.track.running && quadrille.state.state.undo.startsWith('track')", 120)
     await go_to(page, FRAME)
     await shows(page, f"quadrille.state.timeline[{FRAME}].source === 'tracked'", 20)

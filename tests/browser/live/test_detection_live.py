@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import pytest
 from page_driver import command, shows
-from program import ROOT, started, visited
+from program import ROOT, SAMPLE, started, visited
 
 from tracker.evaluation.references import read_joints
 from tracker.interchange.observations.stored import list_observations
@@ -14,7 +14,6 @@ from tracker.session.store.stored_poses import read_stored_poses
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 N_FRAMES = 12
 
 

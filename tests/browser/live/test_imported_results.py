@@ -10,7 +10,7 @@ import pytest
 import pytest_asyncio
 from observed_people import BODY_25, write_openpose
 from page_driver import command, handle_of, shows, to_client
-from program import ROOT, started, visited
+from program import SAMPLE, started, visited
 
 from tracker.evaluation.references import read_joints
 from tracker.formats.keypoints.openpose import read_openpose
@@ -18,7 +18,6 @@ from tracker.session.session import load_session
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 N_FRAMES, WRONG = 8, 3
 WRIST = BODY_25.points.index("LWrist")
 OFF_M = np.array([0.0, 0.0, 0.25])

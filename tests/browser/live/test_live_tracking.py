@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import command, frame_place, go_to, handle_of, shows, state_of
-from program import ROOT, visited
+from program import SAMPLE, visited
+from stored_motions import store_poses
 
-from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
-from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 START = 8
 """The arms are on their way up."""
 
@@ -24,14 +21,8 @@ START = 8
 def folder(tmp_path_factory):
     """A copy of the sample whose body a person has put in place on one frame."""
     folder = shutil.copytree(SAMPLE, tmp_path_factory.mktemp("tracking") / "session")
-    session = load_session(folder)
-    model = session.people[0].model
     truth = read_pose_table(folder / "truth.csv")
-    store = AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision("person", format_model(model))
-    pose = PoseRecord(truth.values[START], ("manual",) * len(model.value_names), revision, keyframe=True)
-    store.commit("place", [PoseChange("person", START, pose)])
-    store.close()
+    store_poses(load_session(folder), {START: truth.values[START]}, label="place", keyframe=True)
     return folder
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from page_driver import command, shows
-from program import ROOT, started, visited
+from program import SAMPLE, started, visited
 
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.evaluation.agreement.consensus import mean_pose
@@ -18,7 +18,6 @@ from tracker.session.store.records import PoseChange, PoseRecord
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 FRAME = 3
 
 

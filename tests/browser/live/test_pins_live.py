@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import handle_of, shows, state_of, to_client
-from program import ROOT, started, visited
+from program import SAMPLE, started, visited
+from stored_motions import store_poses
 
 from tracker.evaluation.references import read_joints
-from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
-from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 FRAME = 0
 FRONT, RIGHT, BACK, LEFT = range(4)
 PINS = "quadrille.state.overlay.pins"
@@ -43,11 +40,7 @@ async def opened(browser, tmp_path_factory):
     values = read_pose_table(folder / "truth.csv").values[FRAME].copy()
     for name in ("left_shoulder.abduction", "right_shoulder.elevation"):
         values[model.value_names.index(name)] += 0.2
-    store = AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision("person", format_model(model))
-    pose = PoseRecord(model.clip(values), ("manual",) * len(values), revision, keyframe=True)
-    store.commit("place", [PoseChange("person", FRAME, pose)])
-    store.close()
+    store_poses(session, {FRAME: model.clip(values)}, label="place", keyframe=True)
     async with started(folder) as program, visited(browser, program.address) as page:
         yield page, Truth(session)
 

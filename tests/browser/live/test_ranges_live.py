@@ -39,14 +39,13 @@ async def test_a_range_is_interpolated_reviewed_cleared_and_given_back(live):
     await shows(page, "quadrille.state.timeline[4]?.reviewed", 30)
     await page.locator("#range-clear").click()
     await shows(page, "Object.keys(quadrille.state.timeline).length === 2", 30)
-    store = AnnotationStore(folder / "annotations.sqlite", read_only=True)
-    assert [row.frame for row in store.frames("person")] == [0, 10]
-    for expected in ("quadrille.state.timeline[4]?.reviewed", "!quadrille.state.timeline[4].reviewed",
-                     "!quadrille.state.timeline[4] && quadrille.state.timeline[10]"):  # fmt: skip
-        await page.keyboard.press("Control+z")
-        await shows(page, expected, 30)
-    assert [row.frame for row in store.frames("person")] == [0, 10]
-    store.close()
+    with closing(AnnotationStore(folder / "annotations.sqlite", read_only=True)) as store:
+        assert [row.frame for row in store.frames("person")] == [0, 10]
+        for expected in ("quadrille.state.timeline[4]?.reviewed", "!quadrille.state.timeline[4].reviewed",
+                         "!quadrille.state.timeline[4] && quadrille.state.timeline[10]"):  # fmt: skip
+            await page.keyboard.press("Control+z")
+            await shows(page, expected, 30)
+        assert [row.frame for row in store.frames("person")] == [0, 10]
 
 
 @pytest.mark.slow

@@ -5,12 +5,11 @@ import shutil
 import pytest
 import pytest_asyncio
 from page_driver import command, shows, state_of
-from program import ROOT, visited
+from program import SAMPLE, visited
 from run_with_doubt import WRONG_FRAME, store_run
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 EXPLAINED = "quadrille.state.reason?.parts.length > 0 && !quadrille.state.reason.running"
 GHOSTS = "quadrille.state.overlay.paths.filter(({ kind, count }) => kind === 'alternative' && count > 0).length"
 WORST = ".reason-table td.is-worst"

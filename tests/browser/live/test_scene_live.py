@@ -11,19 +11,18 @@ import cv2
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import command, shows, state_of, to_client
+from page_driver import command, drag_mouse, shows, state_of, to_client
 from program import started
+from stored_motions import store_poses
 
 from tracker.body.model import PosedBody
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.evidence.contours.occluding_contours import part_poses
 from tracker.footage.camera_source import CameraSource
-from tracker.formats.model_toml import format_model, load_model
+from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.session.session import Person, create_session, load_session
-from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 pytestmark = pytest.mark.slow
 
@@ -84,14 +83,8 @@ def folder(tmp_path_factory):
         sources.append(CameraSource(view, home / view.name))
     people = [Person("person", model, "#203080")]  # its light left limbs differ from white too
     session = create_session(home / "session", cameras=sources, people=people, fps=25.0)
-    store = AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision("person", format_model(model))
-    changes = []
-    for frame in range(N_FRAMES):
-        pose = values + np.eye(len(values))[1] * 0.1 * frame
-        changes.append(PoseChange("person", frame, PoseRecord(pose, ("tracked",) * len(pose), revision)))
-    store.commit("walk", changes)
-    store.close()
+    poses = {frame: values + np.eye(len(values))[1] * 0.1 * frame for frame in range(N_FRAMES)}
+    store_poses(session, poses, source="tracked", label="walk")
     return home / "session"
 
 
@@ -223,10 +216,7 @@ async def test_the_image_follows_the_frame_and_a_turn_leaves_the_camera(live):
     await live.keyboard.press(".")
     await rested(live, lambda image: 100 < np.percentile(image, 99.9) < 150)
     scene = await live.locator("#scene").bounding_box()
-    await live.mouse.move(scene["x"] + 60, scene["y"] + 300)
-    await live.mouse.down()
-    await live.mouse.move(scene["x"] + 110, scene["y"] + 290, steps=4)
-    await live.mouse.up()
+    await drag_mouse(live, (scene["x"] + 60, scene["y"] + 300), (scene["x"] + 110, scene["y"] + 290), steps=4)
     await shows(live, "quadrille.state.state.snapped === null", 30)
     assert await live.locator(".pane.is-snapped").count() == 0
     await live.keyboard.press(",")

@@ -14,21 +14,18 @@ import pytest_asyncio
 from first_poses import true_body, views_of
 from page_driver import command, handle_of, state_of, to_client
 from page_driver import shows as shows_within
-from program import ROOT, started, visited
+from program import ROOT, SAMPLE, started, visited
 from scripted_user import TRUNK, ScriptedUser
+from stored_motions import store_poses
 
 from tracker.estimation.chamfer.settings import TrackSettings, pose_cost
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
-from tracker.formats.model_toml import format_model
+from tracker.evidence.observer import open_observer
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 TANGO = ROOT / "sample_sessions" / "tango"
 BY_DRAGS, BY_SLIDERS = 0, 25
 """The frames that are posed: arms down, and both arms raised and bent."""
@@ -46,14 +43,9 @@ async def folder(tmp_path_factory):
     """A session in which the body stands wrong on the frames to be posed."""
     folder = shutil.copytree(SAMPLE, tmp_path_factory.mktemp("user") / "session")
     session = load_session(folder)
-    model = session.people[0].model
-    store = AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision("person", format_model(model))
     for frame in (BY_DRAGS, BY_SLIDERS):
         values = user_of(session, frame).away()
-        pose = PoseRecord(values, ("manual",) * len(values), revision, keyframe=True)
-        store.commit(f"place, frame {frame}", [PoseChange("person", frame, pose)])
-    store.close()
+        store_poses(session, {frame: values}, label=f"place, frame {frame}", keyframe=True)
     return folder
 
 
@@ -81,12 +73,9 @@ class Hands:
 
     @property
     def values(self):
-        store = AnnotationStore(self._session.annotations_path, read_only=True)
-        try:
+        with closing(AnnotationStore(self._session.annotations_path, read_only=True)) as store:
             stored = store.pose(self._name, self.frame)
             return None if stored is None else stored.values
-        finally:
-            store.close()
 
     async def drag(self, camera, point, to_px):
         """Press on a joint's handle, carry it to a place in that view, let go."""
@@ -238,8 +227,8 @@ def by_hand_px(session):
     """Cost of the poses made by hand that the sample keeps, px."""
     models = [p.model for p in session.people]
     poses = [read_pose_table(TANGO / f"first_pose_{p.name}.csv").values_for(p.model)[0] for p in session.people]
-    with closing(Recording(session.cameras)) as recording:
-        views = Observer(session.cameras, recording).evidence(BY_DRAGS)
+    with open_observer(session.cameras) as observer:
+        views = observer.evidence(BY_DRAGS)
     return pose_cost(views, models, poses, TrackSettings())(poses).total_px
 
 

@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 import pytest_asyncio
-from page_driver import command, reloaded, shows, state_of, toggle_layer
+from page_driver import command, drag_mouse, reloaded, shows, state_of, toggle_layer
 from program import ROOT, started, visit_again, visited
 
 pytestmark = pytest.mark.slow
@@ -214,10 +214,7 @@ async def test_the_drawer_keeps_the_height_it_is_given(page):
     await searched(page)  # an empty drawer does not open again
     before = await page.locator("#drawer-stage").bounding_box()
     grip = await page.locator("#drawer-grip").bounding_box()
-    await page.mouse.move(grip["x"] + 400, grip["y"] + 3)
-    await page.mouse.down()
-    await page.mouse.move(grip["x"] + 400, grip["y"] - 27, steps=3)
-    await page.mouse.up()
+    await drag_mouse(page, (grip["x"] + 400, grip["y"] + 3), (grip["x"] + 400, grip["y"] - 27))
     after = await page.locator("#drawer-stage").bounding_box()
     assert after["height"] == pytest.approx(before["height"] + 30, abs=6)
     await reloaded(page, f"{RUNS} && document.querySelector('#drawer-stage').clientHeight === {after['height']}", 30)

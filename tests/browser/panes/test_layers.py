@@ -5,7 +5,7 @@ import itertools
 
 import pytest
 from fake_endpoint import COLORS, HIDDEN_LINE, FakeEndpoint
-from page_driver import command, handle_of, reloaded, shows, state_of, to_client, toggle_layer, until
+from page_driver import command, handle_of, reloaded, shows, state_of, to_client, toggle_layer, turn_wheel, until
 
 ROW = """([camera, from, to, v]) => {
   const canvas = document.querySelectorAll(".pane-overlay")[camera];
@@ -238,8 +238,7 @@ class TestZoom:
         before = endpoint.views[-1]["reductions"]
         assert min(before) > 1
         box = await page.locator(".pane").nth(5).bounding_box()
-        await page.mouse.move(box["x"] + 80, box["y"] + 60)
-        await page.mouse.wheel(0, -1500)
+        await turn_wheel(page, (box["x"] + 80, box["y"] + 60), -1500)
         await until(lambda: endpoint.views[-1]["reductions"][5] == 1)
         assert endpoint.views[-1]["reductions"][:5] == before[:5]
 
@@ -247,8 +246,7 @@ class TestZoom:
     async def test_the_next_frame_comes_as_coarse_as_a_pane_that_is_zoomed_out_again_can_use(self, page, endpoint):
         before = endpoint.views[-1]["reductions"]
         box = await page.locator(".pane").nth(5).bounding_box()
-        await page.mouse.move(box["x"] + 80, box["y"] + 60)
-        await page.mouse.wheel(0, -1500)
+        await turn_wheel(page, (box["x"] + 80, box["y"] + 60), -1500)
         await until(lambda: endpoint.views[-1]["reductions"][5] == 1)
         await page.keyboard.press("0")
         await shows(page, "quadrille.state.views[5].zoom === 1")

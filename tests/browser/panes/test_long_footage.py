@@ -4,7 +4,7 @@ import asyncio
 from contextlib import asynccontextmanager
 
 import pytest
-from page_driver import handle_of, shows, state_of, to_client
+from page_driver import drag_mouse, handle_of, shows, state_of, to_client
 
 GO = """(frame) => {
   const box = document.querySelector("#frame");
@@ -60,10 +60,7 @@ async def test_no_hand_takes_anything_of_a_frame_that_stands_in(page, endpoint):
     async with slow(page, endpoint, 45):
         await shows(page, "quadrille.state.placeholder?.pictures")
         assert COLORED not in await page.evaluate(COLORS)  # the model of another frame is not drawn over it
-        await page.mouse.move(x, y)
-        await page.mouse.down()
-        await page.mouse.move(x + 20, y + 5, steps=3)
-        await page.mouse.up()
+        await drag_mouse(page, (x, y), (x + 20, y + 5))
     assert endpoint.heard("drag") == []
     assert COLORED in await page.evaluate(COLORS)
 

@@ -5,7 +5,20 @@ import asyncio
 import numpy as np
 import pytest
 from fake_endpoint import project
-from page_driver import DRAWN, OPENED, command, dragging, handle_of, reloaded, shows, state_of, to_client, until
+from page_driver import (
+    DRAWN,
+    OPENED,
+    command,
+    drag_mouse,
+    dragging,
+    handle_of,
+    reloaded,
+    shows,
+    state_of,
+    to_client,
+    turn_wheel,
+    until,
+)
 
 PIXEL = """([x, y]) => {
   const canvas = document.querySelector(".pane-overlay");
@@ -38,8 +51,7 @@ async def test_image_and_vectors_are_drawn_where_the_maths_says(page, endpoint):
 async def test_a_drag_sends_undistorted_pixels_within_half_a_pixel(page, endpoint, zoomed):
     if zoomed:
         at = await to_client(page, 0, *await handle_of(page, 0, "l_wrist"))
-        await page.mouse.move(at[0] - 40, at[1] + 25)
-        await page.mouse.wheel(0, -700)
+        await turn_wheel(page, (at[0] - 40, at[1] + 25), -700)
         await page.mouse.down(button="middle")
         await page.mouse.move(at[0] - 90, at[1] + 60, steps=4)
         await page.mouse.up(button="middle")
@@ -80,10 +92,7 @@ async def test_a_move_is_told_before_the_browser_gets_to_the_next_frame(page, en
 async def test_a_grab_beside_the_joint_keeps_the_distance(page, endpoint):
     u, v = await handle_of(page, 1, "head")
     x, y = await to_client(page, 1, u, v)
-    await page.mouse.move(x + 7, y - 5)
-    await page.mouse.down()
-    await page.mouse.move(x + 7, y + 30, steps=3)
-    await page.mouse.up()
+    await drag_mouse(page, (x + 7, y - 5), (x + 7, y + 30))
     await until(lambda: endpoint.heard("drag")[-1]["phase"] == "end")
     scale = (await state_of(page))["views"][1]["scale"]
     last = endpoint.heard("drag")[-1]
@@ -94,10 +103,7 @@ async def test_a_grab_beside_the_joint_keeps_the_distance(page, endpoint):
 async def test_beyond_twelve_pixels_nothing_is_grabbed_and_the_view_moves(page, endpoint):
     u, v = await handle_of(page, 0, "head")
     x, y = await to_client(page, 0, u, v)
-    await page.mouse.move(x, y - 14)
-    await page.mouse.down()
-    await page.mouse.move(x + 40, y - 14, steps=3)
-    await page.mouse.up()
+    await drag_mouse(page, (x, y - 14), (x + 40, y - 14))
     assert await to_client(page, 0, u, v) == pytest.approx((x + 40, y), abs=0.01)
     assert not endpoint.heard("drag")
     assert not endpoint.heard("select")
@@ -105,10 +111,7 @@ async def test_beyond_twelve_pixels_nothing_is_grabbed_and_the_view_moves(page, 
 
 async def test_a_click_selects_without_editing(page, endpoint):
     x, y = await to_client(page, 0, *await handle_of(page, 0, "l_elbow"))
-    await page.mouse.move(x, y)
-    await page.mouse.down()
-    await page.mouse.move(x + 1, y + 2)  # a hand is never quite still
-    await page.mouse.up()
+    await drag_mouse(page, (x, y), (x + 1, y + 2), steps=1)  # a hand is never quite still
     await until(lambda: endpoint.heard("select"))
     assert endpoint.heard("select") == [{"type": "select", "person": 0, "point": "l_elbow"}]
     assert not endpoint.heard("drag")
@@ -162,8 +165,7 @@ async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
     view = (await state_of(page))["views"][1]
     u = (x - pane["x"] - view["origin"]["x"]) / view["scale"]
     v = (y - pane["y"] - view["origin"]["y"]) / view["scale"]
-    await page.mouse.move(x, y)
-    await page.mouse.wheel(0, -500)
+    await turn_wheel(page, (x, y), -500)
     await shows(page, "quadrille.state.views[1].zoom > 2")
     assert await to_client(page, 1, u, v) == pytest.approx((x, y), abs=0.01)
     views = (await state_of(page))["views"]
@@ -224,8 +226,7 @@ async def test_a_minor_joint_gives_way_to_a_neighbour_until_one_zooms_in(page, e
 
 @pytest.mark.slow
 async def test_a_minor_joint_in_the_hand_stays_there_as_it_meets_another(page, endpoint):
-    await page.mouse.move(*await to_client(page, 0, *await handle_of(page, 0, "waist")))
-    await page.mouse.wheel(0, -1400)
+    await turn_wheel(page, await to_client(page, 0, *await handle_of(page, 0, "waist")), -1400)
     await shows(page, "quadrille.state.views[0].zoom > 5")
     u, v = await handle_of(page, 0, "torso")
     x, y = await to_client(page, 0, u, v)
@@ -244,10 +245,7 @@ async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):
     panes = page.locator("#panes")
     before = (await panes.bounding_box())["width"]
     box = await page.locator("#split").bounding_box()
-    await page.mouse.move(box["x"] + 2, 300)
-    await page.mouse.down()
-    await page.mouse.move(702, 300, steps=4)
-    await page.mouse.up()
+    await drag_mouse(page, (box["x"] + 2, 300), (702, 300), steps=4)
     assert (await panes.bounding_box())["width"] == pytest.approx(700, abs=1) != before
     await page.locator("#split").focus()
     await page.keyboard.press("ArrowRight")
@@ -287,9 +285,7 @@ async def test_all_views_are_framed_on_the_people_by_a_key(page):
 async def test_linked_views_show_the_same_joint_at_the_same_size(page):
     joint = next(h for h in (await state_of(page))["overlay"]["handles"] if h["camera"] == 0)
     await command(page, "Link the zoom of all views (toggle)")
-    x, y = await to_client(page, 0, joint["u"], joint["v"])
-    await page.mouse.move(x, y)
-    await page.mouse.wheel(0, -700)
+    await turn_wheel(page, await to_client(page, 0, joint["u"], joint["v"]), -700)
     await shows(page, "quadrille.state.views.every((view) => view.zoom > 1.5)")
     handles = (await state_of(page))["overlay"]["handles"]
     sizes = []
@@ -315,9 +311,7 @@ async def test_linked_views_show_the_same_joint_at_the_same_size(page):
 
 @pytest.mark.slow
 async def test_zoom_is_kept_over_a_reload(page):
-    x, y = await to_client(page, 0, 200.0, 150.0)
-    await page.mouse.move(x, y)
-    await page.mouse.wheel(0, -600)
+    await turn_wheel(page, await to_client(page, 0, 200.0, 150.0), -600)
     await shows(page, "localStorage.getItem('quadrille.views.elbow_rotation')")
     before = [await to_client(page, camera, 100.0, 90.0) for camera in (0, 1)]
     await reloaded(page)
@@ -361,8 +355,7 @@ async def test_a_view_moved_before_the_first_overlay_stays_where_it_is(page, end
     await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
     await reloaded(page, "window.quadrille?.state.views.length === 4 && quadrille.state.state")
     pane = await page.locator(".pane").nth(1).bounding_box()
-    await page.mouse.move(pane["x"] + 100, pane["y"] + 100)
-    await page.mouse.wheel(0, -300)
+    await turn_wheel(page, (pane["x"] + 100, pane["y"] + 100), -300)
     await shows(page, "quadrille.state.views[1].zoom > 1")
     moved = (await state_of(page))["views"]
     endpoint.held.set()
@@ -391,10 +384,7 @@ async def sizes_of(page):
 async def pulled(page, locator, dx, dy):
     box = await locator.bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    await page.mouse.move(x, y)
-    await page.mouse.down()
-    await page.mouse.move(x + dx, y + dy, steps=3)
-    await page.mouse.up()
+    await drag_mouse(page, (x, y), (x + dx, y + dy))
 
 
 async def test_panes_are_resized_by_their_borders_and_corners(page):
@@ -405,10 +395,7 @@ async def test_panes_are_resized_by_their_borders_and_corners(page):
     # Near the end of the border, clear of the corner.
     box = await between.bounding_box()
     assert await between.evaluate("(bar) => getComputedStyle(bar).cursor") == "col-resize"
-    await page.mouse.move(box["x"] + 4, box["y"] + 20)
-    await page.mouse.down()
-    await page.mouse.move(box["x"] + 94, box["y"] + 40, steps=3)
-    await page.mouse.up()
+    await drag_mouse(page, (box["x"] + 4, box["y"] + 20), (box["x"] + 94, box["y"] + 40))
     (width, height), (other, _) = automatic[:2]
     assert await sizes_of(page) == [(width + 90, height), (other - 90, height), *automatic[2:]]
     # What was in the middle is there still.

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from page_driver import OPENED, command, handle_of, reloaded, shows, state_of, to_client, until
+from page_driver import OPENED, command, handle_of, reloaded, shows, state_of, to_client, turn_wheel, until
 
 PORTRAIT = ((1080, 1920),)
 STEPPED = "quadrille.state.shown.frame === {0} && quadrille.state.overlay.frame === {0}"
@@ -29,9 +29,7 @@ async def step(page, frame):
 @pytest.mark.slow
 @pytest.mark.endpoint(walk_m=0.1)
 async def test_a_zoomed_view_follows_the_person_from_frame_to_frame(page, endpoint):
-    x, y = await to_client(page, 0, *await handle_of(page, 0, "head"))
-    await page.mouse.move(x, y)
-    await page.mouse.wheel(0, -700)
+    await turn_wheel(page, await to_client(page, 0, *await handle_of(page, 0, "head")), -700)
     await shows(page, "quadrille.state.views[0].zoom > 2")
     before = await place_in_pane(page, 0, "head")
     zoom = (await state_of(page))["views"][0]["zoom"]
@@ -64,9 +62,7 @@ async def test_a_zoomed_view_follows_the_person_from_frame_to_frame(page, endpoi
 @pytest.mark.endpoint(walk_m=0.1)
 async def test_a_view_follows_although_the_state_comes_after_the_picture(page, endpoint, monkeypatch):
     """Else it would follow with the next overlay: that of a drag, under the hand."""
-    x, y = await to_client(page, 0, *await handle_of(page, 0, "head"))
-    await page.mouse.move(x, y)
-    await page.mouse.wheel(0, -700)
+    await turn_wheel(page, await to_client(page, 0, *await handle_of(page, 0, "head")), -700)
     await shows(page, "quadrille.state.views[0].zoom > 2")
     before = await place_in_pane(page, 0, "head")
 
@@ -124,9 +120,7 @@ async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, end
     place = await place_in_pane(page, 0, "head")
     assert place[0] == pytest.approx(0.5, abs=0.05)
     # A view of a place that people have left shows them, too.
-    x, y = await to_client(page, 0, *await handle_of(page, 0, "l_wrist"))
-    await page.mouse.move(x, y)
-    await page.mouse.wheel(0, -1500)
+    await turn_wheel(page, await to_client(page, 0, *await handle_of(page, 0, "l_wrist")), -1500)
     await shows(page, "quadrille.state.views[0].zoom > 8")
     endpoint.state["frame"] = 12
     await reloaded(page, f"{OPENED} && quadrille.state.views[0].zoom < 8")

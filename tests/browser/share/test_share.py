@@ -6,7 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from page_driver import shows
+from page_driver import drag_mouse, shows
 from true_poses import sample_with_poses
 
 from app.share.content import SharedComment
@@ -108,10 +108,7 @@ async def test_views_3d_and_curves_are_drawn(browser, shared):
             sums.add(await page.evaluate(PIXELS, canvases[0]))
         assert len(sums) == 3
         box = await page.locator("#scene").bounding_box()
-        await page.mouse.move(box["x"] + 100, box["y"] + 100)
-        await page.mouse.down()
-        await page.mouse.move(box["x"] + 160, box["y"] + 110)
-        await page.mouse.up()
+        await drag_mouse(page, (box["x"] + 100, box["y"] + 100), (box["x"] + 160, box["y"] + 110), steps=1)
         await page.wait_for_timeout(100)
         assert await page.evaluate(PIXELS, "#scene") != last[1]
 

@@ -3,7 +3,7 @@
 import pytest
 import pytest_asyncio
 from fake_endpoint import COLORS
-from page_driver import command, frame_place, handle_of, shows, state_of, to_client, toggle_layer, until
+from page_driver import command, drag_mouse, frame_place, handle_of, shows, state_of, to_client, toggle_layer, until
 
 pytestmark = pytest.mark.endpoint(n_people=2)
 
@@ -17,10 +17,7 @@ async def couple(page):
 
 async def drag_wrist(page, person):
     x, y = await to_client(page, 0, *await handle_of(page, 0, "r_wrist", person))
-    await page.mouse.move(x, y)
-    await page.mouse.down()
-    await page.mouse.move(x + 12, y, steps=3)
-    await page.mouse.up()
+    await drag_mouse(page, (x, y), (x + 12, y))
 
 
 async def test_solo_keeps_the_others_out_of_reach(couple, endpoint):

@@ -1,7 +1,7 @@
 """Widths of the panes and the 3-D view, and how the 3-D view folds away."""
 
 import pytest
-from page_driver import command, reloaded, shows, until
+from page_driver import command, drag_mouse, reloaded, shows, until
 
 SMALL = {"width": 1280, "height": 720}
 
@@ -44,10 +44,7 @@ async def test_the_separator_folds_the_3d_view_away_and_opens_it(page, endpoint)
 
     async def drag_to(x):
         box = await bar.bounding_box()
-        await page.mouse.move(box["x"] + 2, 300)
-        await page.mouse.down()
-        await page.mouse.move(x, 300, steps=4)
-        await page.mouse.up()
+        await drag_mouse(page, (box["x"] + 2, 300), (x, 300), steps=4)
 
     await drag_to(1400)
     assert (await widths(page))[1] == 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from fake_endpoint import curve
-from page_driver import command, drag_up, frame_place, point_of_curve, shows, state_of, until
+from page_driver import command, drag_mouse, drag_up, frame_place, point_of_curve, shows, state_of, until
 from playwright.async_api import expect
 
 DRAWN = """([first, last, index]) => {
@@ -179,10 +179,7 @@ async def test_a_range_is_marked_shifted_and_smoothed(curves, endpoint):
     await curves.locator("#smooth-curves").click()
     await expect(curves.get_by_text("No range is marked").first).to_be_visible()
     await curves.keyboard.down("Shift")
-    await curves.mouse.move(at[0] - 40, y)
-    await curves.mouse.down()
-    await curves.mouse.move(x, y, steps=2)
-    await curves.mouse.up()
+    await drag_mouse(curves, (at[0] - 40, y), (x, y), steps=2)
     span = (await state_of(curves))["range"]
     assert (span["first"] < 40, span["last"]) == (True, 45)
     await drag_up(curves, at, 15)

@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from page_driver import command, frame_place, shows, state_of, until
+from page_driver import command, drag_mouse, frame_place, shows, state_of, until
 
 from tracker.session.store.records import SOURCES
 
@@ -19,10 +19,7 @@ INSIDE_THE_MENU = """(() => {
 
 async def mark(page, first, last):
     await page.keyboard.down("Shift")
-    await page.mouse.move(*await frame_place(page, first))
-    await page.mouse.down()
-    await page.mouse.move(*await frame_place(page, last), steps=4)
-    await page.mouse.up()
+    await drag_mouse(page, await frame_place(page, first), await frame_place(page, last), steps=4)
     await page.keyboard.up("Shift")
     assert (await state_of(page))["range"] == {"first": first, "last": last}
 
@@ -152,10 +149,7 @@ async def test_a_zoomed_view_is_moved_by_button_and_overview(page):
         await command(page, "Timeline: zoom in")
     await shows(page, "quadrille.state.visible?.end - quadrille.state.visible?.start < 20")
     x, y = await frame_place(page, 14)
-    await page.mouse.move(x, y)
-    await page.mouse.down(button="middle")
-    await page.mouse.move(x - 300, y, steps=3)
-    await page.mouse.up(button="middle")
+    await drag_mouse(page, (x, y), (x - 300, y), button="middle")
     assert (await frame_place(page, 14))[0] == pytest.approx(x - 300, abs=1.0)
     await page.mouse.click(*await frame_place(page, 90, 0.95, is_whole=True))
     await shows(page, "quadrille.state.visible.start < 90 && quadrille.state.visible.end > 90")

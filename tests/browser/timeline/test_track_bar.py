@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 from fake_endpoint import REMARK
-from page_driver import command, dragging, frame_place, shows, state_of, until
+from page_driver import command, drag_mouse, dragging, frame_place, shows, state_of, until
 
 STRIP = """(frame) => {
   const canvas = document.querySelector("#timeline canvas");
@@ -75,10 +75,7 @@ async def test_looking_elsewhere_unticks_follow_and_the_tick_leads_back(page, en
 async def test_a_marked_range_ends_a_run(page, endpoint):
     (x0, y), (x1, _) = await frame_place(page, 8), await frame_place(page, 40)
     await page.keyboard.down("Shift")
-    await page.mouse.move(x0, y)
-    await page.mouse.down()
-    await page.mouse.move(x1, y, steps=5)
-    await page.mouse.up()
+    await drag_mouse(page, (x0, y), (x1, y), steps=5)
     await page.keyboard.up("Shift")
     assert (await state_of(page))["range"] == {"first": 8, "last": 40}
     assert not endpoint.heard("seek")

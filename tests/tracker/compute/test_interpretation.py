@@ -16,8 +16,7 @@ from app.session.samples import bundled
 from tracker.body.model import PosedBody
 from tracker.compute.interpretation import interpreted
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.estimation.posing.drag import drag
 from tracker.estimation.posing.grab import grab
@@ -35,8 +34,8 @@ def figures():
     cost = ChamferCost(views, bodies).at_prediction()
     return [*dragged, cost.total_px, *cost.view_costs_px]
 
-with Recording(session.cameras) as recording:
-    views = Observer(session.cameras, recording).evidence(25)
+with open_observer(session.cameras) as observer:
+    views = observer.evidence(25)
 with interpreted():
     slow = figures()
 assert not chamfer_kernels.score_traced.signatures

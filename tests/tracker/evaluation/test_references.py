@@ -3,17 +3,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from stored_motions import store_poses
 
 from tracker.errors import FormatError, SessionError
 from tracker.evaluation.references import read_joints, read_reference, stored_motion
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.joint_maps import JOINTS
-from tracker.formats.model_toml import format_model, load_model
+from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import read_trc, write_trc
 from tracker.session.session import Person, create_session, load_session
-from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 
 @pytest.fixture
@@ -23,18 +22,6 @@ def copy(sample_folder, tmp_path):
         source = sample_folder / name
         (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)
     return load_session(tmp_path)
-
-
-def store_poses(session, person, poses, keyframe=False):
-    store = AnnotationStore(session.annotations_path)
-    model = next(p.model for p in session.people if p.name == person)
-    revision = store.add_model_revision(person, format_model(model))
-    changes = [
-        PoseChange(person, f, PoseRecord(v, ("manual",) * len(v), revision, keyframe=keyframe))
-        for f, v in poses.items()
-    ]
-    store.commit("place", changes)
-    store.close()
 
 
 def two_people(tmp_path, copy, names=("ann", "bob"), model="gavrila22"):
@@ -102,7 +89,7 @@ def test_a_session_as_reference(copy, tmp_path):
     other = two_people(tmp_path, copy)
     model = other.people[1].model
     poses = {3: model.neutral(), 8: model.neutral() + np.eye(22)[0]}
-    store_poses(other, "bob", poses)
+    store_poses(other, poses, other.people[1])
     people = two_people(tmp_path / "mine", copy)
     for path in (other.folder, other.folder / "session.toml"):
         reference = read_reference(path, people, 1)
@@ -120,14 +107,14 @@ def test_a_session_without_the_person(copy, tmp_path):
 
 def test_a_single_person_may_have_another_name(copy, tmp_path):
     other = two_people(tmp_path, copy, names=("carl",))
-    store_poses(other, "carl", {0: other.people[0].model.neutral()})
+    store_poses(other, {0: other.people[0].model.neutral()})
     assert sorted(read_reference(other.folder, copy, 0).motion.poses) == [0]
 
 
 def test_stored_poses(copy):
     assert stored_motion(copy, 0).motion.poses == {}
     values = copy.people[0].model.neutral()
-    store_poses(copy, "person", {4: values, 2: values + 0.1})
+    store_poses(copy, {4: values, 2: values + 0.1})
     found = stored_motion(copy, 0).motion.poses
     assert sorted(found) == [2, 4]
     np.testing.assert_array_equal(found[2], values + 0.1)
@@ -173,10 +160,10 @@ def test_poses_of_another_model(copy, tmp_path):
 def test_a_pose_keeps_the_body_it_was_made_with(copy):
     """A taller body for later frames moves no joint of earlier ones."""
     values = copy.people[0].model.neutral()
-    store_poses(copy, "person", {0: values, 2: values})
+    store_poses(copy, {0: values, 2: values})
     taller = replace(copy.people[0], model=copy.people[0].model.with_height(2.0))
     grown = replace(copy, people=(taller,))
-    store_poses(grown, "person", {1: values})
+    store_poses(grown, {1: values})
     joints = stored_motion(grown, 0).joints
     assert joints.frames.tolist() == [0, 1, 2]
     at = joints.names.index("left_ankle")

@@ -1,6 +1,7 @@
 """The list of a video's frames, kept between openings."""
 
 import os
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -25,11 +26,8 @@ def listed(monkeypatch):
 
 
 def frames(path, folder):
-    video = VideoFile(path, "cam", folder)
-    try:
+    with closing(VideoFile(path, "cam", folder)) as video:
         return [video.read(k) for k in (0, 31, 5, N - 1)]
-    finally:
-        video.close()
 
 
 def test_a_video_is_listed_once_and_its_frames_stay_the_same(clip, tmp_path, listed):

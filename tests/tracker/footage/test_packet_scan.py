@@ -1,6 +1,7 @@
 """The frames of a video, listed beside: what is read meanwhile is what it would be otherwise."""
 
 import threading
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -26,11 +27,8 @@ def in_steps(monkeypatch):
 
 
 def whole(path):
-    video = VideoFile(path, "cam")
-    try:
+    with closing(VideoFile(path, "cam")) as video:
         return [video.read(k) for k in range(video.n_frames)]
-    finally:
-        video.close()
 
 
 @pytest.mark.parametrize("b_frames", [0, 3])
@@ -84,19 +82,16 @@ def test_a_faulty_file_is_named_though_late(tmp_path):
     path.write_bytes(data[: len(data) * 2 // 3])
     with pytest.raises(RecordingError, match="truncated"):
         VideoFile(path, "cam")
-    video = VideoFile(path, "cam", in_background=True)
-    with pytest.raises(RecordingError, match="truncated"):
-        video.read(80)
-    with pytest.raises(RecordingError, match="truncated"):
-        _ = video.listed_share
-    video.close()
+    with closing(VideoFile(path, "cam", in_background=True)) as video:
+        with pytest.raises(RecordingError, match="truncated"):
+            video.read(80)
+        with pytest.raises(RecordingError, match="truncated"):
+            _ = video.listed_share
 
 
 def test_the_list_is_kept_for_the_next_opening(tmp_path):
     path = encode(tmp_path / "a.mp4", n=60, gop=12)
-    video = VideoFile(path, "cam", tmp_path / "lists", in_background=True)
-    assert video.read(59) is not None
-    video.close()
-    again = VideoFile(path, "cam", tmp_path / "lists", in_background=True)
-    assert (again.n_frames, again.listed_share) == (60, None)
-    again.close()
+    with closing(VideoFile(path, "cam", tmp_path / "lists", in_background=True)) as video:
+        assert video.read(59) is not None
+    with closing(VideoFile(path, "cam", tmp_path / "lists", in_background=True)) as again:
+        assert (again.n_frames, again.listed_share) == (60, None)

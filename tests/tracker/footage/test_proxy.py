@@ -1,6 +1,7 @@
 """Proxies: the same frames under the same numbers, stopped and gone on with, and told from those of other footage."""
 
 import itertools
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -23,11 +24,10 @@ def proxy(tmp_path):
 
 def make(proxy, clip, frames=None):
     """Make a proxy, or only as many steps of it; returns the counts that it told."""
-    video = VideoFile(clip, "cam")
-    steps = proxy.make(clip, video)
-    told = list(itertools.islice(steps, frames))
-    steps.close()
-    video.close()
+    with closing(VideoFile(clip, "cam")) as video:
+        steps = proxy.make(clip, video)
+        told = list(itertools.islice(steps, frames))
+        steps.close()
     return told
 
 
@@ -36,11 +36,10 @@ def test_frames_keep_their_numbers(proxy, clip):
     assert make(proxy, clip)[-1] == N
     assert proxy.fits(clip)
     assert [number(proxy.read(k)) for k in (0, 59, 17, 18, 3)] == [0, 59, 17, 18, 3]
-    video = VideoFile(clip, "cam")
-    for k in (0, 30, 59):
-        error = np.abs(proxy.read(k).astype(int) - video.read(k))
-        assert error.mean() < 12  # a picture of it, to look at
-    video.close()
+    with closing(VideoFile(clip, "cam")) as video:
+        for k in (0, 30, 59):
+            error = np.abs(proxy.read(k).astype(int) - video.read(k))
+            assert error.mean() < 12  # a picture of it, to look at
 
 
 def test_stopped_it_is_consistent_and_goes_on(proxy, clip, tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from run_poses import MOVED, Estimate
 from run_with_doubt import WRONG_FRAME, store_run
+from stored_motions import put_poses
 
 from tracker.body.model import PosedBody
 from tracker.compute.progress import mapped, result_of
@@ -19,7 +20,7 @@ from tracker.formats.model_toml import format_model
 from tracker.pipeline import audit
 from tracker.pipeline.audit import AuditPlan, PoseAudit
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import Alternative, AssessmentChange, MarkChange, PoseChange, PoseRecord
+from tracker.session.store.records import Alternative, AssessmentChange, MarkChange, PoseChange
 
 FRAMES = range(17, 24)
 OBSERVER = SimpleNamespace(cameras=(None, None))
@@ -146,8 +147,8 @@ def test_locked_dofs_stay_and_other_people_are_held(session, store, estimate):
     """They are taken where they are stored, in their neutral pose on other frames."""
     (person,) = session.people
     beside = replace(person, name="beside")
-    held, revision = person.model.neutral() + 0.2, store.add_model_revision("beside", format_model(person.model))
-    store.commit("put", [PoseChange("beside", 18, PoseRecord(held, ("manual",) * len(held), revision, True))])
+    held = person.model.neutral() + 0.2
+    put_poses(store, beside, {18: held}, keyframe=True)
     store.set_setting("locked", {"person": ["torso.x"]})
     outcome = audited(replace(session, people=(beside, person)), store, replace(PLAN, people=(1,)))
     (asked,) = estimate.asked

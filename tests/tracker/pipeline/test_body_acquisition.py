@@ -12,8 +12,7 @@ from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.estimation.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.estimation.initialization.first_pose import HEIGHT_SIGMA
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, has_preset_proportions, has_preset_sizes, load_model
 from tracker.geometry.triangulation import sigma_px
@@ -134,8 +133,7 @@ def test_too_few_poses_are_completed_by_tracking(session, store):
     start = np.array(load_session(session.folder).people[0].model.neutral())
     put(session, store, f0=record(session, store, values=start, keyframe=True))
     shares = []
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
 
         def report(stage, share, text=""):
             shares.append(share)

@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+from stored_motions import put_poses
 
 from tracker.body.dimensions import dimensions_of, with_dimensions, with_sizes_of
 from tracker.errors import TrackerError
@@ -12,7 +13,6 @@ from tracker.pipeline.body_acquisition import SIZES_EDITS
 from tracker.pipeline.body_change import change_body
 from tracker.session.session import load_session, save_model
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 FRAMES = {0: ("manual", True), 3: ("searched", False), 4: ("tracked", False)}
 
@@ -38,12 +38,11 @@ def session(tmp_path, sample_folder):
 def store(session):
     """A keyframe, a found pose, and a tracked one."""
     store, (person,) = AnnotationStore(session.annotations_path), session.people
-    revision, model = store.add_model_revision(person.name, format_model(person.model)), person.model
+    model = person.model
     for frame, (source, is_keyframe) in FRAMES.items():
         step = np.random.default_rng(frame).normal(0, 0.2, model.n_dofs)
         values = model.clip(model.retract(model.neutral(), step))
-        record = PoseRecord(values, (source,) * len(values), revision, is_keyframe, status="doubtful", trace=())
-        store.commit("pose", [PoseChange(person.name, frame, record)])
+        put_poses(store, person, {frame: values}, source, "pose", keyframe=is_keyframe, status="doubtful", trace=())
     yield store
     store.close()
 

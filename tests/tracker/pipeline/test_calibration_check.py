@@ -11,9 +11,8 @@ from tracker.body.motion.pose_path import PosePath
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
+from tracker.evidence.observer import open_observer
 from tracker.footage.camera_source import LostFrames
-from tracker.footage.recording import Recording
 from tracker.geometry.camera_correction import N_CORRECTIONS, TIME
 from tracker.pipeline.calibration_check import check_calibration, contradiction
 from tracker.pipeline.posed_recording import PosedRecording
@@ -144,7 +143,6 @@ def test_no_camera_changes_where_a_body_of_a_preset_is_off_before_static_ones(da
     known = [dict(zip(joints.names, places, strict=True)) for places in joints.points]
     named = [{n: p for n, p in places.items() if n in model.point_names} for places in known]
     poses = {k: PosedBody(model, fit_to_points(model, own).pose) for k, own in enumerate(named)}
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         check = check_calibration(PosedRecording(observer, session.fps, [poses]))
     assert (check.since, check.lost) == ({}, {})

@@ -9,13 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command_line import SAMPLE
+from stored_motions import put_poses
 
 from tracker.calibration.check.fault_search import Fault
 from tracker.calibration.check.findings import CameraFinding
 from tracker.errors import SessionError
 from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
-from tracker.formats.model_toml import format_model
 from tracker.geometry.camera_correction import DRIFT, N_CORRECTIONS, TIME
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.calibration_revisions import (
@@ -29,7 +29,7 @@ from tracker.pipeline.calibration_revisions import (
 from tracker.session.session import load_session, save_camera_files
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, present_revision, revisions_of_poses
-from tracker.session.store.records import AssessmentChange, PoseChange, PoseRecord
+from tracker.session.store.records import AssessmentChange
 from tracker.session.synchronize import with_starts
 
 
@@ -57,10 +57,7 @@ def stands(session):
 
 def set_pose(session, store, frame):
     person = session.people[0]
-    revision = store.add_model_revision(person.name, format_model(person.model))
-    values = person.model.neutral()
-    record = PoseRecord(values, ("manual",) * len(values), revision)
-    store.commit("pose", [PoseChange(person.name, frame, record)])
+    put_poses(store, person, {frame: person.model.neutral()}, label="pose")
 
 
 def test_a_changed_calibration_follows_undo_and_redo(session, store):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fake_tracker import Walker
 from run_poses import Estimate
+from stored_motions import store_poses
 
 from tracker.body.dimensions import dimensions_of, with_dimensions
 from tracker.body.model import PosedBody
@@ -31,7 +32,6 @@ from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import load_session, save_model
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 FRAME = 3
 
@@ -128,11 +128,7 @@ def acquiring(opened, monkeypatch):
 def put(opened, frame, keyframe=False):
     """Place the person by hand."""
     (person,) = opened.session.people
-    values = person.model.neutral()
-    with closing(AnnotationStore(opened.session.annotations_path)) as store:
-        revision = store.add_model_revision(person.name, format_model(person.model))
-        record = PoseRecord(values, ("manual",) * len(values), revision, keyframe)
-        store.commit("put", [PoseChange("person", frame, record)])
+    store_poses(opened.session, {frame: person.model.neutral()}, keyframe=keyframe)
 
 
 def rows(opened):

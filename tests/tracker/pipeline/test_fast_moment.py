@@ -5,18 +5,16 @@ import shutil
 import numpy as np
 import pytest
 from command_line import SAMPLE
+from stored_motions import store_poses
 
 from tracker.errors import TrackerError
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import JointMap
-from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
 from tracker.interchange.observations.stored import save_observations
 from tracker.pipeline.fast_moment import find_fast_moment
 from tracker.session.session import load_session
-from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 VIEWS = (0, 2)
 
@@ -34,11 +32,7 @@ def recording():
 
 def test_tracked_joints_show_the_fastest_frame(session, recording):
     person, truth = session.people[0], read_pose_table(SAMPLE / "truth.csv").values
-    store = AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision(person.name, format_model(person.model))
-    sources = ("tracked",) * len(person.model.value_names)
-    store.commit("track", [PoseChange(person.name, k, PoseRecord(truth[k], sources, revision)) for k in range(30)])
-    store.close()
+    store_poses(session, dict(enumerate(truth[:30])), source="tracked")
     found = find_fast_moment(session, recording, VIEWS)
     assert found.source == "tracked joints"
     assert 10 <= found.frame <= 16  # the arms turn fastest at frame 12

@@ -6,19 +6,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from run_poses import Estimate
+from stored_motions import put_poses
 
 from tracker.errors import TrackerError
 from tracker.estimation.chamfer.method import CHAMFER
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.formats.model_toml import format_model
 from tracker.pipeline import track_session
 from tracker.pipeline.keyframe_stretches import KeyframeStretch, frames_of, stretches_to_track
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
+from tracker.session.store.records import PoseChange
 
 APART_M = {3: 0.04, 8: 0.3}
 """Distance of the passes on a frame of each stretch; elsewhere they agree."""
@@ -63,10 +63,9 @@ def store(session):
 
 def set_keyframe(session, store, frame, x_m=0.0):
     (person,) = session.people
-    revision = store.add_model_revision(person.name, format_model(person.model))
     values = person.model.neutral()
     values[0] += x_m
-    store.commit("set", [PoseChange("person", frame, PoseRecord(values, ("manual",) * len(values), revision, True))])
+    put_poses(store, person, {frame: values}, label="set", keyframe=True)
 
 
 def track(session, store, frames=range(11)):

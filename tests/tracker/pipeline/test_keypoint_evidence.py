@@ -5,11 +5,12 @@ from contextlib import closing
 import numpy as np
 import pytest
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
+from stored_motions import put_poses
 
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.formats.model_toml import format_model, load_model
+from tracker.formats.model_toml import load_model
 from tracker.interchange.observations.importing import plan_import, store_import
 from tracker.interchange.observations.request import ImportRequest
 from tracker.pipeline import keypoint_evidence as module
@@ -26,7 +27,6 @@ from tracker.pipeline.keypoint_evidence import (
 from tracker.pipeline.keypoint_poses import store_keypoint_poses
 from tracker.session.session import save_model
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
 
 N = 10
 
@@ -145,9 +145,7 @@ def test_poses_of_key_points_are_stored_and_keyframes_stay(tmp_path):
     session, (motion,) = imported(tmp_path)
     model = session.people[0].model
     with closing(AnnotationStore(session.annotations_path)) as store:
-        revision = store.add_model_revision("ann", format_model(model))
-        held = PoseRecord(model.neutral(), ("manual",) * len(model.neutral()), revision, keyframe=True)
-        store.commit("by hand", [PoseChange("ann", 3, held)])
+        put_poses(store, session.people[0], {3: model.neutral()}, keyframe=True)
         assert store_keypoint_poses(session, store, (0,), range(2, 8), "net") == {0: 5}
         records = store.poses("ann", range(N))
         assert sorted(records) == [2, 3, 4, 5, 6, 7]

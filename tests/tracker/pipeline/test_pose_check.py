@@ -12,8 +12,7 @@ from run_with_doubt import DOUBTED, WRONG_FRAME, store_run
 from tracker.body.limbs import limbs
 from tracker.errors import TrackerError
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.pipeline import pose_check
 from tracker.pipeline.pose_check import PoseInRun, checked_pose, compared_pose, frames_around
 from tracker.session.store.stored_poses import read_stored_poses
@@ -40,8 +39,8 @@ def run(tmp_path_factory):
 
     session = store_run(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("check") / "session"))
     poses = read_stored_poses(session.annotations_path, "person", session.people[0].model)
-    with Recording(session.cameras) as recording:
-        yield session, poses, Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
+        yield session, poses, observer
 
 
 def assessed(run, values):

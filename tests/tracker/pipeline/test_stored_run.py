@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from run_poses import MOVED, Estimate
+from stored_motions import put_poses
 
 from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.estimation.chamfer.method import CHAMFER
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.estimate import AlternativePose, BackwardStep, PoseEstimate
-from tracker.formats.model_toml import format_model
 from tracker.pipeline import methods, track_session
 from tracker.pipeline.methods import METHODS, make_tracker
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.pipeline.track_session import EstimatedRows, EstimateStep
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import PoseChange, PoseRecord
+from tracker.session.store.records import PoseChange
 
 STEP_M, MOVED_M = 0.01, 0.1
 N = 6
@@ -72,10 +72,7 @@ def estimate(monkeypatch):
 def put(session, store, frame, x_m=0.0, source="manual", keyframe=True, index=0):
     person = session.people[index]
     values = person.model.neutral() + x_m * (np.arange(len(person.model.neutral())) == 0)
-    revision = store.add_model_revision(person.name, format_model(person.model))
-    store.commit(
-        "put", [PoseChange(person.name, frame, PoseRecord(values, (source,) * len(values), revision, keyframe))]
-    )
+    put_poses(store, person, {frame: values}, source, keyframe=keyframe)
 
 
 def run_of(session, store, frames=range(N), settings=FIRST_PASS, start=None):

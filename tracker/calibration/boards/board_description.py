@@ -11,17 +11,14 @@ import numpy as np
 from msgspec import Meta
 
 from tracker.errors import CalibrationError
-from tracker.formats.camera_section import METRES
 from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.geometry.arrays import Array
-from tracker.geometry.lengths import check_usual
+from tracker.geometry.lengths import METRES_BY_WORD, check_usual
 from tracker.validation import check
 
 KIND = TextKind("board", DOCUMENT_BYTES, CalibrationError)
 DICTIONARIES = tuple(sorted(n for n in dir(cv2.aruco) if n.startswith("DICT_")))
 """Names of the sets of markers that OpenCV knows."""
-_INCH_M = 0.0254
-"""An inch, metres, by definition."""
 _MARKER_SHARE = 0.75
 """Side of a marker as a share of its square where a file does not state it: Caliscope's default."""
 
@@ -95,12 +92,11 @@ class _CaliscopeBoard(msgspec.Struct):
     def board(self) -> Board:
         """Return the board."""
         if self.square_size_override_cm is not None:
-            square_m = 0.01 * self.square_size_override_cm
+            square_m = METRES_BY_WORD["cm"] * self.square_size_override_cm
         else:
             assert self.board_height is not None
             assert self.board_width is not None
-            unit = _INCH_M if self.units == "inch" else METRES[self.units]
-            square_m = unit * min(self.board_height / self.rows, self.board_width / self.columns)
+            square_m = METRES_BY_WORD[self.units] * min(self.board_height / self.rows, self.board_width / self.columns)
         return Board(
             "charuco", self.columns, self.rows, square_m, self.aruco_scale, self.dictionary, self.inverted,
             self.legacy_pattern,
@@ -133,7 +129,7 @@ class _AniposeBoard(msgspec.Struct):
         columns, rows = (n + (self.board_type == "checkerboard") for n in self.board_size)
         side = self.board_square_side_length
         share = self.board_marker_length / side if self.board_marker_length else _MARKER_SHARE
-        return Board(self.board_type, columns, rows, 1e-3 * side, share, self._dictionary)
+        return Board(self.board_type, columns, rows, METRES_BY_WORD["mm"] * side, share, self._dictionary)
 
 
 class _PlainBoard(msgspec.Struct, forbid_unknown_fields=True):
@@ -158,8 +154,8 @@ class _PlainBoard(msgspec.Struct, forbid_unknown_fields=True):
         """Return the board."""
         share = self.marker_mm / self.square_mm if self.marker_mm else _MARKER_SHARE
         return Board(
-            self.kind, self.columns, self.rows, 1e-3 * self.square_mm, share, self.dictionary or "DICT_4X4_50",
-            self.inverted, self.legacy_pattern,
+            self.kind, self.columns, self.rows, METRES_BY_WORD["mm"] * self.square_mm, share,
+            self.dictionary or "DICT_4X4_50", self.inverted, self.legacy_pattern,
         )  # fmt: skip
 
 
@@ -190,8 +186,8 @@ def described_board(data: dict[str, Any], where: str = "board", any_size: bool =
     declared, section = _form_of(data)
     found: Board = check(section, declared, where, CalibrationError).board()
     if not any_size:
-        unit, metres = ("centimetres", 0.01) if declared is _CaliscopeBoard else ("millimetres", 1e-3)
-        side = float(f"{found.square_m / metres:.6g}")
+        unit = "centimetres" if declared is _CaliscopeBoard else "millimetres"
+        side = float(f"{found.square_m / METRES_BY_WORD[unit]:.6g}")
         check_usual(side, "square", f"{where}: expected the side of a square", unit, CalibrationError)
     if found.kind == "checkerboard" and (found.columns + found.rows) % 2 == 0:
         raise CalibrationError(

@@ -91,7 +91,7 @@ def _spanned(links: Mapping[tuple[int, int], Link], names: Sequence[str]) -> lis
     while len(Ts) < len(names):
         open_links = [pair for pair in links if (pair[0] in Ts) != (pair[1] in Ts)]
         if not open_links:
-            raise CalibrationError(_unlinked(set(Ts), links, names))
+            raise CalibrationError(_unlinked(set(Ts), names))
         a, b = max(open_links, key=lambda pair: links[pair].n_corners)
         if a in Ts:
             Ts[b] = Ts[a] @ links[a, b].T_a_b
@@ -100,7 +100,7 @@ def _spanned(links: Mapping[tuple[int, int], Link], names: Sequence[str]) -> lis
     return [Ts[i] for i in range(len(names))]
 
 
-def _unlinked(reached: set[int], links: Mapping[tuple[int, int], Link], names: Sequence[str]) -> str:
+def _unlinked(reached: set[int], names: Sequence[str]) -> str:
     """Return the sentence on cameras that share no board with the others; the smaller group is named first."""
     rest = set(range(len(names))) - reached
     if len(rest) > len(reached):

@@ -112,7 +112,7 @@ def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
     )
     cameras = found.rig.cameras
     if filmed.floor_frame is not None:
-        cameras = _on_floor(found, filmed.floor_frame, filmed.board)
+        cameras = _on_floor(found, filmed.floor_frame)
     return FilmedCalibration(cameras, found, views)
 
 
@@ -154,7 +154,7 @@ def _check_found(board: Board, views: BoardViews, names: Sequence[str]) -> None:
         )
 
 
-def _on_floor(found: BoardCalibration, frame: int, board: Board) -> tuple[Camera, ...]:
+def _on_floor(found: BoardCalibration, frame: int) -> tuple[Camera, ...]:
     """Return the cameras in the world of the board on a frame, with z up: towards the cameras.
 
     Raises:

@@ -1,6 +1,7 @@
 """Silhouettes of a person in footage: from masks of other programs, or from the changes against the still room."""
 
 from collections.abc import Sequence
+from contextlib import closing
 
 import numpy as np
 
@@ -52,16 +53,12 @@ def silhouettes_in_footage(session: Session, cameras: Sequence[Camera], report: 
         RecordingError: footage cannot be read.
     """
     out = []
-    with Recording(session.cameras) as recording:
-        finder = SilhouetteFinder(session.cameras, recording)
-        try:
-            for k in range(session.n_frames):
-                report("finding silhouettes", k / session.n_frames)
-                views = finder.silhouettes(k)
-                found = zip(views, cameras, strict=True)
-                out.append([_measured(v.mask, c, v.camera.size[0] / c.size[0]) for v, c in found])
-        finally:
-            finder.close()
+    with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
+        for k in range(session.n_frames):
+            report("finding silhouettes", k / session.n_frames)
+            views = finder.silhouettes(k)
+            found = zip(views, cameras, strict=True)
+            out.append([_measured(v.mask, c, v.camera.size[0] / c.size[0]) for v, c in found])
     return out
 
 

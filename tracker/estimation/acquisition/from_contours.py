@@ -5,6 +5,7 @@ so that any poses will do and joints are found where the flesh turns about them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal, NamedTuple
@@ -187,11 +188,8 @@ def _fit_to_voxels(
     settings: VoxelSizeSettings, report: Callable[[float], None],
 ) -> VoxelSizes:  # fmt: skip
     """Fit sizes to the voxels of some frames. On each, the person is the first of the people."""
-    finder = SilhouetteFinder(observer.cameras, observer.recording, in_recording=observer.in_recording)
-    try:
+    with closing(SilhouetteFinder(observer.cameras, observer.recording, in_recording=observer.in_recording)) as finder:
         seen = [SilhouettedPerson(k, finder.silhouettes(k), own) for k, own in people.items()]
-    finally:
-        finder.close()
     return fit_sizes_to_voxels(parameters, seen, settings, report)
 
 

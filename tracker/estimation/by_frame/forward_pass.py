@@ -17,7 +17,7 @@ from tracker.estimation.tracking.confidence import Status
 from tracker.estimation.tracking.estimate import AlternativePose, PoseEstimate
 from tracker.estimation.tracking.person_memory import PersonMemory
 from tracker.estimation.tracking.tracker import TrackingRun
-from tracker.estimation.tracking.view_regions import confirmed_regions, regions, regions_ahead, visible_pieces_px
+from tracker.estimation.tracking.view_regions import confirmed_regions, regions, visible_pieces_px
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.occluding_contours import Contour
 from tracker.evidence.images.static_edges import StaticEdgeModel
@@ -92,7 +92,7 @@ class _ForwardPass:
         predicted = _moving(run, self._memories, self._placed(frame, PersonMemory.predict), i)
         where, following = self._regions.around(predicted), run.frames[i + 1 : i + 2]
         for k in following if self._regions.is_ahead else ():
-            self._regions.look_ahead(k, self._placed(k, PersonMemory.predict_two_ahead))
+            self._regions.look_ahead(self._placed(k, PersonMemory.predict_two_ahead))
             self._read_ahead(k)
         seen = self._observe(frame, predicted, where)
         seen, starts = self._settled(seen) if i == 0 else (seen, {})
@@ -132,7 +132,7 @@ class _ForwardPass:
         """Read the first frame. A run that goes on from known poses uses the regions of one without a break."""
         goes_on = len(self._memories) > 1 and all(len(m.history) > 1 for m in self._memories)
         if goes_on:
-            self._regions.look_ahead(frame, self._placed(frame, PersonMemory.predict_before_last))
+            self._regions.look_ahead(self._placed(frame, PersonMemory.predict_before_last))
         self._read_ahead(frame)
 
     def _read_ahead(self, frame: int) -> None:
@@ -189,9 +189,9 @@ class _Regions:
         self.ahead: list[Region | None] = []
         """Regions of the frame that is read ahead."""
 
-    def look_ahead(self, frame: int, predicted: Bodies) -> None:
-        """Choose the regions of a frame that is read ahead."""
-        self.ahead = self._whole or regions_ahead(self._cameras, predicted)
+    def look_ahead(self, predicted: Bodies) -> None:
+        """Choose the regions of a frame that is read ahead, around all bodies as predicted two frames on."""
+        self.ahead = self.new(predicted)
 
     def around(self, bodies: Bodies) -> list[Region | None]:
         """Return the regions that were chosen ahead, where they hold all bodies; else new ones."""
@@ -256,7 +256,7 @@ def _remember(
     """Update the memory of each person with the result of a frame: all people in some poses."""
 
     def remember(p: int) -> None:
-        memories[p].update(bodies[p].values, estimator.colors(p, bodies), statuses[p], keyframe=p in keyframes)
+        memories[p].update(bodies[p].values, estimator.problem.colors(p, bodies), statuses[p], keyframe=p in keyframes)
 
     map_parallel(remember, range(len(memories)))
 

@@ -62,10 +62,6 @@ class FrameEstimator:
         """The fitting problem of the frame."""
         self._memories, self.settings = memories, settings
 
-    def colors(self, person: int, bodies: Bodies) -> Colors:
-        """Return the colours of the frame under a person, with all people in some poses."""
-        return self.problem.colors(person, bodies)
-
     def estimate_fixed(self, person: int) -> PersonEstimate:
         """Return the estimate of a person whose pose is a keyframe; it is not assessed."""
         return estimate_fixed(self.problem, person, self.bodies)

@@ -33,11 +33,6 @@ def regions(cameras: Sequence[Camera], bodies: Sequence[PosedBody], margin_m: fl
     return out
 
 
-def regions_ahead(cameras: Sequence[Camera], bodies: Sequence[PosedBody]) -> list[Region | None]:
-    """Return the regions of a frame that is read ahead, around all bodies as predicted two frames on."""
-    return regions(cameras, bodies)
-
-
 def confirmed_regions(
     ahead: Sequence[Region | None], cameras: Sequence[Camera], bodies: Sequence[PosedBody]
 ) -> list[Region | None]:

@@ -107,7 +107,7 @@ def linearize(
     residual, H, R = np.zeros((n, n_rows)), np.zeros((n, n_rows, n_states)), np.zeros((n, n_rows, n_rows))
     one, xyz = np.arange(n)[:, None], np.arange(3)
     rotations, sizes, columns = state.rotations[parts], state.sizes[parts], 3 * parts[:, None] + xyz
-    doubt = _doubt(state, found, noise)[parts] if noise.independent_m3 is not None else np.ones(n)
+    doubt = _doubt(state, found)[parts] if noise.independent_m3 is not None else np.ones(n)
     residual[:, :3] = (rotations @ found.offsets[parts, :, None])[..., 0]
     residual[:, 3:6] = found.turns[parts]
     H[:, :3] = state.center_jacobian[parts]
@@ -151,7 +151,7 @@ def _closest_order(axes: Array) -> IntArray:
     return np.asarray(_ORDERS[fits.argmax(axis=1)])
 
 
-def _doubt(state: FilterState, found: PartAxes, noise: MeasurementNoise) -> Array:
+def _doubt(state: FilterState, found: PartAxes) -> Array:
     """Return the factor by which the variances of each part grow, (10,), at least 1.
 
     A cloud that is thicker than its part is merged with another one; one with fewer voxels is only a piece of it.

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, field
 
 from tracker.estimation.tracking.estimate import PoseEstimate
@@ -28,13 +29,10 @@ class VoxelTracker:
             return found if run.floor is None else recover_from_shadows(found, run.floor, self.settings.voxel_m)
 
         estimator = VoxelEstimator(run, self.settings)
-        try:
-            with ThreadPoolExecutor(1, "silhouettes ahead") as ahead:
-                following = ahead.submit(silhouettes_of, run.frames[0])
-                for i, frame in enumerate(run.frames):
-                    silhouettes = following.result()
-                    if i + 1 < len(run.frames):
-                        following = ahead.submit(silhouettes_of, run.frames[i + 1])
-                    yield estimator.estimate(frame, silhouettes)
-        finally:
-            finder.close()
+        with closing(finder), ThreadPoolExecutor(1, "silhouettes ahead") as ahead:
+            following = ahead.submit(silhouettes_of, run.frames[0])
+            for i, frame in enumerate(run.frames):
+                silhouettes = following.result()
+                if i + 1 < len(run.frames):
+                    following = ahead.submit(silhouettes_of, run.frames[i + 1])
+                yield estimator.estimate(frame, silhouettes)

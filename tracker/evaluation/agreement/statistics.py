@@ -13,6 +13,10 @@ import numpy as np
 from tracker.geometry.arrays import Array
 
 Interval = tuple[float, float]
+_OUTSIDE = 0.05
+"""Probability beyond 95% limits and confidence intervals."""
+_UPPER = 1 - _OUTSIDE / 2
+"""Probability below the upper one."""
 
 
 class Limits(NamedTuple):
@@ -81,10 +85,10 @@ def limits_of_agreement(differences: Array, dimensions: int = 1, chosen_of: int 
     if n < 2:
         unknown = (np.nan, np.nan)
         return Limits(bias, np.nan, np.nan, unknown, unknown, unknown)
-    z, sd, freedom = float(ndtri(0.975)), float(np.std(differences, ddof=1)), n - dimensions
+    z, sd, freedom = float(ndtri(_UPPER)), float(np.std(differences, ddof=1)), n - dimensions
     t_squared = np.nan
     if freedom > 0:
-        t_squared = dimensions * (n - 1) / freedom * float(fdtri(dimensions, freedom, 1 - 0.05 / chosen_of))
+        t_squared = dimensions * (n - 1) / freedom * float(fdtri(dimensions, freedom, 1 - _OUTSIDE / chosen_of))
     of_bias, of_limit = sd * np.sqrt(t_squared / n), sd * np.sqrt(t_squared * (1 / n + z**2 / (2 * (n - 1))))
     lower, upper = bias - z * sd, bias + z * sd
     return Limits(bias, lower, upper, _around(bias, of_bias), _around(lower, of_limit), _around(upper, of_limit))
@@ -129,7 +133,7 @@ def icc_agreement(of: MeanSquares) -> Icc:
     a, b = k * icc / (n * (1 - icc)), 1 + k * icc * (n - 1) / (n * (1 - icc))
     denominator = (a * columns) ** 2 / (k - 1) + (b * error) ** 2 / ((n - 1) * (k - 1))
     v = (a * columns + b * error) ** 2 / denominator if denominator > 0 else np.nan
-    above, below = fdtri(n - 1, v, 0.975), fdtri(v, n - 1, 0.975)
+    above, below = fdtri(n - 1, v, _UPPER), fdtri(v, n - 1, _UPPER)
     between = k * columns + (k * n - k - n) * error
     lower = n * (rows - above * error) / (above * between + n * rows)
     upper = n * (below * rows - error) / (between + n * below * rows)

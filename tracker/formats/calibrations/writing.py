@@ -20,11 +20,6 @@ def anipose_text(cameras: Sequence[Camera], metadata: Mapping[str, Any] | None =
     return tomli_w.dumps({**data, "metadata": dict(metadata or {"adjusted": True, "error": 0.0})})
 
 
-def pose2sim_text(cameras: Sequence[Camera]) -> str:
-    """Return `Calib.toml` of Pose2Sim: a section for each camera under its own name."""
-    return format_calibration(cameras)
-
-
 def caliscope_text(cameras: Sequence[Camera]) -> str:
     """Return `camera_array.toml` of Caliscope, which numbers its cameras: by the ends of their names if these differ.
 
@@ -64,11 +59,11 @@ def opencv_text(cameras: Sequence[Camera]) -> str:
 
 LAYOUT_TEXTS: Mapping[str, Callable[[Sequence[Camera]], str]] = {
     "anipose": anipose_text,
-    "pose2sim": pose2sim_text,
+    "pose2sim": format_calibration,
     "caliscope": caliscope_text,
     "opencv": opencv_text,
 }
-"""Writers by the names that a user chooses."""
+"""Writers by the names that a user chooses. In `Calib.toml` of Pose2Sim each camera has a section of its name."""
 
 
 def write_layout(path: Path, layout: str, cameras: Sequence[Camera]) -> None:

@@ -61,7 +61,7 @@ def read_table(columns_of: ColumnsOf, path: Path, unit_m: float | None, rate: fl
         frames = np.unique(times, return_inverse=True)[1].astype(np.int64)
     points = scale * values[:, len(limits) :].reshape(len(frames), len(columns.points), 3)
     notes, stated = (*columns.notes, *mask_missing(points)), stated_rate(columns.rate)
-    tables, people = list[MarkerTable](), _people(rows, columns, where)
+    tables, people = list[MarkerTable](), _people(rows, columns)
     for person, series in people.items():
         numbers, first, placed = frames, np.arange(len(frames)), points
         if is_keyed or len(people) > 1:
@@ -102,7 +102,7 @@ def _read_rows(table: Delimited, columns: Columns) -> _Rows:
     return _Rows(rows, [*keys], np.frombuffer(key_of, dtype=np.int64))
 
 
-def _people(rows: _Rows, columns: Columns, where: str) -> Mapping[str, Series]:
+def _people(rows: _Rows, columns: Columns) -> Mapping[str, Series]:
     """Return the points of each person; a name of several groups is named after all but the first.
 
     Raises:

@@ -20,6 +20,7 @@ from tracker.session.store.connection import Connection
 from tracker.session.store.edit_log import EditLog, Written, read_log, write_log
 from tracker.session.store.own_undo import OwnLabels, OwnMove
 from tracker.session.store.records import (
+    ALL_FRAMES,
     Alternative,
     Change,
     Committed,
@@ -144,7 +145,7 @@ class AnnotationStore:
         )
         return tuple(found)
 
-    def frames(self, person: str, within: range = range(1 << 31)) -> list[FrameRow]:
+    def frames(self, person: str, within: range = ALL_FRAMES) -> list[FrameRow]:
         """Summarize the frames of a range in which the person has a pose, ascending; all frames by default."""
         return self._within(rows.FRAME_ROW_COLUMNS, person, within, rows.row_to_frame_row)
 

@@ -6,7 +6,7 @@ stays in the log but is out of reach.
 """
 
 import sqlite3
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from datetime import UTC, datetime
 from typing import Any
 
@@ -41,22 +41,20 @@ class EditTree:
 
     def undo(self) -> str | None:
         """Undo the last edit; returns its label, or None if there is none."""
-        with self._connection.transaction() as db:
-            row = db.execute("SELECT e.id, e.label FROM head h JOIN edits e ON e.id = h.edit").fetchone()
-            if row is None:
-                return None
-            undo_edit(db, row[0])
-            return str(row[1])
+        return self._move("SELECT e.id, e.label FROM head h JOIN edits e ON e.id = h.edit", undo_edit)
 
     def redo(self) -> str | None:
         """Redo the edit that was undone last; returns its label, or None if there is none."""
+        sql = "SELECT id, label FROM edits WHERE parent IS (SELECT edit FROM head) ORDER BY id DESC LIMIT 1"
+        return self._move(sql, redo_edit)
+
+    def _move(self, sql: str, move: Callable[[sqlite3.Connection, int], None]) -> str | None:
+        """Undo or redo the edit whose id and label a query finds, if any; returns its label."""
         with self._connection.transaction() as db:
-            row = db.execute(
-                "SELECT id, label FROM edits WHERE parent IS (SELECT edit FROM head) ORDER BY id DESC LIMIT 1"
-            ).fetchone()
+            row = db.execute(sql).fetchone()
             if row is None:
                 return None
-            redo_edit(db, row[0])
+            move(db, row[0])
             return str(row[1])
 
     def go_to(self, edit: int | None) -> list[int]:

@@ -11,6 +11,8 @@ from tracker.geometry.arrays import Array
 from tracker.validation import Time
 
 RowId: TypeAlias = Annotated[int, Meta(ge=1, description="the number of a row")]
+ALL_FRAMES = range(1 << 31)
+"""More frames than a recording can have."""
 
 SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", "smoothed", "imported")
 """Sources of a value, most manual first. Stored by index: add at the end, never reorder."""

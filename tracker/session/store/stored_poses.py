@@ -7,7 +7,7 @@ from pathlib import Path
 from tracker.body.model import BodyModel, PosedBody
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import SOURCES, PoseRecord
+from tracker.session.store.records import ALL_FRAMES, SOURCES, PoseRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +23,7 @@ class StoredPose:
         return min(self.record.sources, key=SOURCES.index)
 
 
-def read_stored_poses(
-    path: Path, person: str, model: BodyModel, frames: range = range(1 << 31)
-) -> dict[int, StoredPose]:
+def read_stored_poses(path: Path, person: str, model: BodyModel, frames: range = ALL_FRAMES) -> dict[int, StoredPose]:
     """Return the poses of a person by frame, each in the body of its model revision.
 
     The dimensions of a body may have changed since. Poses of the present body share its model.

@@ -25,17 +25,16 @@ def tracked(couple, session, opened):
     lifted = bob.copy()
     lifted[couple.models[BOB].value_names.index("left_shoulder.elevation")] += 0.8
     revisions = couple.state.revisions
-    store = AnnotationStore(session / "annotations.sqlite")
+    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
 
-    def found(person, frame, values, *others):
-        record = PoseRecord(values, ("tracked",) * len(values), revisions[person], status="doubtful", cost_px=2.0)
-        kept = tuple(Alternative(pose, revisions[person], cost_px) for pose, cost_px in others)
-        return PoseChange(("ann", "bob")[person], frame, record, kept)
+        def found(person, frame, values, *others):
+            record = PoseRecord(values, ("tracked",) * len(values), revisions[person], status="doubtful", cost_px=2.0)
+            kept = tuple(Alternative(pose, revisions[person], cost_px) for pose, cost_px in others)
+            return PoseChange(("ann", "bob")[person], frame, record, kept)
 
-    here = [found(ANN, 0, ann, (bob, 2.25)), found(BOB, 0, bob, (lifted, 2.1), (ann, 2.25))]
-    later = [found(ANN, 1, ann), found(BOB, 1, bob, (lifted, 2.1)), found(ANN, 2, ann), found(BOB, 2, bob)]
-    store.commit("track", [*here, *later], by_program=True)
-    store.close()
+        here = [found(ANN, 0, ann, (bob, 2.25)), found(BOB, 0, bob, (lifted, 2.1), (ann, 2.25))]
+        later = [found(ANN, 1, ann), found(BOB, 1, bob, (lifted, 2.1)), found(ANN, 2, ann), found(BOB, 2, bob)]
+        store.commit("track", [*here, *later], by_program=True)
     return opened(), ann, bob, lifted
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gestures import FRONT, PAGE, drag, pixel_of
+from gestures import FRONT, PAGE, drag, grab, pixel_of
 
 from app.drawing import joint_handles
 from app.state.people import HeldPoint
@@ -61,8 +61,7 @@ def test_still_points_and_spines_are_not_held(controller):
 
 
 def test_a_point_out_of_reach_says_by_how_much(controller):
-    start = pixel_of(controller, "left_wrist")
-    controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(start))
+    start = grab(controller, "left_wrist")
     controller.dragging.move(PAGE, tuple(start + np.array([15.0, -15.0])), 1)
     assert joint_handles.out_of_reach(controller.session, controller.state) is None
     controller.dragging.move(PAGE, tuple(start + np.array([200.0, 0.0])), 2)

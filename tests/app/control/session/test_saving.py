@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from gestures import FRONT, PAGE, drag, drag_on, pixel_of, wait_for
+from gestures import FRONT, PAGE, drag, drag_on, grab, pixel_of, wait_for
 
 from app.messages.encoding import state as state_message
 from tracker.body.dimensions import dimensions_of
@@ -70,16 +70,14 @@ def resize(controller):
 
 
 def cancel(controller):
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     controller.dragging.move(PAGE, tuple(start + 40), 1)
     controller.dragging.cancel(PAGE)
 
 
 def back_and_forth(controller):
     """A drag that ends where it began."""
-    start = pixel_of(controller, "torso")
-    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    start = grab(controller, "torso")
     values = controller.state.poses[0]
     controller.dragging.move(PAGE, tuple(start + 40), 1)
     session_state = controller.session_state

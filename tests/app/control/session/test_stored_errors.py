@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gestures import FRONT, PAGE, drag, pixel_of
+from gestures import PAGE, drag, grab
 from page_visits import visiting
 
 from tracker.session.store.records import PoseChange, PoseRecord
@@ -52,8 +52,7 @@ def test_they_are_those_of_the_shown_frame(tracked, opened):
 
 
 def test_a_pose_changed_by_hand_has_none_until_it_is_undone(tracked):
-    start = pixel_of(tracked, "left_wrist")
-    tracked.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(start))
+    start = grab(tracked, "left_wrist")
     tracked.dragging.move(PAGE, tuple(start + 9), 1)
     assert shown_error(tracked) is None
     tracked.dragging.cancel(PAGE)

@@ -63,6 +63,16 @@ def tracked(monkeypatch):
     return runs
 
 
+def assert_sizes_follow_the_history(controller, before_m, factor):
+    """The entry that made the person larger is the only one; undo and redo change the height."""
+    assert controller.session.people[0].model.height_m == pytest.approx(factor * before_m)
+    controller.history.undo()
+    assert controller.session.people[0].model.height_m == pytest.approx(before_m)
+    assert controller.state.undo is None
+    controller.history.redo()
+    assert controller.session.people[0].model.height_m == pytest.approx(factor * before_m)
+
+
 def begun(controller):
     controller.finding.start()
     wait_for(lambda: controller.state.finding.share > 0)
@@ -79,12 +89,7 @@ def test_one_entry_holds_poses_sizes_and_tracks(found, tracked, controller):
     ((frame, people, edit),) = tracked
     assert (frame, people) == (FRAME, (0,))
     assert edit is not None
-    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * before)
-    controller.history.undo()
-    assert controller.session.people[0].model.height_m == pytest.approx(before)
-    assert controller.state.undo is None
-    controller.history.redo()
-    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * before)
+    assert_sizes_follow_the_history(controller, before, 1.05)
 
 
 @pytest.fixture
@@ -111,15 +116,10 @@ def test_acquired_sizes_belong_to_the_same_entry(found, acquired, tracked, contr
     wait_for(lambda: not controller.state.finding.running)
     ((_, _, edit),) = tracked
     assert edit is not None
-    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * 1.1 * before)
     assert controller.state.frame == FRAME
     assert controller.state.people[0].source == "searched"
     assert controller.state.revisions[0] == controller.state.people[0].revision
-    controller.history.undo()
-    assert controller.session.people[0].model.height_m == pytest.approx(before)
-    assert controller.state.undo is None
-    controller.history.redo()
-    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * 1.1 * before)
+    assert_sizes_follow_the_history(controller, before, 1.05 * 1.1)
 
 
 def test_a_pose_that_was_changed_while_sizes_are_acquired_wins(found, acquired, tracked, controller):

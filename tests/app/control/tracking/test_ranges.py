@@ -1,5 +1,7 @@
 """Work on ranges of frames through the controller: what is stored, what stays, and how it is taken back."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 from gestures import drag_on, wait_for
@@ -25,11 +27,8 @@ def cells(controller):
 
 
 def stored(session, frame):
-    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
-    try:
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
         return store.pose("person", frame)
-    finally:
-        store.close()
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import gc
 import threading
 import time
 import weakref
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -41,14 +42,13 @@ def test_a_run_goes_out_from_a_frame_in_both_directions_and_keeps_its_pose(place
     wait_for(lambda: ended)
     assert ended == [True]
     assert tracker.seen == [2, 1, 0, *range(2, last + 1)]
-    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
-    assert tracker.last[3].poses[0][0] == pytest.approx(start + STEP_M)  # the second leg begins at the start, too
-    assert store.pose("person", 2).values[0] == start
-    assert len(store.frames("person")) == last + 1
-    assert {row.frame for row in store.frames("person") if row.source == "manual"} == {2}
-    placed.history.undo()
-    assert [row.frame for row in store.frames("person")] == [2]
-    store.close()
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+        assert tracker.last[3].poses[0][0] == pytest.approx(start + STEP_M)  # the second leg begins at the start, too
+        assert store.pose("person", 2).values[0] == start
+        assert len(store.frames("person")) == last + 1
+        assert {row.frame for row in store.frames("person") if row.source == "manual"} == {2}
+        placed.history.undo()
+        assert [row.frame for row in store.frames("person")] == [2]
 
 
 def test_a_camera_that_seems_off_is_a_notice_at_the_end_of_a_run(placed, tracker, monkeypatch):
@@ -77,18 +77,17 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     assert placed.state.track.message == "done: 7 frames, 1 doubtful, 1 lost"
     assert placed.state.frame == 9
     assert placed.state.undo == "track forward from frame 3"
-    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
-    assert [(row.frame, row.source, row.status) for row in store.frames("person")] == [
-        (2, "manual", ""), (3, "tracked", "good"), (4, "tracked", "doubtful"), (5, "tracked", "good"),
-        (6, "tracked", "good"), (7, "tracked", "lost"), (8, "tracked", "good"), (9, "tracked", "good"),
-    ]  # fmt: skip
-    record = store.pose("person", 4)
-    assert (record.cost_px, record.view_costs_px) == costs
-    assert (record.part_costs_px, record.remark) == (shown.part_costs_px, shown.remark)
-    assert record.settings["method"]
-    assert record.limbs_lost == pytest.approx((0.25, 0.0001), abs=1e-6)
-    assert placed.stored_poses.timeline()[3]["limbs_lost"] == ()  # a good pose
-    store.close()
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+        assert [(row.frame, row.source, row.status) for row in store.frames("person")] == [
+            (2, "manual", ""), (3, "tracked", "good"), (4, "tracked", "doubtful"), (5, "tracked", "good"),
+            (6, "tracked", "good"), (7, "tracked", "lost"), (8, "tracked", "good"), (9, "tracked", "good"),
+        ]  # fmt: skip
+        record = store.pose("person", 4)
+        assert (record.cost_px, record.view_costs_px) == costs
+        assert (record.part_costs_px, record.remark) == (shown.part_costs_px, shown.remark)
+        assert record.settings["method"]
+        assert record.limbs_lost == pytest.approx((0.25, 0.0001), abs=1e-6)
+        assert placed.stored_poses.timeline()[3]["limbs_lost"] == ()  # a good pose
     assert placed.stored_poses.timeline()[4] == {
         "source": "tracked", "cost_px": round(costs[0], 3), "keyframe": False, "status": "doubtful",
         "remark": shown.remark, "reviewed": False, "ambiguous": False, "limbs_lost": (0.25, 0.0),
@@ -168,9 +167,8 @@ def test_pause_and_go_on_are_one_entry(placed, tracker, session):
     placed.tracking.pause()
     assert not placed.state.track.running
     assert placed.state.track.at == 5
-    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
-    assert [row.frame for row in store.frames("person")] == [2, 3, 4, 5]
-    store.close()
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+        assert [row.frame for row in store.frames("person")] == [2, 3, 4, 5]
     placed.navigation.seek(3)
     placed.tracking.resume()
     tracker.go_on(placed, 3)

@@ -18,8 +18,7 @@ from tracker.estimation.tracking.person_memory import PersonMemory
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.assemble import NewSession, assemble
 
@@ -158,8 +157,8 @@ def test_twenty_bad_starts(data_folder, tmp_path, settings):
 
     def tracked(start):
         """The error on each frame after the first, mm, and the status of the last."""
-        with Recording(session.cameras) as recording:
-            observer, keyframes = Observer(session.cameras, recording), {0: {0: start}}
+        with open_observer(session.cameras) as observer:
+            keyframes = {0: {0: start}}
             found = list(track(observer, [model], [start], range(N_FRAMES), settings, keyframes=keyframes))
         joints = joints_of_poses(model, {f.frame: f.poses[0] for f in found}, session.fps)
         errors_mm = [evaluate_joints(joints, reference, range(k, k + 1)).mpjpe_mm for k in range(1, N_FRAMES)]

@@ -15,8 +15,7 @@ from tracker.estimation.tracking.subjects import Subjects
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import Observer, open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
@@ -321,8 +320,7 @@ def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypa
     starts = [start, start + aside][:n_people]
 
     def run():
-        with Recording(session.cameras) as recording:
-            observer = Observer(session.cameras, recording)
+        with open_observer(session.cameras) as observer:
             tracked = track(observer, [model] * n_people, starts, frames, TrackSettings(recover=None))
             return [(*f.poses, f.cost_px) for f in tracked]
 
@@ -352,8 +350,7 @@ def test_a_real_recording(data_folder, tmp_path):
     reference = read_joints(folder / "reference_joints.trc", session.fps)
     places = dict(zip(reference.names, reference.points[0], strict=True))
     start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS})
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         found = list(track(observer, [model], [start.pose], range(3), TrackSettings()))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, range(3))
@@ -372,8 +369,7 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     reference = read_joints(folder / "ground_truth.trc", session.fps)
     places = dict(zip(reference.names, reference.points[0], strict=True))
     start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         found = list(track(observer, [model], [start], frames, TrackSettings(), keyframes={0: {0: start}}))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, frames)

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contour_oracle import MatchOracle, without_ties
+from finite_differences import normal, slopes
 from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid, view_evidence
 
 from tracker.body.model import PosedBody
@@ -25,10 +26,6 @@ BALL = at(solid((0.3, 0.3, 0.3)), 0, 0, 0)
 CENTER = np.array([319.5, 239.5])
 RADIUS_PX = 520 * np.tan(np.arcsin(0.3 / 4.0))
 THETA = 20.0
-
-
-def normal(match, body):
-    return match.linearize(body.model, body.values, body.model.kinematics(body.values))
 
 
 def staged(model, seed=0, off_deg=4.0, off_m=0.02):
@@ -72,9 +69,7 @@ def test_against_rows_built_one_by_one(model, match, seed):
     np.testing.assert_allclose(equations.hessian / np.outer(scale, scale), J.T @ J / np.outer(scale, scale), atol=1e-2)
     np.testing.assert_allclose(equations.gradient / scales(equations), J.T @ residuals / scales(equations), atol=1e-3)
     # The gradient is the derivative of what the frozen matches cost.
-    h = 1e-6
-    sides = [[oracle.cost(model.retract(body.values, s * h * e)) for s in (1, -1)] for e in np.eye(model.n_dofs)]
-    numeric = np.array([(after - before) / (2 * h) for after, before in sides])
+    numeric = slopes(lambda b: oracle.cost(b.values), body)
     np.testing.assert_allclose(equations.gradient / scales(equations), numeric / scales(equations), atol=1e-3)
 
 

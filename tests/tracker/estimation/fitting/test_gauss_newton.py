@@ -3,11 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import ARM, with_center
+from finite_differences import normal, slopes
 from gaussian_prior import GaussianPrior
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from staging import at, posed, shaken, solid
 
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.gauss_newton import (
     PointTargets,
@@ -61,25 +63,17 @@ def test_blocks_against_finite_differences(kind, model, seed):
     """Balls: a prior's derivative is exact at its own pose, and off by half the angle between them, here 1%."""
     rng = np.random.default_rng(seed)
     values = shaken(model, model.neutral(), rng, 0.3, 0.5)
-    block = block_of(kind, model, values, rng)
-    equations = block.linearize(model, values, model.kinematics(values))
-
-    def normal(step):
-        moved = model.retract(values, step)
-        return block.linearize(model, moved, model.kinematics(moved))
-
-    h = 1e-5
-    sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
-    gradient = np.array([a.cost - b.cost for a, b in sides]) / (2 * h)
-    np.testing.assert_allclose(equations.gradient, gradient, atol=(0.02 if model is ARM and kind != "points" else 1e-7))
+    body, block = PosedBody(model, values), block_of(kind, model, values, rng)
+    gradient = slopes(lambda b: normal(block, b).cost, body, 1e-5)
+    atol = 0.02 if model is ARM and kind != "points" else 1e-7
+    np.testing.assert_allclose(normal(block, body).gradient, gradient, atol=atol)
     # Where nothing is left over, Gauss-Newton's second derivative is the second derivative.
     if isinstance(block, PointTargets):
         block = PointTargets(block.points, model.points_world(values)[block.points], block.weights)
     else:
         block = replace(block, pose=values)
-    sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
-    hessian = np.array([a.gradient - b.gradient for a, b in sides]) / (2 * h)
-    np.testing.assert_allclose(block.linearize(model, values, model.kinematics(values)).hessian, hessian, atol=1e-6)
+    hessian = slopes(lambda b: normal(block, b).gradient, body, 1e-5)
+    np.testing.assert_allclose(normal(block, body).hessian, hessian, atol=1e-6)
 
 
 def test_normal_equations_of_rows_by_hand():

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from finite_differences import normal, slopes
 from staging import at, posed, shaken, solid
 
 from tracker.body.model import PosedBody
@@ -7,17 +8,6 @@ from tracker.estimation.fitting.gauss_newton import PosePrior, solve
 from tracker.estimation.fitting.interpenetration import BodyPenetration, SelfPenetration
 
 BALL, ROD = solid((0.1, 0.1, 0.1)), solid((0.05, 0.05, 0.3))
-
-
-def normal(block, body):
-    return block.linearize(body.model, body.values, body.model.kinematics(body.values))
-
-
-def numeric_gradient(block, body, step=1e-6):
-    model = body.model
-    steps = step * np.eye(model.n_dofs)
-    costs = [[normal(block, PosedBody(model, model.retract(body.values, s * d))).cost for s in (-1, 1)] for d in steps]
-    return np.array([(there - here) / (2 * step) for here, there in costs])
 
 
 def embraced(gavrila, seed):
@@ -70,7 +60,7 @@ def test_derivative_between_bodies(gavrila, seed, person):
     """The curvature of the other part's surface is neglected, so derivatives are right up to a small share."""
     bodies = embraced(gavrila, seed)
     block = BodyPenetration(bodies, person, 1.0)
-    found, wanted = normal(block, bodies[person]), numeric_gradient(block, bodies[person])
+    found, wanted = normal(block, bodies[person]), slopes(lambda b: normal(block, b).cost, bodies[person])
     assert found.cost > 1
     assert found.gradient @ wanted > 0.95 * np.linalg.norm(found.gradient) * np.linalg.norm(wanted)
     places = gavrila.dof_is_length

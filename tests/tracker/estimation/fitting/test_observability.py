@@ -13,8 +13,7 @@ from tracker.estimation.fitting.observability import OBSERVABLE_RAD, ContourNois
 from tracker.estimation.fitting.observability_reasons import describe_all
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.tracking.tracker import TrackingRun
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.simulate import Simulation, simulate
@@ -157,8 +156,7 @@ def test_predicted_and_real_errors_of_a_person_that_nothing_was_fitted_to(tmp_pa
     session = simulate(tmp_path / "s", Simulation("exercise", n_frames=36, seed=9, person="broad_man"))
     model = session.people[0].model
     truth = read_pose_table(tmp_path / "s" / "truth.csv").values_for(model)
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         run = TrackingRun(observer, Subjects.of([model]), [truth[0]], range(36), session.fps)
         poses = [e.poses[0] for e in ChamferTracker().estimates(run)]
     found = [observe_pose([PosedBody(model, p)], observer.working_cameras) for p in poses]

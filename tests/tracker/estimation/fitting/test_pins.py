@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import ARM
+from finite_differences import normal, slopes
 from fisheye import with_fisheye
 from staging import camera_at, cameras_around, posed, seen, shaken
 
+from tracker.body.model import PosedBody
 from tracker.estimation.fitting.gauss_newton import PosePrior, solve
 from tracker.estimation.fitting.pins import pin_block
 from tracker.formats.model_toml import load_model
@@ -28,21 +30,12 @@ def test_the_pull_of_pins_against_finite_differences(model, seed):
     values = shaken(model, model.neutral(), rng, 0.4, 0.3)
     names = rng.choice(model.point_names, 3, replace=False)
     block = pin_block(model, CAMERAS, seen(model, values, names, CAMERAS, noise_px=20.0, seed=seed))
-    equations = block.linearize(model, values, model.kinematics(values))
-
-    def normal(step):
-        moved = model.retract(values, step)
-        return block.linearize(model, moved, model.kinematics(moved))
-
-    h = 1e-6
-    sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
-    gradient = np.array([a.cost - b.cost for a, b in sides]) / (2 * h)
-    np.testing.assert_allclose(equations.gradient, gradient, rtol=1e-5, atol=1e-3)
+    body = PosedBody(model, values)
+    gradient = slopes(lambda b: normal(block, b).cost, body)
+    np.testing.assert_allclose(normal(block, body).gradient, gradient, rtol=1e-5, atol=1e-3)
     # Without anything left over, Gauss-Newton's second derivative is the second derivative.
     block = pin_block(model, CAMERAS, seen(model, values, names, CAMERAS))
-    sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
-    hessian = np.array([a.gradient - b.gradient for a, b in sides]) / (2 * h)
-    exact = block.linearize(model, values, model.kinematics(values))
+    hessian, exact = slopes(lambda b: normal(block, b).gradient, body), normal(block, body)
     np.testing.assert_allclose(exact.hessian, hessian, rtol=1e-5, atol=1e-3 * np.abs(hessian).max())
     assert exact.cost == pytest.approx(0, abs=1e-15)
 
@@ -61,14 +54,8 @@ def test_behind_a_camera_pins_stay_finite_and_exact():
     values = GAVRILA.neutral()
     values[0] = 12.0
     block = pin_block(GAVRILA, CAMERAS, [PointObservation("head", i, (300.0, 200.0)) for i in range(4)])
-
-    def cost(step):
-        moved = GAVRILA.retract(values, step)
-        return block.linearize(GAVRILA, moved, GAVRILA.kinematics(moved)).cost
-
-    h = 1e-6 * np.eye(GAVRILA.n_dofs)
-    gradient = np.array([cost(e) - cost(-e) for e in h]) / 2e-6
-    equations = block.linearize(GAVRILA, values, GAVRILA.kinematics(values))
+    body = PosedBody(GAVRILA, values)
+    gradient, equations = slopes(lambda b: normal(block, b).cost, body), normal(block, body)
     assert np.isfinite(equations.cost)
     np.testing.assert_allclose(equations.gradient, gradient, rtol=1e-4, atol=1e-3 * np.abs(gradient).max())
 

@@ -11,8 +11,7 @@ from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.posing.grab import Constraints, limb_points
 from tracker.estimation.posing.pinned_fit import fit_frame
 from tracker.evaluation.references import read_joints
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
+from tracker.evidence.observer import open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import PointObservation
@@ -190,8 +189,7 @@ def test_pins_and_edges_of_real_footage_come_below_45_mm(sample_folder):
     session = load_session(sample_folder)
     joints = read_joints(sample_folder / "truth.trc", session.fps)
     model, cameras = session.people[0].model, [c.camera for c in session.cameras]
-    with Recording(session.cameras) as recording:
-        observer = Observer(session.cameras, recording)
+    with open_observer(session.cameras) as observer:
         views = {k: observer.evidence(k) for k in (8, 25, 40)}
     errors = []
     for k, evidence in views.items():

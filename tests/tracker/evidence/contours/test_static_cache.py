@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from contour_oracle import MatchOracle, without_ties
+from finite_differences import normal
 from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker.body.limbs import limbs
@@ -85,10 +86,6 @@ def staged(gavrila):
     rng = np.random.default_rng(7)
     start = [PosedBody(gavrila, shaken(gavrila, b.values, rng, np.radians(4), 0.02)) for b in bodies]
     return without_ties(views, start, settings, THETA), start, settings
-
-
-def normal(match, body):
-    return match.linearize(body.model, body.values, body.model.kinematics(body.values))
 
 
 def afresh(staged, bodies, person=0):

@@ -12,11 +12,10 @@ import pytest
 from bodies import MODELS, with_center
 from pycocotools.coco import COCO
 from staging import cameras_around
-from stored_motions import FPS, distorted_cameras, store_motion
+from stored_motions import FPS, distorted_cameras, store_motion, store_poses
 
 from tracker.errors import Remedy, SessionError
 from tracker.evidence.contours.label_image import part_labels
-from tracker.formats.model_toml import format_model
 from tracker.formats.trc import read_trc
 from tracker.geometry import rigid
 from tracker.geometry.camera_correction import N_CORRECTIONS
@@ -28,7 +27,7 @@ from tracker.interchange.exports.options import ExportOptions, file_from_world
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.records import MarkChange, PoseChange, PoseRecord
+from tracker.session.store.records import MarkChange, PoseChange
 
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """From a world in which z points up."""
@@ -329,11 +328,8 @@ def test_a_keyframe_is_never_left_out_as_lost(couple):
 def test_poses_of_another_body_are_tabled_but_give_no_skeleton(tmp_path):
     session, _ = store_motion(tmp_path / "s", [MODELS["gavrila34"]], n_frames=2)
     other = MODELS["gavrila22"]
-    store = AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision("ann", format_model(other))
     values = other.neutral()
-    store.commit("Other", [PoseChange("ann", 1, PoseRecord(values, ("manual",) * len(values), revision))])
-    store.close()
+    store_poses(session, {1: values}, replace(session.people[0], model=other))
     motion = read_motion(session, (0,))
     writers.write_person_trc(motion, ExportOptions(), [tmp_path / "a.trc"], no_tick)
     table = read_trc(tmp_path / "a.trc")
@@ -351,11 +347,8 @@ def test_poses_of_another_body_are_tabled_but_give_no_skeleton(tmp_path):
 def test_poses_of_earlier_sizes_are_refitted_for_a_skeleton(tmp_path):
     session, truth = store_motion(tmp_path / "s", [MODELS["gavrila22"]], n_frames=3)
     taller = session.people[0].model.with_height(1.9)
-    store = AnnotationStore(session.annotations_path)
-    revision = store.add_model_revision("ann", format_model(taller))
     values = truth[0][2].values
-    store.commit("Grown", [PoseChange("ann", 2, PoseRecord(values, ("manual",) * len(values), revision))])
-    store.close()
+    store_poses(session, {2: values}, replace(session.people[0], model=taller))
     person = read_motion(load_session(session.folder), (0,)).exported[0]
     assert person.n_refitted == 1
     assert person.model is not person.poses[2].body.model

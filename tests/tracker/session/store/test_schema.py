@@ -73,21 +73,19 @@ def version_5(version_4):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_10_decisions_named_no_pose_and_counted_by_their_time(version_10, read_only):
     before = version_10.read_bytes()
-    store = AnnotationStore(version_10, read_only=read_only)
-    assert [(s.author, s.pose) for s in store.tasks.states()] == [("rita", None)]
-    assert [(t.row.frame, t.state) for t in read_tasks(store)] == [(1, "verified"), (2, "draft")]
-    store.close()
+    with closing(AnnotationStore(version_10, read_only=read_only)) as store:
+        assert [(s.author, s.pose) for s in store.tasks.states()] == [("rita", None)]
+        assert [(t.row.frame, t.state) for t in read_tasks(store)] == [(1, "verified"), (2, "draft")]
     assert (version_10.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_10_takes_poses_of_decisions_and_is_still_checked(version_10):
-    store = AnnotationStore(version_10)
-    first = store.pose("ann", 1)
-    store.commit("Drag", [PoseChange("ann", 1, PoseRecord(first.values + 1, ("manual",) * 2, 1, keyframe=True))])
-    assert [t.state for t in read_tasks(store)] == ["annotated", "draft"]
-    decide(store, ("ann", 1), "verified")
-    assert len(store.tasks.states()[-1].pose) == 32
-    store.close()
+    with closing(AnnotationStore(version_10)) as store:
+        first = store.pose("ann", 1)
+        store.commit("Drag", [PoseChange("ann", 1, PoseRecord(first.values + 1, ("manual",) * 2, 1, keyframe=True))])
+        assert [t.state for t in read_tasks(store)] == ["annotated", "draft"]
+        decide(store, ("ann", 1), "verified")
+        assert len(store.tasks.states()[-1].pose) == 32
     altered(version_10, "UPDATE task_states SET pose = NULL")
     with pytest.raises(DamagedStoreError, match="rows of 'task_states'"):
         AnnotationStore(version_10)
@@ -101,14 +99,13 @@ def uids(path):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_9_edits_had_no_identities_and_nothing_was_planned(version_9, read_only):
     before = version_9.read_bytes()
-    store = AnnotationStore(version_9, read_only=read_only)
-    assert [(e.edit, e.author, e.undone) for e in store.history()] == [
-        (4, "eve", True), (3, "", False), (2, "", False), (1, "eve", False),
-    ]  # fmt: skip
-    assert (store.tasks.tasks(), store.tasks.states(), store.tasks.comments()) == ([], [], [])
-    assert [(m.frame, m.author) for m in store.tasks.keyframe_edits()] == [(1, "eve"), (1, "eve")]
-    assert len({m.uid for m in store.tasks.makers_of_poses()}) == 2
-    store.close()
+    with closing(AnnotationStore(version_9, read_only=read_only)) as store:
+        assert [(e.edit, e.author, e.undone) for e in store.history()] == [
+            (4, "eve", True), (3, "", False), (2, "", False), (1, "eve", False),
+        ]  # fmt: skip
+        assert (store.tasks.tasks(), store.tasks.states(), store.tasks.comments()) == ([], [], [])
+        assert [(m.frame, m.author) for m in store.tasks.keyframe_edits()] == [(1, "eve"), (1, "eve")]
+        assert len({m.uid for m in store.tasks.makers_of_poses()}) == 2
     assert (version_9.read_bytes() == before) == read_only
 
 
@@ -117,9 +114,8 @@ def test_two_copies_of_a_store_of_version_9_agree_about_its_edits(version_9, tmp
     copy.write_bytes(version_9.read_bytes())
     read = AnnotationStore(copy, read_only=True).tasks.keyframe_edits()
     for path in (version_9, copy):
-        store = AnnotationStore(path)
-        store.commit("new", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("manual",) * 2, 1))])
-        store.close()
+        with closing(AnnotationStore(path)) as store:
+            store.commit("new", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("manual",) * 2, 1))])
     mine, theirs = uids(version_9), uids(copy)
     assert mine[:4] == theirs[:4]
     assert read[0].uid == mine[0]
@@ -146,24 +142,22 @@ def test_copies_of_a_store_of_version_9_that_were_edited_apart_before_their_upgr
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_8_searches_were_not_kept_and_nothing_was_assessed_later(version_8, read_only):
     before = version_8.read_bytes()
-    store = AnnotationStore(version_8, read_only=read_only)
-    assert [(r.frame, r.status, r.assessed_since) for r in store.frames("ann")] == [
-        (1, "", False), (2, "lost", False), (3, "doubtful", False),
-    ]  # fmt: skip
-    found = [store.pose("ann", k) for k in (1, 2, 3)]
-    assert [(f.trace, f.author) for f in found] == [(None, "eve")] * 3
-    np.testing.assert_array_equal(found[1].errors, [[[4, 1, 0], [1, 5, 2], [0, 2, 6]]])
-    store.close()
+    with closing(AnnotationStore(version_8, read_only=read_only)) as store:
+        assert [(r.frame, r.status, r.assessed_since) for r in store.frames("ann")] == [
+            (1, "", False), (2, "lost", False), (3, "doubtful", False),
+        ]  # fmt: skip
+        found = [store.pose("ann", k) for k in (1, 2, 3)]
+        assert [(f.trace, f.author) for f in found] == [(None, "eve")] * 3
+        np.testing.assert_array_equal(found[1].errors, [[[4, 1, 0], [1, 5, 2], [0, 2, 6]]])
     assert (version_8.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_8_takes_searches_and_assessments_and_is_still_checked(version_8):
-    store = AnnotationStore(version_8)
-    trace = (Search("limbs", ("left_arm",), 41.0, 12.5, True), Search("samples", (), 12.5, None, False))
-    store.commit("track", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("tracked",) * 2, 1, trace=trace))])
-    keyframe = store.pose("ann", 1)
-    store.commit("audit", [AssessmentChange("ann", 1, keyframe.values, "good", "", (), None)], by_program=True)
-    store.close()
+    with closing(AnnotationStore(version_8)) as store:
+        trace = (Search("limbs", ("left_arm",), 41.0, 12.5, True), Search("samples", (), 12.5, None, False))
+        store.commit("track", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("tracked",) * 2, 1, trace=trace))])
+        keyframe = store.pose("ann", 1)
+        store.commit("audit", [AssessmentChange("ann", 1, keyframe.values, "good", "", (), None)], by_program=True)
     again = AnnotationStore(version_8)
     assert again.pose("ann", 4).trace == trace
     assert again.pose("ann", 1).status == "good"
@@ -172,41 +166,37 @@ def test_a_store_of_version_8_takes_searches_and_assessments_and_is_still_checke
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_7_errors_were_not_known(version_7, read_only):
     before = version_7.read_bytes()
-    store = AnnotationStore(version_7, read_only=read_only)
-    assert [(r.frame, r.status, r.limbs_lost) for r in store.frames("ann")] == [
-        (1, "", ()), (2, "lost", (0.5, 0.01)), (3, "doubtful", (0.5, 0.01)),
-    ]  # fmt: skip
-    assert [store.pose("ann", k).errors for k in (1, 2, 3)] == [None] * 3
-    store.close()
+    with closing(AnnotationStore(version_7, read_only=read_only)) as store:
+        assert [(r.frame, r.status, r.limbs_lost) for r in store.frames("ann")] == [
+            (1, "", ()), (2, "lost", (0.5, 0.01)), (3, "doubtful", (0.5, 0.01)),
+        ]  # fmt: skip
+        assert [store.pose("ann", k).errors for k in (1, 2, 3)] == [None] * 3
     assert (version_7.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_7_takes_errors_and_is_still_checked(version_7):
-    store = AnnotationStore(version_7)
-    errors = np.array([[[4, 1, 0], [1, 5, 2], [0, 2, 6]], np.eye(3)])
-    store.commit("track", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("tracked",) * 2, 1, errors=errors))])
-    store.close()
+    with closing(AnnotationStore(version_7)) as store:
+        errors = np.array([[[4, 1, 0], [1, 5, 2], [0, 2, 6]], np.eye(3)])
+        store.commit("track", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("tracked",) * 2, 1, errors=errors))])
     np.testing.assert_array_equal(AnnotationStore(version_7).pose("ann", 4).errors, errors)
 
 
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_6_limbs_were_not_assessed(version_6, read_only):
     before = version_6.read_bytes()
-    store = AnnotationStore(version_6, read_only=read_only)
-    assert [(r.frame, r.status, r.limbs_lost) for r in store.frames("ann")] == [
-        (1, "", ()), (2, "lost", ()), (3, "lost", ()),
-    ]  # fmt: skip
-    assert store.pose("ann", 2).remark == "left arm uncertain"
-    assert [a.cost_px for a in store.alternatives("ann", 3)] == [2.0]
-    store.close()
+    with closing(AnnotationStore(version_6, read_only=read_only)) as store:
+        assert [(r.frame, r.status, r.limbs_lost) for r in store.frames("ann")] == [
+            (1, "", ()), (2, "lost", ()), (3, "lost", ()),
+        ]  # fmt: skip
+        assert store.pose("ann", 2).remark == "left arm uncertain"
+        assert [a.cost_px for a in store.alternatives("ann", 3)] == [2.0]
     assert (version_6.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_6_takes_limbs_and_is_still_checked(version_6):
-    store = AnnotationStore(version_6)
-    record = PoseRecord(np.zeros(2), ("tracked",) * 2, 1, status="lost", limbs_lost=(0.9, 0.01))
-    store.commit("track", [PoseChange("ann", 4, record)])
-    store.close()
+    with closing(AnnotationStore(version_6)) as store:
+        record = PoseRecord(np.zeros(2), ("tracked",) * 2, 1, status="lost", limbs_lost=(0.9, 0.01))
+        store.commit("track", [PoseChange("ann", 4, record)])
     assert AnnotationStore(version_6).frames("ann")[-1].limbs_lost == (0.9, 0.01)
 
 
@@ -219,21 +209,19 @@ def test_damage_of_a_store_of_version_6_is_found_before_it_is_upgraded(version_6
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_5_there_were_no_checksums(version_5, read_only):
     before = version_5.read_bytes()
-    store = AnnotationStore(version_5, read_only=read_only)
-    assert xs(store) == {1: store.pose("ann", 1).values[0], 2: 2.0, 3: 3.0}
-    assert (store.pose("ann", 2).settings, store.pose("ann", 3).reviewed) == ({"step_deg": 5}, True)
-    assert [a.cost_px for a in store.alternatives("ann", 3)] == [2.0]
-    store.close()
+    with closing(AnnotationStore(version_5, read_only=read_only)) as store:
+        assert xs(store) == {1: store.pose("ann", 1).values[0], 2: 2.0, 3: 3.0}
+        assert (store.pose("ann", 2).settings, store.pose("ann", 3).reviewed) == ({"step_deg": 5}, True)
+        assert [a.cost_px for a in store.alternatives("ann", 3)] == [2.0]
     assert (version_5.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_5_is_backed_up_as_it_was_and_then_checked(version_5):
-    store = AnnotationStore(version_5)
-    (backup,) = backups_of(version_5)
-    with closing(sqlite3.connect(backup)) as db:
-        assert schema.version(db) == 5
-    assert store.undo() == "track"
-    store.close()
+    with closing(AnnotationStore(version_5)) as store:
+        (backup,) = backups_of(version_5)
+        with closing(sqlite3.connect(backup)) as db:
+            assert schema.version(db) == 5
+        assert store.undo() == "track"
     with closing(sqlite3.connect(version_5)) as db:
         columns = "SELECT name FROM pragma_table_info('pose_changes')"
         names = [n for (n,) in db.execute(f"SELECT name FROM sqlite_master UNION {columns}")]
@@ -248,18 +236,16 @@ def test_a_store_of_version_5_is_backed_up_as_it_was_and_then_checked(version_5)
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_4_there_were_no_alternatives(version_4, read_only):
     before = version_4.read_bytes()
-    store = AnnotationStore(version_4, read_only=read_only)
-    assert [(r.frame, r.reviewed) for r in store.frames("ann")] == [(1, True), (2, False), (3, True)]
-    assert store.alternatives("ann", 3) == ()
-    store.close()
+    with closing(AnnotationStore(version_4, read_only=read_only)) as store:
+        assert [(r.frame, r.reviewed) for r in store.frames("ann")] == [(1, True), (2, False), (3, True)]
+        assert store.alternatives("ann", 3) == ()
     assert (version_4.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_4_takes_alternatives(version_4):
-    store = AnnotationStore(version_4)
-    here = store.pose("ann", 3)
-    store.commit("track", [PoseChange("ann", 3, here, (Alternative(here.values + 1, here.model_revision, 2.0),))])
-    store.close()
+    with closing(AnnotationStore(version_4)) as store:
+        here = store.pose("ann", 3)
+        store.commit("track", [PoseChange("ann", 3, here, (Alternative(here.values + 1, here.model_revision, 2.0),))])
     (found,) = AnnotationStore(version_4).alternatives("ann", 3)
     np.testing.assert_array_equal(found.values, here.values + 1)
 
@@ -267,24 +253,22 @@ def test_a_store_of_version_4_takes_alternatives(version_4):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_3_nobody_had_reviewed_but_keyframes(version_3, read_only):
     before = version_3.read_bytes()
-    store = AnnotationStore(version_3, read_only=read_only)
-    assert [(r.frame, r.keyframe, r.reviewed) for r in store.frames("ann")] == [
-        (1, True, True), (2, False, False), (3, False, False),
-    ]  # fmt: skip
-    pose = store.pose("ann", 3)
-    assert (pose.reviewed, pose.remark, pose.view_costs_px) == (False, "late", (1.0, None))
-    assert pose.settings == {"step_deg": 5}
-    store.close()
+    with closing(AnnotationStore(version_3, read_only=read_only)) as store:
+        assert [(r.frame, r.keyframe, r.reviewed) for r in store.frames("ann")] == [
+            (1, True, True), (2, False, False), (3, False, False),
+        ]  # fmt: skip
+        pose = store.pose("ann", 3)
+        assert (pose.reviewed, pose.remark, pose.view_costs_px) == (False, "late", (1.0, None))
+        assert pose.settings == {"step_deg": 5}
     assert (version_3.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_3_takes_marks_and_gives_them_back(version_3):
-    store = AnnotationStore(version_3)
-    store.commit("review", [MarkChange("ann", 3, keyframe=False, reviewed=True)])
-    assert [r.reviewed for r in store.frames("ann")] == [True, False, True]
-    assert (store.undo(), store.undo(), store.redo()) == ("review", "track", "track")
-    assert [r.reviewed for r in store.frames("ann")] == [True, False, False]
-    store.close()
+    with closing(AnnotationStore(version_3)) as store:
+        store.commit("review", [MarkChange("ann", 3, keyframe=False, reviewed=True)])
+        assert [r.reviewed for r in store.frames("ann")] == [True, False, True]
+        assert (store.undo(), store.undo(), store.redo()) == ("review", "track", "track")
+        assert [r.reviewed for r in store.frames("ann")] == [True, False, False]
     assert AnnotationStore(version_3).redo() == "review"
 
 
@@ -322,21 +306,19 @@ def test_older_version_keeps_everything(version_1):
 
 def test_older_version_that_is_only_read_stays_as_it_is(version_1):
     before = version_1.read_bytes()
-    store = AnnotationStore(version_1, read_only=True)
-    assert store.pose("ann", 2).remark == ""
-    assert [row.view_costs_px for row in store.frames("ann")] == [(), (), ()]
-    assert [row.frame for row in store.frame_poses("ann", range(9))] == [1, 2, 3]
-    assert [h.label for h in store.history()] == ["clear", "track", "drag", "place"]
-    store.close()
+    with closing(AnnotationStore(version_1, read_only=True)) as store:
+        assert store.pose("ann", 2).remark == ""
+        assert [row.view_costs_px for row in store.frames("ann")] == [(), (), ()]
+        assert [row.frame for row in store.frame_poses("ann", range(9))] == [1, 2, 3]
+        assert [h.label for h in store.history()] == ["clear", "track", "drag", "place"]
     assert version_1.read_bytes() == before
 
 
 @pytest.mark.parametrize("read_only", [False, True])
 def test_settings_that_version_2_kept_with_each_pose(version_2, read_only):
     before = version_2.read_bytes()
-    store = AnnotationStore(version_2, read_only=read_only)
-    assert (store.pose("ann", 1).settings, store.pose("ann", 1).values[0]) == ({"step_deg": 7}, 0.3)
-    store.close()
+    with closing(AnnotationStore(version_2, read_only=read_only)) as store:
+        assert (store.pose("ann", 1).settings, store.pose("ann", 1).values[0]) == ({"step_deg": 7}, 0.3)
     assert (version_2.read_bytes() == before) == read_only
 
 

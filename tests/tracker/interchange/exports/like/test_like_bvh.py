@@ -62,10 +62,16 @@ def sent(session, tmp_path, poses, by_hand=lambda name: True):
     return export_like(session, load_observations(session, "mocap"), tmp_path / "b.bvh", learn_offsets=False)
 
 
-def test_a_mended_frame_alone_is_replaced(session, tmp_path):
+@pytest.fixture
+def poses(session, tmp_path):
+    """The poses of the file as it came."""
+    poses = moved(session.people[0].model, 0.2, 1)
+    write(tmp_path / "a.bvh", session.people[0].model, poses)
+    return poses
+
+
+def test_a_mended_frame_alone_is_replaced(session, poses, tmp_path):
     model = session.people[0].model
-    poses = moved(model, 0.2, 1)
-    write(tmp_path / "a.bvh", model, poses)
     poses[EDITED] = moved(model, 0.2, 2)[EDITED]
     done = sent(session, tmp_path, poses)
     assert (done.frames, len(done.changed)) == ((EDITED,), 1)
@@ -78,10 +84,8 @@ def test_a_mended_frame_alone_is_replaced(session, tmp_path):
     assert done.farthest_m < 1e-4
 
 
-def test_only_values_of_an_edited_arm_change(session, tmp_path):
+def test_only_values_of_an_edited_arm_change(session, poses, tmp_path):
     model = session.people[0].model
-    poses = moved(model, 0.2, 1)
-    write(tmp_path / "a.bvh", model, poses)
     poses[EDITED] = poses[EDITED].copy()
     arm = [i for i, name in enumerate(model.value_names) if name.startswith("left_shoulder")]
     poses[EDITED][arm] += 0.3
@@ -97,10 +101,7 @@ def test_only_values_of_an_edited_arm_change(session, tmp_path):
     assert done.farthest_m < 1e-4
 
 
-def test_nothing_was_mended(session, tmp_path):
-    model = session.people[0].model
-    poses = moved(model, 0.2, 1)
-    write(tmp_path / "a.bvh", model, poses)
+def test_nothing_was_mended(session, poses, tmp_path):
     done = sent(session, tmp_path, poses, lambda name: False)
     assert not done.changed
     assert (tmp_path / "a.bvh").read_bytes() == (tmp_path / "b.bvh").read_bytes()
