@@ -11,9 +11,9 @@ from code_counts import code_lines, git, numbers, private_names, unexplained_ris
 MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 991, 224, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
-MAX_CODE_LINES = {"tracker": 49276, "app": 21081, "js": 14586, "css": 4189, "tests": 65980}
+MAX_CODE_LINES = {"tracker": 49889, "app": 21115, "js": 14567, "css": 4189, "tests": 66519}
 """Lines without blanks, comments and docstrings. Clocks, curves, the bar of a chain and calibration in the page raised
-them by what was not won back elsewhere."""
+them by what was not won back elsewhere; meshes, blurred faces and markers did, too, and one module of systems."""
 MAX_HIDDEN_SUBJECTS = 25
 MAX_PRIVATE = 207
 """Uses of private names in tests: a test goes through the public surface where that shows the same."""

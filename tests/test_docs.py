@@ -66,10 +66,10 @@ def test_files_that_are_named_exist(page):
 
 
 def test_the_site_has_each_document_once():
-    """mkdocs.yml lists the documents; docs/site/hooks.py brings in those outside of docs."""
+    """mkdocs.yml lists the documents; docs/site/build.py brings in those outside of docs."""
     listed = re.findall(r"(\S+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
     outside = dict(
-        re.findall(r'^    "(\S+\.md)": "(\S+\.md)"', (ROOT / "docs/site/hooks.py").read_text("utf-8"), re.MULTILINE)
+        re.findall(r'^    "(\S+\.md)": "(\S+\.md)"', (ROOT / "docs/site/build.py").read_text("utf-8"), re.MULTILINE)
     )
     places = [outside.get(place_of(page), place_of(page).removeprefix("docs/")) for page in PAGES]
     assert sorted(listed) == sorted(places)

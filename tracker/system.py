@@ -42,6 +42,7 @@ _M_ARENA_MAX = -8
 _PR_SET_THP_DISABLE = 41
 """Option of `prctl` (linux/prctl.h), since Linux 3.15."""
 _BINARY = getattr(os, "O_BINARY", 0)
+"""Windows changes line ends otherwise."""
 READ_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _BINARY
 """To open a file for its bytes, without waiting for a writer."""
 NEW_FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY

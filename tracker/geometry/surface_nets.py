@@ -6,7 +6,9 @@ from numpy.typing import NDArray
 from tracker.geometry.arrays import Array, IntArray
 
 _CORNERS = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+"""Corners of a cell, in cells."""
 _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1]
+"""Its edges, as pairs of corners."""
 
 
 def surface_nets(field: NDArray[np.float32], origin: Array, spacing: float) -> tuple[Array, IntArray]:

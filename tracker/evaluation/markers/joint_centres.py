@@ -5,8 +5,9 @@ y up, z to the right. Knees, ankles, elbows and wrists are midpoints of the two 
 and the thickness of the skin are not subtracted.
 """
 
-from collections.abc import Mapping
-from typing import NamedTuple
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -25,20 +26,10 @@ _SHOULDER_SHARE = 0.104
 p. 1231)."""
 
 
-class _HipRegression(NamedTuple):
-    """The place of the right hip in the frame of the pelvis: multiples of its sizes, and a constant."""
-
-    of_depth: tuple[float, float, float]
-    of_width: tuple[float, float, float]
-    constant_m: tuple[float, float, float]
-
-
-_HIPS: Mapping[HipRegression, _HipRegression] = {
-    # Harrington et al. 2007, J. Biomech. 40, p. 595: by the depth and the width of the pelvis.
-    "harrington": _HipRegression((-0.24, 0.0, 0.0), (0.0, -0.30, 0.33), (-0.0099, -0.0109, 0.0073)),
-    # Bell, Pedersen & Brand 1990, J. Biomech. 23, p. 617: by the width of the pelvis.
-    "bell": _HipRegression((0.0, 0.0, 0.0), (-0.19, -0.30, 0.36), (0.0, 0.0, 0.0)),
-}
+_HIPS: Mapping[str, Mapping[str, Sequence[float]]] = tomllib.loads(
+    Path(__file__).with_name("hips.toml").read_text("utf-8")
+)
+"""Regressions of hips."""
 
 
 def joint_centres(landmarks: Mapping[str, Array], hips: HipRegression) -> dict[str, Array]:
@@ -60,7 +51,7 @@ def joint_centres(landmarks: Mapping[str, Array], hips: HipRegression) -> dict[s
     return found
 
 
-def _hips(landmarks: Mapping[str, Array], by: _HipRegression) -> dict[str, Array]:
+def _hips(landmarks: Mapping[str, Array], by: Mapping[str, Sequence[float]]) -> dict[str, Array]:
     left, right = landmarks.get("left_asis"), landmarks.get("right_asis")
     behind = [landmarks[name] for name in ("left_psis", "right_psis") if name in landmarks]
     back = sum(behind) / 2 if len(behind) == 2 else landmarks.get("sacrum")
@@ -74,7 +65,7 @@ def _hips(landmarks: Mapping[str, Array], by: _HipRegression) -> dict[str, Array
     x = forward - np.sum(forward * z, axis=1)[:, None] * z
     x /= np.linalg.norm(x, axis=1)[:, None]
     y = np.cross(z, x)
-    sizes = np.multiply.outer(depth_m, by.of_depth) + np.multiply.outer(width_m, by.of_width) + by.constant_m
+    sizes = np.multiply.outer(depth_m, by["of_depth"]) + np.multiply.outer(width_m, by["of_width"]) + by["constant_m"]
     axes = np.stack([x, y, z], axis=1)  # (n, axis, 3)
     return {
         f"{side}_hip": origin + np.einsum("ni,nij->nj", sizes * (1.0, 1.0, sign), axes)

@@ -1,4 +1,4 @@
-"""Marker sets: under which names a file has the landmarks of the body. Those of the field lie in `sets`.
+"""Marker sets: under which names a file has the landmarks of the body. Sets of the field lie in `sets`.
 
 Own ones are TOML files:
 

@@ -19,6 +19,7 @@ from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.voxels.shadows import recover_from_shadows
 from tracker.evidence.voxels.visual_hull import carve_people
 from tracker.evidence.voxels.voxel_grid import VOXEL_M
+from tracker.footage.animation_writer import MAX_WIDTH_PX
 from tracker.footage.recording import Recording
 from tracker.formats.file_names import identifiers
 from tracker.geometry import rigid
@@ -33,8 +34,6 @@ from tracker.interchange.exports.options import ExportOptions, file_from_world
 
 _DEPTH_M = 0.5
 """Distance of the picture from its camera in a scene, metres: less than that of anybody whom a camera films whole."""
-_PICTURE_PX = 1280
-"""Width of a picture in a scene, px, at most."""
 
 
 def write_bodies(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
@@ -138,7 +137,7 @@ def _corners(camera: Camera) -> Array:
 
 def _picture_surface(corners: Array, picture: Image) -> trimesh.Trimesh:
     """Return a rectangle that shows a picture on both sides; its corners from the upper left one, clockwise."""
-    share = min(1.0, _PICTURE_PX / picture.shape[1])
+    share = min(1.0, 2 * MAX_WIDTH_PX / picture.shape[1])  # sharp over half of a screen
     if share < 1:
         size = (round(share * picture.shape[1]), round(share * picture.shape[0]))
         picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
