@@ -1,4 +1,4 @@
-"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels [--background]`.
+"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels [--background] [--times]`.
 
 Numba compiles a kernel on its first call and holds the interpreter lock meanwhile. The first tracking run after an
 installation would wait for a minute, and the page with it. This program calls all kernels; other programs then load
@@ -8,7 +8,7 @@ them from the cache. The kernels that a new user meets first come first (`kernel
 import gc
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -46,12 +46,19 @@ _GC_THRESHOLDS = 50_000, 20, 50
 """Thresholds of the garbage collector: numba makes so many objects that the usual ones cost a sixth of the time."""
 
 
-def main(background: bool = False) -> None:
+def main(background: bool = False, times: bool = False) -> None:
     """Compile the missing kernels. While another program compiles them, wait for it.
 
     Args:
         background: work beside a page: at the lowest priority after what its first cost needs, and on two cores.
+        times: print the processor time and the time by the clock at which each stage is compiled, s.
     """
+    began = time.perf_counter()
+
+    def reached(stage: str) -> None:
+        if times:
+            print(stage, time.process_time(), time.perf_counter() - began, flush=True)
+
     gc.set_threshold(*_GC_THRESHOLDS)
     mark = compiled_mark()
     if mark.exists():
@@ -60,13 +67,14 @@ def main(background: bool = False) -> None:
         try:
             with SessionLock(mark.parent):
                 if not mark.exists():  # another process may have compiled them meanwhile
-                    _call_kernels(background)
+                    _call_kernels(background, reached)
                     record_compiled()
+                    reached("all")
         except SessionError:
             time.sleep(_WAIT_S)
 
 
-def _call_kernels(background: bool) -> None:
+def _call_kernels(background: bool, reached: Callable[[str], None]) -> None:
     """Call the kernels stage by stage on the bundled tango: two people in four views.
 
     In the background, a second process compiles the kernels of the evidence, at the priority of the page: its first
@@ -92,6 +100,7 @@ def _call_kernels(background: bool) -> None:
     with open_observer(session.cameras) as observer:
         ChamferCost(observer.evidence(_FRAME), bodies).at_prediction()
     record_stage("cost")
+    reached("cost")
     _call_tracking(session)
     record_stage("tracking")
     _call_others(session)
@@ -214,4 +223,4 @@ def _estimate(
 
 
 if __name__ == "__main__":
-    main("--background" in sys.argv[1:])
+    main("--background" in sys.argv[1:], "--times" in sys.argv[1:])

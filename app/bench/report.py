@@ -20,7 +20,7 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from app.bench import acquisition_rows, calibration_rows, contour_rows, diagnosis_rows, run_rows, voxel_rows
+from app.bench import acquisition_rows, calibration_rows, contour_rows, diagnosis_rows, run_rows, start_rows, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import FRAME, read_crowd, read_frame
@@ -33,7 +33,7 @@ from tracker.simulate import Simulation, simulate
 from tracker.validation import Number, check
 
 BASELINE = Path(__file__).with_name("baseline.json")
-N_ROWS = 32
+N_ROWS = 34
 """Number of rows that `measure` yields if `cma` is installed."""
 _KIND = TextKind("baseline", 1_000_000, TrackerError, "make one with --save")
 _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
@@ -72,6 +72,7 @@ def measure() -> Iterator[Row]:
     yield bench_rows.pipeline_of_two(read_crowd(sample_copy("tango"), FRAME), yardstick)
     yield from acquisition_rows.acquisitions(frame, yardstick)
     yield run_rows.whole_run(frame.with_model(DEFAULT_MODEL), yardstick)
+    yield from start_rows.first_start(yardstick)
 
 
 @contextmanager

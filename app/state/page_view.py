@@ -11,8 +11,8 @@ PictureLayer = Literal["image", "silhouette", "distance", "parts"]
 PICTURES: tuple[PictureLayer, ...] = get_args(PictureLayer)
 """Layers that are sent as pictures."""
 Layer = Literal[
-    "image", "silhouette", "distance", "parts", "accepted", "rejected", "contours", "hidden", "part_edges", "skeleton",
-    "joints", "observability", "errors", "imported", "alternatives", "epipolar", "axes",
+    "image", "silhouette", "distance", "parts", "faces", "accepted", "rejected", "contours", "hidden", "part_edges",
+    "skeleton", "joints", "observability", "errors", "imported", "alternatives", "epipolar", "axes",
 ]  # fmt: skip
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 """Every layer: pictures, then those that are sent as line segments and joints."""

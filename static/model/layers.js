@@ -22,6 +22,10 @@ import { stored } from "../widgets/stored.js";
 export const LAYERS = [
   { id: "image", group: "Picture", label: "Image", title: "Undistorted camera image", shown: true, opacity: 1 },
   {
+    id: "faces", group: "Picture", label: "Blurred faces", shown: false, opacity: 1,
+    title: "Heads of all people who are placed, reduced to a few grains in this page; exports have a choice of their own",
+  },
+  {
     id: "distance", group: "Evidence", label: "Distance", shown: false, opacity: 0.7,
     title: "Distance to the nearest edge: bright at edges, dark beyond the outlier distance",
   },

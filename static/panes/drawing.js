@@ -29,6 +29,8 @@ const RIGHT_DASH = [9, 4];
 const BEHIND_DASH = [2, 2.5];
 /** Opacity of dimmed people. */
 const DIMMED = 0.3;
+/** Across a blurred head, as in exports (tracker/interchange/exports/faces.py). */
+const GRAINS = 4;
 
 /**
  * Line style and layer of each kind of path. A layer of null is always drawn.
@@ -114,6 +116,31 @@ export function drawPicture(context, view, picture, opacity) {
   context.globalAlpha = opacity;
   context.drawImage(picture, x, y, width, height);
   context.globalAlpha = 1;
+}
+
+/**
+ * Reduce circles of a picture to a few grains; without circles, the whole picture.
+ *
+ * @param {CanvasRenderingContext2D} context of a canvas over the picture
+ * @param {HTMLCanvasElement} picture
+ * @param {{x: number, y: number, radius: number}[] | null} circles
+ */
+export function drawGrains(context, picture, circles) {
+  const { width, height } = context.canvas.getBoundingClientRect();
+  const ratio = picture.width / width;
+  const grains = new OffscreenCanvas(GRAINS, GRAINS);
+  const coarse = /** @type {OffscreenCanvasRenderingContext2D} */ (grains.getContext("2d"));
+  coarse.imageSmoothingQuality = "high";
+  for (const { x, y, radius } of circles ?? [{ x: width / 2, y: height / 2, radius: Math.hypot(width, height) / 2 }]) {
+    const [left, top, side] = [x - radius, y - radius, 2 * radius];
+    coarse.drawImage(picture, left * ratio, top * ratio, side * ratio, side * ratio, 0, 0, GRAINS, GRAINS);
+    context.save();
+    context.beginPath();
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.clip();
+    context.drawImage(grains, left, top, side, side);
+    context.restore();
+  }
 }
 
 /**

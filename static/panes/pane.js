@@ -20,6 +20,8 @@ import { drawsInSoftware } from "../widgets/webgl.js";
 
 // Software rendering composites one opaque canvas faster than two.
 const IN_SOFTWARE = drawsInSoftware();
+/** Of the distance from the neck to the middle of the head, which is about its radius; half of one is left for hair and error. */
+const HEAD_REACH = 1.4;
 const WHEEL_ZOOM = 0.0015;
 const PINCH_ZOOM = 0.01;
 const LINE_PX = 16;
@@ -161,6 +163,15 @@ export class Pane {
     return decluttered(placed, session?.people ?? [], dragging ? hover : null);
   }
 
+  /** Circles around the heads of all people, from the neck to as far beyond the head. */
+  #heads() {
+    const handles = this.#placedHandles();
+    return handles.flatMap(({ handle, x, y }) => {
+      const neck = handle.point === "head" && handles.find((h) => h.handle.person === handle.person && h.handle.point === "neck");
+      return neck ? [{ x, y, radius: HEAD_REACH * Math.hypot(x - neck.x, y - neck.y) }] : [];
+    });
+  }
+
   /** All joints of this view, with their positions in the pane. */
   #placedHandles() {
     const handles = this.#store.facts.overlay?.handles ?? [];
@@ -208,6 +219,7 @@ export class Pane {
     if (withPictures) this.#drawPictures();
     const context = drawing.prepare(this.#overlay, width, height, true);
     if (IN_SOFTWARE) context.drawImage(this.#image, 0, 0, width, height);
+    if (layers.shown.faces) drawing.drawGrains(context, this.#image, placeholder?.pictures ? null : this.#heads());
     this.#corner.showPlaceholder(placeholder);
     if (!state || !session || !overlay || placeholder?.pictures) return;
     this.#showJoint(state);

@@ -101,7 +101,7 @@ async def server(blank_viser, tmp_path_factory):
 def keys_file(server):
     """The user's keys, which the page reads when it is loaded; there are none."""
     path = server.state_folder / KEYS_FILE
-    yield ViserPlace(path, 0, "")
+    yield path
     path.unlink(missing_ok=True)
 
 
