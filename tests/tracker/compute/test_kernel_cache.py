@@ -75,7 +75,7 @@ class Clone:
         copied.mkdir(parents=True)
         for path in (SOURCE / "compute").glob("*.py"):
             shutil.copy(path, copied)
-        for name in ("__init__", "files", "errors"):
+        for name in ("__init__", "files", "errors", "system"):
             shutil.copy(SOURCE / f"{name}.py", folder / "tracker")
         self.near = folder / "tracker" / "near"
         self.near.mkdir()

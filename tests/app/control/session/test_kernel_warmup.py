@@ -4,7 +4,6 @@ import os
 import signal
 import sys
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -159,17 +158,15 @@ def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monk
     class Beside:
         exitcode = 0
 
-        def __init__(self, target, args, daemon):
-            self._work = lambda: target(*args)
-
-        def start(self):
-            beside.append("started")
-            self._work()
-
         def join(self):
             beside.append("joined")
 
-    monkeypatch.setattr(compile_kernels.multiprocessing, "get_context", lambda kind: SimpleNamespace(Process=Beside))
+    def start_beside(work, *arguments):
+        beside.append("started")
+        work(*arguments)
+        return Beside()
+
+    monkeypatch.setattr(compile_kernels, "start_beside", start_beside)
     monkeypatch.setattr(compile_kernels, "record_stage", lambda stage: stages.append(stage) or record_stage(stage))
     monkeypatch.setattr(
         compile_kernels, "_track", lambda cameras, settings, models, start: tracked.append((cameras, settings, models))
