@@ -14,6 +14,7 @@ import socket
 import stat
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -29,6 +30,8 @@ FORKS = _IS_LINUX
 HAS_UNIX_SOCKETS = not IS_PORTABLE and hasattr(socket, "AF_UNIX")
 MAX_SOCKET_PATH_BYTES = 100
 """Longest path of a Unix socket that all systems take: their limits are 104 to 108 bytes."""
+KEEPS_OPEN_FILES = sys.platform == "win32"
+"""Whether a file cannot be removed while it is open."""
 HAS_BROWSER = sys.platform in ("darwin", "win32")
 """Whether the system has a browser of its own."""
 ENDING_SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name))
@@ -41,6 +44,10 @@ _M_ARENA_MAX = -8
 """Option of `mallopt` (malloc.h): largest number of heaps."""
 _PR_SET_THP_DISABLE = 41
 """Option of `prctl` (linux/prctl.h), since Linux 3.15."""
+_NICENESS = 10
+"""Priority of threads whose results can wait, as of `nice`."""
+_END_S = 10.0
+"""Time for a program to end once it is asked to, s."""
 _BINARY = getattr(os, "O_BINARY", 0)
 """Windows changes line ends otherwise."""
 READ_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _BINARY
@@ -98,12 +105,11 @@ def is_running(process: int, started: str) -> bool:
         process: its number.
         started: when it began, by `start_of`; empty if unknown.
     """
-    with suppress(psutil.AccessDenied):
-        try:
-            if psutil.Process(process).status() in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
-                return False  # it ended, and nobody has asked for its status yet
-        except psutil.NoSuchProcess:
-            return False
+    if not psutil.pid_exists(process):
+        return False
+    with suppress(psutil.Error):  # some systems tell nothing of processes of other accounts
+        if psutil.Process(process).status() in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
+            return False  # it ended, and nobody has asked for its status yet
     now = start_of(process)
     return not started or not now or now == started
 
@@ -161,7 +167,10 @@ def end_apart(process: "subprocess.Popen[bytes]") -> None:
         for each in whole:
             with suppress(psutil.Error):
                 each.terminate()
-        psutil.wait_procs(whole[:-1])
+        _, left = psutil.wait_procs(whole[:-1], _END_S)
+        for each in left:
+            with suppress(psutil.Error):
+                each.kill()
     process.wait()
 
 
@@ -179,6 +188,12 @@ def give_way() -> None:
         psutil.Process().nice(psutil.IDLE_PRIORITY_CLASS)
     else:
         os.nice(19)
+
+
+def give_way_in_thread() -> None:
+    """Lower the priority of this thread alone, where the system has that."""
+    if _IS_LINUX:
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
 
 
 # Sockets.

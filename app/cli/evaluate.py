@@ -47,6 +47,8 @@ class EvaluateArguments:
     them, and laid over the poses by the motion, in time and in space."""
     report: OptionalPath = None
     """with --marker-set: HTML file to write, with Bland-Altman plots of joints and angles."""
+    overwrite: bool = False
+    """replace the file of --report."""
     align: Literal["none", "rigid-all"] = "none"
     """rigid-all moves the whole reference onto the estimate first."""
     json: bool = False
@@ -89,14 +91,17 @@ def _against_markers(at: Target, arguments: EvaluateArguments, marker_set: str) 
             "expected --marker-set without --joint-map, --axes, --first-frame, --clock and --align: clock and axes are "
             "found by the motion; leave them out"
         )
+    path = arguments.report
+    if path is not None and path.exists() and not arguments.overwrite:
+        raise TrackerError(f"expected --report at a path that is free, found {path}; say --overwrite to replace it")
     session, (index,) = at
     estimate = stored_motion(session, index).joints
     read = read_marker_reference(arguments.reference, marker_set, estimate)
     found = evaluate(at, read.reference, arguments.frames, "none", stride=arguments.stride)
     frames = [error.frame for error in found["per_frame"]]
     copies, agreement = compare_with_markers(estimate, read.reference.joints, found["person"], frames)
-    if arguments.report is not None:
-        write_report(copies, agreement, None, arguments.report)
+    if path is not None:
+        write_report(copies, agreement, None, path)
     if arguments.json:
         more = {"lag_s": read.lag_s, "T_world_markers": read.T_world_markers.tolist()}
         return format_json(found | more | {"agreement": agreement_record(copies, agreement, {}, "all", None)})
@@ -104,7 +109,7 @@ def _against_markers(at: Target, arguments: EvaluateArguments, marker_set: str) 
     for name, angle in agreement.angles.items():
         bias, low, high = map(degrees, (angle.limits.bias, angle.limits.lower, angle.limits.upper))
         lines.append(f"  {name.replace('_', ' '):16} {bias:5.1f} deg {low:7.1f} to {high:.1f} deg")
-    return "\n".join([*lines, *([f"wrote {arguments.report}"] if arguments.report else [])])
+    return "\n".join([*lines, *([f"wrote {path}"] if path else [])])
 
 
 def added_help() -> str:

@@ -115,6 +115,7 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
 
     at = load_target(arguments.sessions[0], arguments.person, several=True)
     chosen = find_format(arguments.format, arguments.out)
+    _check_faces(arguments, chosen)
     out = _file(arguments.out, chosen, at.session.folder.name)
     given = {name: getattr(arguments, name) for name in OPTIONS}
     options = replace(check_options(chosen, at.session, given), provenance=arguments.provenance)
@@ -127,6 +128,18 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
         "axes": options.axes if "axes" in chosen.options else None
     }
     print(format_json(found) if arguments.json else _format(found))
+
+
+def _check_faces(arguments: ExportArguments, chosen: ExportFormat) -> None:
+    """Refuse to blur where no picture is written."""
+    has_pictures = "faces" in chosen.options and (
+        chosen.name not in ("openpose", "masks") or arguments.pixels == "undistorted"
+    )
+    if arguments.blur_faces and not has_pictures:
+        raise TrackerError(
+            f"expected --blur-faces with pictures, found format {chosen.name}, which writes none; leave it out, or say "
+            "--pixels undistorted where a format has them"
+        )
 
 
 def _only(arguments: ExportArguments) -> "Checked | None":

@@ -14,7 +14,7 @@ from tracker.evaluation.judging.verdicts import LIMBS
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
-from tracker.interchange.exports.faces import BlurredRecording, stored_people
+from tracker.interchange.exports.faces import BlurredRecording
 from tracker.session.session import Session
 
 _SHOWN = 12
@@ -46,7 +46,7 @@ def write_report(session: Session, name: str, found: Sequence[Judgement], path: 
         '<p><span class="imported">Imported joints</span>, <span class="off">limbs that are off</span>, '
         '<span class="tracked">joints by contours and colours</span>.</p>'
     )
-    footage = BlurredRecording(session, stored_people(session)) if blur_faces else Recording(session.cameras)
+    footage = BlurredRecording(session) if blur_faces else Recording(session.cameras)
     with footage as recording:
         for own in found:
             body += _person(own, recording, [c.camera for c in session.cameras])

@@ -7,6 +7,7 @@ docstring of each header describes its payload.
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.curves import CurveGroup
+from app.drawing.head_circles import HeadCircle
 from app.drawing.joint_handles import Handle, OutOfReach, Side
 from app.drawing.overlays import PathKind
 from app.drawing.pin_marks import PinMark, PinTriangulation
@@ -64,6 +65,8 @@ class OverlayHeader(Message, frozen=True, tag="overlay"):
     paths: tuple[Path, ...]
     outlines: tuple[Outline, ...]
     handles: tuple[Handle, ...]
+    heads: tuple[HeadCircle, ...]
+    """Empty unless the page blurs faces."""
     out_of_reach: OutOfReach | None
     """Null while the dragged point follows the pointer."""
     pins: tuple[PinMark, ...]

@@ -5,8 +5,6 @@ They are requests of their own, so that no command, picture or overlay on the pa
 
 import asyncio
 import logging
-import os
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -15,11 +13,11 @@ from aiohttp import web
 from app.remedies import page_text
 from app.server.page_requests import require_page
 from tracker.errors import TrackerError
+from tracker.system import give_way_in_thread
 
 _LOG = logging.getLogger(__name__)
 _MAX_WAITING = 16
 """Number of thumbnails that may wait; a page requests two at a time."""
-_NICENESS = 10
 _MAX_DIGITS = 9
 
 Make = Callable[[int, int, int | None], bytes | None]
@@ -37,7 +35,7 @@ class ThumbnailRoutes:
             is_busy: whether none can be made now, as while kernels are compiled.
         """
         self._make, self._is_busy = make, is_busy
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix="thumbnails", initializer=_lower_priority)
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="thumbnails", initializer=give_way_in_thread)
         self._n_waiting = 0
 
     def add_to(self, app: web.Application) -> None:
@@ -78,9 +76,3 @@ def _number(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) <= _MAX_DIGITS):
         raise web.HTTPNotFound(text="Expected an index, found other text.")
     return int(text)
-
-
-def _lower_priority() -> None:
-    """Let everything else have the processor first, where the system allows it for a single thread."""
-    if hasattr(os, "setpriority") and os.uname().sysname == "Linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)

@@ -20,8 +20,6 @@ import { drawsInSoftware } from "../widgets/webgl.js";
 
 // Software rendering composites one opaque canvas faster than two.
 const IN_SOFTWARE = drawsInSoftware();
-/** Of the distance from the neck to the middle of the head, which is about its radius; half of one is left for hair and error. */
-const HEAD_REACH = 1.4;
 const WHEEL_ZOOM = 0.0015;
 const PINCH_ZOOM = 0.01;
 const LINE_PX = 16;
@@ -163,12 +161,12 @@ export class Pane {
     return decluttered(placed, session?.people ?? [], dragging ? hover : null);
   }
 
-  /** Circles around the heads of all people, from the neck to as far beyond the head. */
+  /** Circles around the heads of all people. */
   #heads() {
-    const handles = this.#placedHandles();
-    return handles.flatMap(({ handle, x, y }) => {
-      const neck = handle.point === "head" && handles.find((h) => h.handle.person === handle.person && h.handle.point === "neck");
-      return neck ? [{ x, y, radius: HEAD_REACH * Math.hypot(x - neck.x, y - neck.y) }] : [];
+    const heads = (this.#store.facts.overlay?.heads ?? []).filter(({ camera }) => camera === this.#camera);
+    return heads.map(({ u, v, radius_px }) => {
+      const [middle, side] = [this.view.toScreen(u, v), this.view.toScreen(u + radius_px, v)];
+      return { ...middle, radius: side.x - middle.x };
     });
   }
 

@@ -126,13 +126,17 @@ class SessionLock:
         holder = _parse(data)
         if not (len(data) <= _MAX_BYTES and not data.strip(b"\0")) and (holder is None or is_alive(holder)):
             raise SessionError(f"session {self._path.parent} is open already {_describe(holder, self._path)}")
+        is_stale = False
         with suppress(FileNotFoundError), self._path.open("rb+") as file:
             # Several programs may find the same stale lock. The one that has this file to itself removes it; to the
             # others it is no longer the file at the path.
             if not _have_alone(file.fileno()):
                 raise SessionError(f"session {self._path.parent} is being opened by another program; try again")
-            if self._is_at_path(file.fileno()) and file.read(_MAX_BYTES + 1) == data:
+            is_stale = self._is_at_path(file.fileno()) and file.read(_MAX_BYTES + 1) == data
+            if is_stale and not system.KEEPS_OPEN_FILES:
                 self._path.unlink()
+        if is_stale and system.KEEPS_OPEN_FILES:
+            self._path.unlink(missing_ok=True)
 
     def _settled(self) -> bytes | None:
         """Read the lock file, once it has been written; None if it is missing."""

@@ -51,6 +51,8 @@ def command(arguments: Annotated[JudgeArguments, tyro.conf.arg(name="")]) -> Non
         raise TrackerError(f"expected --report at a path that is free, found {path}; say --overwrite to replace it")
     if path is not None and (path.is_dir() or not path.parent.is_dir()):
         raise TrackerError(f"expected --report at a file in a folder that exists, found {path}; give another path")
+    if arguments.blur_faces and path is None:
+        raise TrackerError("expected --blur-faces with --report, found no report; add it, or leave the option out")
     found = judge_session(session, arguments.of, Reporter(silent=arguments.json))
     print(format_json(record(found)) if arguments.json else _format(found))
     if path is not None:

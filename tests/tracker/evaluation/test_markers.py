@@ -178,3 +178,41 @@ def test_angles_are_those_between_the_bones():
     straight = replace(one, points=np.array([[(0, 0, 1.0), (0, 0, 0.5), (0, 0, 0.0)]]))
     _, agreement = compare_with_markers(one, straight, "a", [0])
     assert np.degrees(agreement.angles["left_knee"].limits.bias) == pytest.approx(30)
+
+
+def gait(n, rate, seed=0, cycle_s=1.0):
+    """Four pairs of joints that swing, ever differently, at a rate."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n) / rate
+    names = tuple(f"{side}_{joint}" for side in SIDES for joint in ENDS)
+    knots = np.arange(int(t[-1]) + 2)
+    drift = np.interp(t, knots, rng.normal(size=len(knots)).cumsum())
+    points = np.zeros((n, len(names), 3))
+    for i in range(len(names)):
+        amplitude, phase = rng.uniform(0.1, 0.3), rng.uniform(0, 2 * np.pi)
+        points[:, i] = rng.normal(size=3) + 0.05 * drift[:, None] * rng.normal(size=3)
+        points[:, i, 0] += amplitude * np.sin(2 * np.pi * t / cycle_s + phase + 0.2 * drift)
+    return MarkerTable(names, np.arange(n), t, points, rate)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [range(250), [*range(60), *range(170, 250)], range(0, 250, 3), [*range(0, 120, 3), *range(120, 250)]],
+    ids=["whole", "gap", "stride", "two strides"],
+)
+def test_the_lag_is_found_where_frames_are_missing(tmp_path, rows):
+    motion = gait(250, 25.0)
+    began = as_markers(tmp_path / "a.trc", motion, np.eye(4))
+    some = replace(motion, frames=motion.frames[rows], times=motion.times[rows], points=motion.points[rows])
+    found = read_marker_reference(tmp_path / "a.trc", "plug-in-gait", some)
+    assert abs(found.lag_s + began) < 0.25 / motion.rate
+
+
+def test_a_motion_that_repeats_is_refused(tmp_path):
+    t = np.arange(250) / 25.0
+    motion = gait(250, 25.0)
+    again = replace(motion, points=motion.points[(np.arange(250) % 25)])
+    as_markers(tmp_path / "a.trc", again, np.eye(4))
+    part = replace(again, frames=again.frames[:150], times=t[:150], points=again.points[:150])
+    with pytest.raises(FormatError, match="alike at several lags"):
+        read_marker_reference(tmp_path / "a.trc", "plug-in-gait", part)

@@ -8,6 +8,7 @@ from tracker.evaluation.agreement.comparison import Agreement, compare
 from tracker.evaluation.agreement.copies import Copies, Subject
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
+from tracker.interchange.plausibility.body_likelihood import PRIORS
 
 NAMES = ("markers", "video")
 _ANGLES = {
@@ -23,17 +24,23 @@ def compare_with_markers(
 ) -> tuple[Copies, Agreement]:
     """Compare joints at the same frames and in the same axes.
 
+    Intervals of agreement need independent differences: frames are left out that follow another one too soon.
+
     Args:
         estimate: joints of stored poses.
         markers: joint centres from markers.
         person: name.
         frames: to compare; those that one of the two lacks are left out.
     """
+    apart, taken = PRIORS.posture_s * estimate.rate, list[int]()
+    for frame in sorted(frames):
+        if not taken or frame - taken[-1] >= apart:
+            taken.append(frame)
     joints = tuple(name for name in markers.names if name in estimate.names)
     rows = [
-        (np.flatnonzero(t.frames == f), np.flatnonzero(m.frames == f)) for f in frames for t, m in [(estimate, markers)]
+        (np.flatnonzero(t.frames == f), np.flatnonzero(m.frames == f)) for f in taken for t, m in [(estimate, markers)]
     ]
-    both = [(f, int(a[0]), int(b[0])) for f, (a, b) in zip(frames, rows, strict=True) if len(a) and len(b)]
+    both = [(f, int(a[0]), int(b[0])) for f, (a, b) in zip(taken, rows, strict=True) if len(a) and len(b)]
     points = np.stack(
         [
             markers.points[[b for _, _, b in both]][:, [markers.names.index(j) for j in joints]],
@@ -47,7 +54,8 @@ def compare_with_markers(
         flexions[..., i] = _flexion(points[:, :, [joints.index(j) for j in _ANGLES[name]]])
     means = flexions.mean(axis=1)
     subjects = tuple(Subject(person, f) for f, _, _ in both)
-    copies = Copies(NAMES, subjects, joints, points, names, means, flexions - means[:, None], estimate.rate)
+    note = f"of each {PRIORS.posture_s:g} s one frame is compared: those between are no independent postures"
+    copies = Copies(NAMES, subjects, joints, points, names, means, flexions - means[:, None], estimate.rate, (note,))
     return copies, compare(copies)
 
 

@@ -7,6 +7,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from tracker.errors import FormatError
+from tracker.estimation.fitting.hypothesis import CLEAR_NATS
+from tracker.estimation.fitting.keypoints import GROSS_SIGMAS
 from tracker.evaluation.markers.joint_centres import joint_centres
 from tracker.evaluation.markers.marker_set import LANDMARKS, read_marker_set
 from tracker.evaluation.metrics import best_rigid
@@ -21,8 +23,14 @@ from tracker.interchange.plausibility.lags import find_lag
 
 _MIN_OVERLAP = 0.5
 """Share of the poses that the markers cover at any lag that is tried."""
-_N_PEAKS = 5
+_N_PEAKS = 30
 """Number of lags, the likeliest by speed, at which motions are laid over one another."""
+_LAG_SHARE = 0.02
+"""Accuracy with which a lag is sought, frames: less than a tenth of a quarter of a frame."""
+_LONGEST_STEP = 2.0
+"""Longest time between rows across which points are interpolated, usual times between rows."""
+_SAME = 1e-6
+"""Share of the time between two rows by which a time may differ from that of a row."""
 
 
 class MarkerReference(NamedTuple):
@@ -57,7 +65,7 @@ def read_marker_reference(path: Path, marker_set: str, estimate: MarkerTable) ->
     theirs = table.points[:, [table.names.index(name) for name in shared]]
     ours = estimate.points[:, [estimate.names.index(name) for name in shared]]
     times = estimate.frames / estimate.rate
-    lag_s = _lag(times, ours, table.times, theirs)
+    lag_s = _lag(times, ours, table.times, theirs, 1 / estimate.rate)
     at = times + lag_s
     moved = _at(at, table.times, theirs)
     T = _rigid(moved, ours)
@@ -112,45 +120,106 @@ def read_centres(path: Path, marker_set: str) -> MarkerTable:
     )
 
 
-def _lag(times: Array, ours: Array, marker_times: Array, theirs: Array) -> float:
+def _lag(times: Array, ours: Array, marker_times: Array, theirs: Array, frame_s: float) -> float:
     """Return the lag, s, at which two motions lie best over one another, whatever their axes.
 
     Speeds, which no axes change, correlate best at some lags. From each, the motions are laid over one another.
+
+    Args:
+        times: of the estimate, (F,), s; some frames may be missing.
+        ours: its joints, (F, m, 3).
+        marker_times: (n,), s.
+        theirs: the same joints by markers, (n, m, 3).
+        frame_s: time of a frame, s.
+
+    Raises:
+        FormatError: the markers cover too few poses at every lag, or the motion does not show the lag.
     """
-    step = float(np.median(np.diff(times)))
-    grid = np.arange(marker_times[0], marker_times[-1] + step / 2, step)
-    speeds = _speeds(_at(times, times, ours), step), _speeds(_at(grid, marker_times, theirs), step)
-    n_least = int(np.ceil(_MIN_OVERLAP * len(speeds[0])))
-    scored = []
-    for shift in range(n_least - len(speeds[0]), len(speeds[1]) - n_least + 1):
-        first, last = max(0, -shift), min(len(speeds[0]), len(speeds[1]) - shift)
-        if last - first >= max(n_least, 3):
-            scored.append((_correlation(speeds[0][first:last], speeds[1][first + shift : last + shift]), shift))
-    starts = [grid[0] - times[0] + shift * step for _, shift in sorted(scored, reverse=True)[:_N_PEAKS]]
+    errors: dict[float, Array] = {}
+
+    def distances(lag_s: float) -> Array:
+        if lag_s not in errors:
+            errors[lag_s] = _laid_over(_at(times + lag_s, marker_times, theirs), ours)
+        return errors[lag_s]
 
     def distance_m(lag_s: float) -> float:
-        errors = _laid_over(_at(times + lag_s, marker_times, theirs), ours)
-        known = np.isfinite(errors)
-        return float(np.median(errors[known])) if known.sum() >= n_least else np.inf
+        known = np.isfinite(distances(lag_s))
+        is_covered = np.any(known, axis=1).mean() >= _MIN_OVERLAP
+        return float(np.median(distances(lag_s)[known])) if is_covered else np.inf
 
+    bounds = [(start - frame_s, start + frame_s) for start in _starts(times, ours, marker_times, theirs, frame_s)]
     found = [
-        minimize_scalar(distance_m, bounds=(start - step, start + step), method="bounded", options={"xatol": step / 50})
-        for start in starts
+        minimize_scalar(distance_m, bounds=b, method="bounded", options={"xatol": _LAG_SHARE * frame_s}) for b in bounds
     ]
-    best = min(found, key=lambda f: f.fun, default=None)
-    if best is None or not np.isfinite(best.fun):
+    found.sort(key=lambda f: f.fun)
+    if not found or not np.isfinite(found[0].fun):
         raise FormatError(
             "expected markers over at least half of the tracked poses, found fewer at every lag; choose their recording"
         )
-    reach = int(np.ceil(PRIORS.posture_s / step))
-    around = best.x + step * np.linspace(-reach, reach, 4 * reach + 1)
-    errors = np.stack([_laid_over(_at(times + lag_s, marker_times, theirs), ours) for lag_s in around])
-    if find_lag(errors, reach, reach) is None:
+    best, n_rows = float(found[0].x), PRIORS.posture_s / frame_s
+    reach = int(np.ceil(n_rows))
+    around = np.stack([distances(best + k * frame_s) for k in np.linspace(-reach, reach, 4 * reach + 1)])
+    others = [float(f.x) for f in found[1:] if abs(f.x - best) > PRIORS.posture_s and np.isfinite(f.fun)]
+    rivals = [other for other in others if not _is_worse(distances(other), distances(best), n_rows)]
+    if rivals or find_lag(around, reach, n_rows) is None:
+        at = f" at {best:.2f} and {rivals[0]:.2f} s" if rivals else ""
         raise FormatError(
             "expected a motion that shows by how much the clocks of markers and cameras differ, found motions that are "
-            "alike at many lags; compare a stretch with faster motion"
+            f"alike at several lags{at}; compare a longer stretch, or one with faster motion"
         )
-    return float(best.x)
+    return best
+
+
+def _starts(times: Array, ours: Array, marker_times: Array, theirs: Array, frame_s: float) -> list[float]:
+    """Return the lags, s, at which mean speeds correlate best: the highest of the local maxima."""
+    apart = np.diff(times)
+    step = float(np.median(apart))
+    is_step = np.abs(apart - step) < frame_s / 2  # not across missing frames
+    starts = times[:-1][is_step]
+    speeds = _mean_lengths(np.diff(ours, axis=0)[is_step])
+    grid = np.arange(marker_times[0], marker_times[-1] - step, frame_s)
+    grid_speeds = _mean_lengths(_at(grid + step, marker_times, theirs) - _at(grid, marker_times, theirs))
+    lags = np.arange(grid[0] - starts[-1], grid[-1] - starts[0] + frame_s, frame_s) if len(grid) else np.zeros(0)
+    score = np.full(len(lags) + 2, -np.inf)
+    for i, lag_s in enumerate(lags, 1):
+        at = np.interp(starts + lag_s, grid, grid_speeds, left=np.nan, right=np.nan)
+        known = np.isfinite(at) & np.isfinite(speeds)
+        if known.mean() >= _MIN_OVERLAP:
+            score[i] = _correlation(speeds[known], at[known])
+    peaks = np.flatnonzero((score[1:-1] > score[:-2]) & (score[1:-1] >= score[2:]))
+    return lags[peaks[np.argsort(-score[1:-1][peaks])][:_N_PEAKS]].tolist()
+
+
+def _is_worse(errors: Array, best: Array, n_rows: float) -> bool:
+    """Return whether distances, (F, m), are larger than the best by a paired t-test of independent stretches.
+
+    Their squares saturate, as in `find_lag`: one stretch that is far off says no more than one that is off.
+    """
+    scale2 = (GROSS_SIGMAS * np.nanmedian(best)) ** 2
+    rows = [_row_means(e**2 / (e**2 + scale2)) for e in (errors, best)]
+    more = (rows[0] - rows[1])[np.isfinite(rows[0]) & np.isfinite(rows[1])]
+    parts = np.array([part.mean() for part in np.array_split(more, max(1, round(len(more) / n_rows))) if len(part)])
+    if len(parts) < 2:
+        return False
+    error = parts.std(ddof=1) / np.sqrt(len(parts))
+    return bool(parts.mean() > np.sqrt(2 * CLEAR_NATS) * error)
+
+
+def _row_means(values: Array) -> Array:
+    """Return the mean of each row, (n, m), over what is known; NaN where nothing is."""
+    known = np.isfinite(values)
+    total = np.where(known, values, 0.0).sum(axis=1)
+    return np.asarray(np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan))
+
+
+def _mean_lengths(vectors: Array) -> Array:
+    """Return the mean length of the vectors of each row, (n, m, 3), over those that are known."""
+    return _row_means(np.linalg.norm(vectors, axis=-1))
+
+
+def _correlation(a: Array, b: Array) -> float:
+    spread = float(a.std() * b.std())
+    return float(np.mean((a - a.mean()) * (b - b.mean()))) / spread if spread > 0 else 0.0
 
 
 def _laid_over(moved: Array, ours: Array) -> Array:
@@ -159,23 +228,15 @@ def _laid_over(moved: Array, ours: Array) -> Array:
 
 
 def _at(wanted: Array, times: Array, points: Array) -> Array:
-    """Return points, (n, m, 3), at other times, (k, m, 3), linearly; NaN beyond the ends and beside gaps."""
+    """Return points, (n, m, 3), at other times, (k, m, 3), linearly; NaN beyond the ends and across gaps."""
     after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-    share = (wanted - times[after - 1]) / (times[after] - times[after - 1])
-    share = np.where((share < -1e-9) | (share > 1 + 1e-9), np.nan, share)[:, None, None]
-    return np.asarray((1 - share) * points[after - 1] + share * points[after])
-
-
-def _speeds(points: Array, step_s: float) -> Array:
-    """Return the mean speed of all points between rows, (n - 1,), m/s; 0 where none is known."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=-1) / step_s
-    known = np.isfinite(steps)
-    return np.where(known, steps, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-
-
-def _correlation(a: Array, b: Array) -> float:
-    spread = float(a.std() * b.std())
-    return float(np.mean((a - a.mean()) * (b - b.mean()))) / spread if spread > 0 else 0.0
+    apart = times[after] - times[after - 1]
+    share = ((wanted - times[after - 1]) / apart)[:, None, None]
+    is_gap = (apart > _LONGEST_STEP * np.median(np.diff(times)))[:, None, None]
+    between = (1 - share) * points[after - 1] + share * points[after]
+    found = np.where(share >= 1 - _SAME, points[after], np.where(share <= _SAME, points[after - 1], between))
+    is_outside = (share < -_SAME) | (share > 1 + _SAME) | (is_gap & (share > _SAME) & (share < 1 - _SAME))
+    return np.asarray(np.where(is_outside, np.nan, found))
 
 
 def _rigid(moved: Array, ours: Array) -> Array:

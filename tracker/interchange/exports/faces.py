@@ -1,7 +1,8 @@
 """Blur faces in the pictures of an export: footage of people is personal data.
 
-The head of each person with a pose is known in every view; between two poses it is interpolated. Bystanders are known
-by their imported key points and joints. A bystander whom masks alone show is blurred whole.
+The head of each person with a pose is known in every view; between two poses it is interpolated, beyond them it stays.
+Bystanders are known by their imported key points and joints: by their heads, or whole where no point of the head is
+known. One whom masks alone show is blurred whole; one whose mask touches that of a tracked person is not seen.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,8 +32,10 @@ _HEAD_SHARE = 0.13
 """Height of the head, body heights (Winter 2009, Fig. 4.1)."""
 _GRAINS = 4
 """Number of grains across a blurred head; a face needs some 16 to be recognized (Harmon & Julesz 1973)."""
-_FACE = ("nose", "eye", "ear", "head", "face")
-"""Parts of names of points of a head."""
+_LEAST_PX = 16.0
+"""Radius of a head of which nothing but some points is known, px: below some 32 px across, faces are not recognized."""
+_FACE = ("nose", "eye", "ear", "head", "face", "mouth", "chin", "brow", "vertex", "fhd", "bhd")
+"""Parts of names of points of a head; the last two are of markers around it."""
 
 
 class Circle(NamedTuple):
@@ -46,19 +49,18 @@ class Circle(NamedTuple):
 class BlurredRecording(Recording):
     """The footage of a session, in which every head that is known is blurred."""
 
-    def __init__(self, session: Session, people: Sequence[PersonMotion], indices: Path | None = None) -> None:
+    def __init__(self, session: Session, indices: Path | None = None) -> None:
         """Open the footage.
 
         Args:
-            session: with its imported observations.
-            people: with their stored poses.
+            session: with its stored poses and imported observations.
             indices: as of a `Recording`.
 
         Raises:
             SessionError: a body has no head, or observations are damaged.
             RecordingError: the footage cannot be read.
         """
-        self._session, self._heads = session, Heads(session, people)
+        self._heads = Heads(session)
         super().__init__(session.cameras, indices=indices)
 
     def _read_one(self, camera: int, k: int) -> Image | None:
@@ -74,11 +76,11 @@ def recording_of(motion: ExportedMotion, faces: FacesName, indices: Path | None 
         RecordingError: the footage cannot be read.
     """
     if faces == "blurred":
-        return BlurredRecording(motion.session, motion.people, indices)
+        return BlurredRecording(motion.session, indices)
     return Recording(motion.session.cameras, indices=indices)
 
 
-def stored_people(session: Session) -> Sequence[PersonMotion]:
+def _stored_people(session: Session) -> Sequence[PersonMotion]:
     """Return the people of a session with all their stored poses; nobody if there is no pose."""
     try:
         return read_motion(session, range(len(session.people))).people
@@ -89,10 +91,10 @@ def stored_people(session: Session) -> Sequence[PersonMotion]:
 class Heads:
     """The heads of all people who are known in the views of a session."""
 
-    def __init__(self, session: Session, people: Sequence[PersonMotion]) -> None:
-        self._session, self._people = session, people
-        for person in people:
-            for model in {p.body.model for p in (*person.around.values(), *person.poses.values())}:
+    def __init__(self, session: Session) -> None:
+        self._session, self._people = session, _stored_people(session)
+        for person in self._people:
+            for model in person.models:
                 if "head" not in model.part_index:
                     raise SessionError(
                         f"expected a body with a head to blur, found '{model.name}' of {person.person.name}; leave the "
@@ -104,27 +106,30 @@ class Heads:
         return [load_observations(self._session, name) for name in list_observations(self._session)]
 
     def circles(self, view: int, frame: int) -> list[Circle]:
-        """Return what hides the heads in a view on a frame."""
-        camera = self._session.cameras[view].camera
-        bodies = [body for person in self._people if (body := _body_on(person, frame)) is not None]
-        surfaces = [project_through_lens(camera, _head(body)) for body in bodies]
-        found = [_around(px[np.isfinite(px).all(axis=1)], 0.0) for px in surfaces if np.isfinite(px).all(axis=1).any()]
-        for points in self._observed(view, frame):
-            found += _by_points(*points)
-        return found + self._masked(view, frame, bodies)
+        """Return what hides the heads in a view on a frame; the view's own clock counts."""
+        source = self._session.cameras[view]
+        at = frame + source.clock.ahead(frame)
+        bodies = [body for person in self._people if (body := _body_at(person, at)) is not None]
+        found = list[Circle]()
+        for body in bodies:
+            px = project_through_lens(source.camera, head_surface(body))
+            if (seen := np.isfinite(px).all(axis=1)).any():
+                found.append(around(px[seen]))
+        largest = max((circle.radius_px / _MARGIN for circle in found), default=0.0)
+        for names, points_px in self._observed(view, frame, at):
+            found += _by_points(names, points_px, largest)
+        return found + self._masked(view, frame, [b for p in self._people if (b := _body_at(p, at, beyond=False))])
 
-    def _observed(self, view: int, frame: int) -> Iterator[tuple[Sequence[str], Array]]:
+    def _observed(self, view: int, frame: int, at: float) -> Iterator[tuple[Sequence[str], Array]]:
         """Yield the names and positions, px, (n, 2), of the points of everybody who was observed; NaN where absent."""
         camera = self._session.cameras[view].camera
         for observed in self._observations:
-            if observed.points is not None and frame < observed.points.n_frames:
-                for detection, known in zip(
-                    observed.points.points_px[frame, view], observed.points.is_known[frame, view], strict=True
-                ):
-                    yield observed.points.names, np.where(known[:, None], detection, np.nan)
-            if observed.joints is not None and frame < observed.joints.n_frames:
-                for joints in observed.joints.joints_world[frame]:
-                    yield observed.joints.names, project_through_lens(camera, joints)
+            points, joints = observed.points, observed.joints
+            if points is not None and frame < points.n_frames:
+                known = points.is_known[frame, view][..., None]
+                yield from ((points.names, px) for px in np.where(known, points.points_px[frame, view], np.nan))
+            if joints is not None and round(at) < joints.n_frames:
+                yield from ((joints.names, project_through_lens(camera, p)) for p in joints.joints_world[round(at)])
 
     def _masked(self, view: int, frame: int, bodies: Sequence[PosedBody]) -> list[Circle]:
         """Return circles around the pieces of a mask in which no body is."""
@@ -139,48 +144,60 @@ class Heads:
             at = np.rint(px[np.isfinite(px).all(axis=1)]).astype(int)
             inside = at[((at >= 0) & (at < mask.shape[::-1])).all(axis=1)]
             of_people |= set(labels[inside[:, 1], inside[:, 0]].tolist())
-        return [
-            Circle(centers[i], float(np.hypot(*boxes[i, 2:4]))) for i in range(n) if i not in of_people
-        ]  # fmt: skip
+        return [Circle(centers[i], float(np.hypot(*boxes[i, 2:4]))) for i in range(n) if i not in of_people]
 
 
-def _body_on(person: PersonMotion, frame: int) -> PosedBody | None:
-    """Return the body of a person on a frame: between two poses, in between; beyond them, as at the nearest one."""
-    known = {**person.around, **person.poses}
-    if frame in known:
-        return known[frame].body
+def _body_at(person: PersonMotion, at: float, beyond: bool = True) -> PosedBody | None:
+    """Return the body of a person at a time in frames: between two poses, in between; of two bodies, the nearer one.
+
+    Args:
+        person: with all stored poses.
+        at: the time.
+        beyond: whether it stays as at the nearest pose beyond the first and the last one.
+    """
     before, after = (
-        max((k for k in known if k < frame), default=None),
-        min((k for k in known if k > frame), default=None),
+        max((k for k in person.poses if k <= at), default=None),
+        min((k for k in person.poses if k >= at), default=None),
     )
     if before is None or after is None:
         nearest = after if before is None else before
-        return None if nearest is None else known[nearest].body
-    a, b = known[before].body, known[after].body
+        return person.poses[nearest].body if beyond and nearest is not None else None
+    a, b = person.poses[before].body, person.poses[after].body
+    share = (at - before) / (after - before) if after > before else 0.0
     if a.model.value_names != b.model.value_names:
-        return a
-    share = np.array([(frame - before) / (after - before)])
-    return PosedBody(a.model, interpolate_pose(a.model, a.values, b.values, share)[0])
+        return a if share < 0.5 else b
+    return PosedBody(a.model, interpolate_pose(a.model, a.values, b.values, np.array([share]))[0])
 
 
-def _head(body: PosedBody) -> Array:
+def head_surface(body: PosedBody) -> Array:
     """Return points on the surface of a head, (n, 3), world, metres."""
     part = body.model.part_index["head"]
     points = body.model.shapes[part].triangles().vertices + body.model.centers_part[part]
     return rigid.apply(body.kinematics.Ts_world_part[part], points)
 
 
-def _by_points(names: Sequence[str], points_px: Array) -> list[Circle]:
-    """Return the circle of the head of one person by his points, (n, 2), px; none if no point of the head is known."""
+def _by_points(names: Sequence[str], points_px: Array, head_px: float) -> list[Circle]:
+    """Return the circle of the head of one person by his points, (n, 2), px; of him whole if none is of the head.
+
+    Args:
+        names: of the points.
+        points_px: NaN where absent.
+        head_px: radius of the largest head of a body in the view, px; 0 without any.
+    """
     known = np.isfinite(points_px).all(axis=1)
+    if not known.any():
+        return []
     is_face = np.array([any(word in name.lower().replace("forearm", "") for word in _FACE) for name in names])
     if not (known & is_face).any():
-        return []
-    extent = np.ptp(points_px[known], axis=0)
-    return [_around(points_px[known & is_face], _HEAD_SHARE * float(np.hypot(*extent)))]
+        return [around(points_px[known], head_px)]
+    is_whole = any("ankle" in name.lower() for name in np.array(names)[known])
+    extent = float(np.hypot(*np.ptp(points_px[known], axis=0)))
+    # A person who is seen in part has an extent that says nothing of the size of the head.
+    least = _HEAD_SHARE * extent if is_whole else max(head_px, _HEAD_SHARE * extent, _LEAST_PX)
+    return [around(points_px[known & is_face], least)]
 
 
-def _around(points_px: Array, least_px: float) -> Circle:
+def around(points_px: Array, least_px: float = 0.0) -> Circle:
     """Return a circle around points of a head, (n, 2), px, of at least a radius before the margin."""
     center = (points_px.min(axis=0) + points_px.max(axis=0)) / 2
     radius = max(least_px, float(np.linalg.norm(points_px - center, axis=1).max()))

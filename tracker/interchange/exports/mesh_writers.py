@@ -14,7 +14,7 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from tracker.body.model import PosedBody
-from tracker.errors import TrackerError
+from tracker.errors import RecordingError, TrackerError
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.voxels.shadows import recover_from_shadows
 from tracker.evidence.voxels.visual_hull import carve_people
@@ -49,22 +49,33 @@ def write_bodies(motion: ExportedMotion, options: ExportOptions, paths: Sequence
 
 
 def write_hulls(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
-    """Write the visual hull of all people on each frame, `hull_000012.ply`, from the silhouettes of the footage.
+    """Write the visual hull of each figure on each frame, `hull1_000012.ply`, from the silhouettes of the footage.
+
+    A frame on which silhouettes do not agree or show nobody has none.
 
     Raises:
-        TrackerError: the silhouettes of a frame do not agree, or show nobody.
+        TrackerError: no frame has a hull; the reason is that of the first one.
     """
-    session, floor = motion.session, floor_plane(motion.session.up, motion.session.floor)
+    session, errors = motion.session, list[TrackerError]()
+    floor = floor_plane(session.up, session.floor)
     with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
 
         def meshes(frame: int) -> Iterator[tuple[str, trimesh.Trimesh]]:
-            hull = carve_people(recover_from_shadows(finder.silhouettes(frame), floor, VOXEL_M), VOXEL_M)
+            try:
+                hull = carve_people(recover_from_shadows(finder.silhouettes(frame), floor, VOXEL_M), VOXEL_M)
+            except RecordingError:
+                raise
+            except TrackerError as error:
+                errors.append(error)
+                return
             for number, figure in enumerate(hull.figures, 1):
                 field = np.where(np.pad(figure.occupied, 1), np.float32(-1), np.float32(1))
                 corner = figure.grid.origin - figure.grid.size_m
                 yield f"hull{number}", trimesh.Trimesh(*surface_nets(field, corner, figure.grid.size_m), process=False)
 
         _write_frames(motion, options, paths[0], tick, meshes)
+    if len(errors) == len(motion.frames):
+        raise errors[0]
 
 
 def _write_frames(
