@@ -49,7 +49,7 @@ _PLACES = {
     "tracker.interchange.exports.export_format": ("ExportFormat",),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
-PLACE = str(Path(__file__).resolve().parents[1])
+_PLACE = str(Path(__file__).resolve().parents[1])
 """Folder of the packages `quadrille`, `app` and `tracker`."""
 
 
@@ -59,7 +59,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'quadrille' has no attribute '{name}'")
     module = _MODULES[name]
     for package in {"tracker", module.partition(".")[0]}:
-        _require_own(package)
+        require_own(package)
     return getattr(import_module(module), name)
 
 
@@ -68,19 +68,19 @@ def __dir__() -> list[str]:
     return __all__
 
 
-def _require_own(package: str) -> None:
+def require_own(package: str) -> None:
     """Import a package from beside this one, even where another of that name comes first on the path.
 
     Raises:
         ImportError: the program has imported another one before.
     """
-    sys.path.insert(0, PLACE)
+    sys.path.insert(0, _PLACE)
     try:
         found = import_module(package).__file__
     finally:
-        sys.path.remove(PLACE)
-    if found is None or Path(found).resolve().parents[1] != Path(PLACE):
+        sys.path.remove(_PLACE)
+    if found is None or Path(found).resolve().parents[1] != Path(_PLACE):
         raise ImportError(
-            f"expected the package '{package}' of Quadrille in {PLACE}, found {found or 'a folder of that name'}, "
+            f"expected the package '{package}' of Quadrille in {_PLACE}, found {found or 'a folder of that name'}, "
             "which this program imported before; import quadrille first, or rename your own package"
         )

@@ -1,11 +1,16 @@
 """`quadrille`, or `python -m quadrille`: the command line, from any folder."""
 
-import sys
+from quadrille import require_own
 
-from quadrille import PLACE
 
-sys.path.insert(0, PLACE)  # before the working folder and PYTHONPATH, which may hold another project's `app`
-from app.main import program
+def program() -> None:
+    """Run the command line, though the working folder or PYTHONPATH may hold another project's `app`."""
+    for package in ("tracker", "app"):
+        require_own(package)
+    from app.main import program as run
+
+    run()
+
 
 if __name__ == "__main__":
     program()

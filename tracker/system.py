@@ -152,6 +152,13 @@ def _first_line(path: str) -> str:
         return ""
 
 
+def own_module(name: str) -> list[str]:
+    """Return the words that run a module of this program as one, also where another package of its name comes first."""
+    place = str(Path(__file__).resolve().parents[1])
+    run = f"import runpy, sys; sys.path.insert(0, {place!r}); runpy.run_module({name!r}, run_name='__main__')"
+    return [sys.executable, "-P", "-c", run]
+
+
 def start_apart(command: Sequence[str], **more: Any) -> "subprocess.Popen[bytes]":
     """Start a program that Ctrl+C in this one's terminal does not reach; `end_apart` ends it."""
     if sys.platform == "win32":

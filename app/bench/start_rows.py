@@ -2,11 +2,11 @@
 
 import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 
 from app.bench.rows import Row, Yardstick, in_yardsticks
+from tracker.system import own_module
 
 _MUST = {"cost": in_yardsticks(60_000), "all": in_yardsticks(190_000)}
 _AIMS = {"cost": in_yardsticks(40_000), "all": in_yardsticks(90_000)}
@@ -17,7 +17,7 @@ def first_start(yardstick: Yardstick) -> Iterator[Row]:
     """Compile all kernels in a process of its own; one row until the first cost of a pose, one until all are there."""
     (_, _, yardstick_us) = yardstick.beside(lambda: None, runs=40)
     with tempfile.TemporaryDirectory() as cache:
-        words = [sys.executable, "-P", "-m", "app.bench.compile_kernels", "--times"]
+        words = [*own_module("app.bench.compile_kernels"), "--times"]
         environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
         done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
     spent = {stage: (float(own), float(clock)) for stage, own, clock in map(str.split, done.stdout.splitlines())}

@@ -1,4 +1,4 @@
-"""Places on the bodies to grab in each view: joints with their occlusion, and a dragged point out of reach."""
+"""Places on the bodies in each view: joints to grab, with their occlusion, a dragged point out of reach, and heads."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from tracker.body.model import PosedBody, ahead
 from tracker.evidence.contours import part_edges
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.interchange.exports.faces import around, head_surface
 from tracker.session.session import Session
 
 _SHORT_M = 0.01
@@ -56,6 +57,16 @@ class Handle:
     """Whether it stays in place while others are dragged."""
     side: Side
     """Side of the body."""
+
+
+@dataclass(frozen=True)
+class HeadCircle:
+    """What hides a head in one view, undistorted px."""
+
+    camera: int
+    u: float
+    v: float
+    radius_px: float
 
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
@@ -130,3 +141,17 @@ def dragged_place(session: Session, state: State, drag: DragState) -> Array:
     """Return the dragged place, (3,), metres."""
     T_world_part = session.people[drag.person].model.kinematics(state.poses[drag.person]).Ts_world_part[drag.part]
     return rigid.apply(T_world_part, np.array(drag.place_part))
+
+
+def head_circles(session: Session, state: State, cameras: Collection[int]) -> list[HeadCircle]:
+    """Return the circles of all people in some views, given by index, whether they are drawn or not."""
+    found = []
+    for time, group in at_one_time(picture_times(session, state.frame, cameras)):
+        bodies = [b for b in ahead(bodies_in(session, state), time) if "head" in b.model.part_index]
+        surfaces = [head_surface(body) for body in bodies]
+        for index in group:
+            for px in (session.cameras[index].camera.pinhole.project(surface) for surface in surfaces):
+                if (seen := np.isfinite(px).all(axis=1)).any():
+                    (u, v), radius_px = around(px[seen])
+                    found.append(HeadCircle(index, float(u), float(v), radius_px))
+    return found

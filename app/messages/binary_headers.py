@@ -7,8 +7,7 @@ docstring of each header describes its payload.
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.curves import CurveGroup
-from app.drawing.head_circles import HeadCircle
-from app.drawing.joint_handles import Handle, OutOfReach, Side
+from app.drawing.joint_handles import Handle, HeadCircle, OutOfReach, Side
 from app.drawing.overlays import PathKind
 from app.drawing.pin_marks import PinMark, PinTriangulation
 from app.messages.base import Message, Part, Status

@@ -13,7 +13,6 @@ from app.drawing.epipolar_check import epipolar_check
 from app.drawing.error_ellipses import error_ellipses
 from app.drawing.floor_lines import floor_lines
 from app.drawing.ghosts import copy_lines, former_limb_lines, ghost_lines
-from app.drawing.head_circles import head_circles
 from app.drawing.seen_bodies import bodies_in
 from app.messages import annotation as plan_wire
 from app.messages import search
@@ -160,7 +159,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         paths=tuple(rows),
         outlines=tuple(hulls),
         handles=tuple(handles),
-        heads=tuple(head_circles(session, state.drawn, view.cameras)) if "faces" in view.layers else (),
+        heads=tuple(joint_handles.head_circles(session, state.drawn, view.cameras)) if "faces" in view.layers else (),
         out_of_reach=joint_handles.out_of_reach(session, state),
         pins=tuple(pin_marks.pin_marks(session, state)),
         triangulation=pin_marks.pin_triangulation(session, state),

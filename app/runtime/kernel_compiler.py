@@ -1,14 +1,13 @@
 """Compile missing kernels in a process of their own (`app.bench.compile_kernels`) while the program starts and runs."""
 
 import subprocess
-import sys
 from collections.abc import Sequence
 
 from tracker.compute.interpretation import interpret_modules
 from tracker.compute.kernel_cache import STAGES, compiled_stages, is_compiled
-from tracker.system import end_apart, start_apart
+from tracker.system import end_apart, own_module, start_apart
 
-COMMAND = (sys.executable, "-P", "-m", "app.bench.compile_kernels", "--background")
+COMMAND = (*own_module("app.bench.compile_kernels"), "--background")
 _POSING = "posing"
 
 

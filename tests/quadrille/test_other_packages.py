@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from tracker.system import own_module
+
 OTHERS = "NAME = 'of another project'\n"
 
 
@@ -23,6 +25,13 @@ def run(project, *words):
 
 def test_the_program_runs_from_their_folder(project):
     done = run(project, "-m", "quadrille", "--version")
+    assert (done.returncode, done.stdout.split()[:1]) == (0, ["quadrille"]), done.stderr
+
+
+@pytest.mark.slow
+def test_processes_that_it_starts_find_their_own_packages(project, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(project))
+    done = subprocess.run([*own_module("quadrille"), "--version"], cwd=project, capture_output=True, text=True)
     assert (done.returncode, done.stdout.split()[:1]) == (0, ["quadrille"]), done.stderr
 
 

@@ -36,6 +36,11 @@ def surface():
     for kind in RESULTS:
         names = kind._fields if issubclass(kind, tuple) else [f.name for f in dataclasses.fields(kind)]
         lines += [f"{kind.__name__}.{name}" for name in names]
+        methods = inspect.getmembers(kind, inspect.isfunction)
+        own = [
+            (name, f) for name, f in methods if not name.startswith("_") and f.__qualname__.startswith(kind.__name__)
+        ]
+        lines += [f"{kind.__name__}.{name}{arguments(f)}" for name, f in own]
     return "\n".join(lines) + "\n"
 
 

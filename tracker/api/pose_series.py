@@ -70,7 +70,13 @@ class PoseSeries:
         """
         pandas = require("pandas", "a table of pandas", "make")
         n_frames, n_joints = self.joints.shape[:2]
-        each = {"frame": self.frames, "time_s": self.times_s, "status": self.statuses, "keyframe": self.keyframes}
+        each = {
+            "frame": self.frames,
+            "time_s": self.times_s,
+            "status": self.statuses,
+            "source": self.sources,
+            "keyframe": self.keyframes,
+        }
         columns = {name: np.repeat(values, n_joints) for name, values in each.items()}
         places = {f"{axis}_m": self.joints[..., i].ravel() for i, axis in enumerate("xyz")}
         errors = np.sqrt(np.trace(self.covariances, axis1=-2, axis2=-1)).ravel()
@@ -83,15 +89,17 @@ class PoseSeries:
             FormatError: xarray is not installed.
         """
         xarray = require("xarray", "a dataset of xarray", "make")
-        of_frames = {"frame": self.frames, "status": self.statuses, "keyframe": self.keyframes}
+        of_frames = {
+            "frame": self.frames, "status": self.statuses, "source": self.sources, "keyframe": self.keyframes,
+        }  # fmt: skip
         return xarray.Dataset(
             {
-                "position": (("time", "joint", "axis"), self.joints),
-                "covariance": (("time", "joint", "axis", "axis_2"), self.covariances),
+                "position": (("time", "joint", "axis"), self.joints, {"units": "m"}),
+                "covariance": (("time", "joint", "axis", "axis_2"), self.covariances, {"units": "m2"}),
             },
             {
                 "time": self.times_s, "joint": list(self.names), "axis": list("xyz"), "axis_2": list("xyz"),
                 **{name: ("time", values) for name, values in of_frames.items()},
             },
-            {"person": self.person, "units": "m"},
+            {"person": self.person},
         )  # fmt: skip

@@ -3,7 +3,6 @@
 import os
 import signal
 import subprocess
-import sys
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -12,7 +11,7 @@ from app.cli.doctor import WORKER_BYTES
 from app.runtime.progress import Reporter
 from tracker.batch.manifest import Manifest
 from tracker.errors import TrackerError
-from tracker.system import free_bytes, n_cores, start_apart
+from tracker.system import free_bytes, n_cores, own_module, start_apart
 
 _LOOK_S = 0.5
 _END_S = 10.0
@@ -37,17 +36,8 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
     progress.say(f"{n_open} recordings, {n} {'worker' if n == 1 else 'workers'}")
     compile_kernels(progress)
     environment = {**os.environ, "QUADRILLE_THREADS": str(max(1, n_cores() // n))}
-    words = [
-        sys.executable,
-        "-P",
-        "-m",
-        "quadrille",
-        "batch",
-        str(manifest.folder),
-        "--out",
-        str(manifest.folder),
-        "--work",
-    ]
+    folder = str(manifest.folder)
+    words = [*own_module("quadrille"), "batch", folder, "--out", folder, "--work"]
     logs = manifest.folder / "logs"
     logs.mkdir(exist_ok=True)
     workers = list[subprocess.Popen[bytes]]()
@@ -108,7 +98,7 @@ def compile_kernels(progress: Reporter) -> None:
 
     if not is_compiled():
         progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
-        subprocess.run([sys.executable, "-P", "-m", "app.bench.compile_kernels"], check=False)
+        subprocess.run(own_module("app.bench.compile_kernels"), check=False)
 
 
 def _watch(manifest: Manifest, workers: list[subprocess.Popen[bytes]], progress: Reporter) -> None:

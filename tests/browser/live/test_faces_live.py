@@ -31,4 +31,3 @@ async def test_heads_are_reduced_to_grains_and_all_else_stays(tab):
     await tab.wait_for_timeout(500)
     assert await tab.evaluate(DETAIL, places["head"]) < 0.5 * before["head"]
     assert await tab.evaluate(DETAIL, places["beside"]) == before["beside"]
-    await tab.screenshot(path="/tmp/n/faces.png")

@@ -25,12 +25,6 @@ _MIN_OVERLAP = 0.5
 """Share of the poses that the markers cover at any lag that is tried."""
 _N_PEAKS = 30
 """Number of lags, the likeliest by speed, at which motions are laid over one another."""
-_LAG_SHARE = 0.02
-"""Accuracy with which a lag is sought, frames: less than a tenth of a quarter of a frame."""
-_LONGEST_STEP = 2.0
-"""Longest time between rows across which points are interpolated, usual times between rows."""
-_SAME = 1e-6
-"""Share of the time between two rows by which a time may differ from that of a row."""
 
 
 class MarkerReference(NamedTuple):
@@ -148,9 +142,7 @@ def _lag(times: Array, ours: Array, marker_times: Array, theirs: Array, frame_s:
         return float(np.median(distances(lag_s)[known])) if is_covered else np.inf
 
     bounds = [(start - frame_s, start + frame_s) for start in _starts(times, ours, marker_times, theirs, frame_s)]
-    found = [
-        minimize_scalar(distance_m, bounds=b, method="bounded", options={"xatol": _LAG_SHARE * frame_s}) for b in bounds
-    ]
+    found = [minimize_scalar(distance_m, bounds=b, method="bounded") for b in bounds]
     found.sort(key=lambda f: f.fun)
     if not found or not np.isfinite(found[0].fun):
         raise FormatError(
@@ -232,11 +224,12 @@ def _at(wanted: Array, times: Array, points: Array) -> Array:
     after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
     apart = times[after] - times[after - 1]
     share = ((wanted - times[after - 1]) / apart)[:, None, None]
-    is_gap = (apart > _LONGEST_STEP * np.median(np.diff(times)))[:, None, None]
+    is_gap = (np.rint(apart / np.median(np.diff(times))) > 1)[:, None, None]
+    is_before, is_after = np.isclose(share, 0), np.isclose(share, 1)
     between = (1 - share) * points[after - 1] + share * points[after]
-    found = np.where(share >= 1 - _SAME, points[after], np.where(share <= _SAME, points[after - 1], between))
-    is_outside = (share < -_SAME) | (share > 1 + _SAME) | (is_gap & (share > _SAME) & (share < 1 - _SAME))
-    return np.asarray(np.where(is_outside, np.nan, found))
+    found = np.where(is_after, points[after], np.where(is_before, points[after - 1], between))
+    is_known = is_before | is_after | ((share > 0) & (share < 1) & ~is_gap)
+    return np.asarray(np.where(is_known, found, np.nan))
 
 
 def _rigid(moved: Array, ours: Array) -> Array:

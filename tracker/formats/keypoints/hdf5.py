@@ -7,7 +7,6 @@ within limits of time and memory, and hands back plain arrays.
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -22,6 +21,7 @@ from tracker.files import check_regular
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.keypoints.point_changes import Changes
 from tracker.formats.number_rows import MAX_VALUES
+from tracker.system import own_module
 
 CHANGES, PATCHED = "changes.npz", "patched"
 """Names of the file of changes to a file of key points, and of the copy that gets them, without its suffix."""
@@ -121,7 +121,7 @@ def _answer(path: Path, folder: Path) -> ReadAnswer:
     # Each thread of a library for matrices would take up addresses, which are limited.
     environment = os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     environment |= {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
-    words = [sys.executable, "-P", "-m", "tracker.formats.keypoints.hdf5_process", str(path.resolve()), str(folder)]
+    words = [*own_module("tracker.formats.keypoints.hdf5_process"), str(path.resolve()), str(folder)]
     subprocess.run(
         words, env=environment, timeout=LIMITS.seconds, capture_output=True, check=False, stdin=subprocess.DEVNULL
     )

@@ -32,8 +32,6 @@ _HEAD_SHARE = 0.13
 """Height of the head, body heights (Winter 2009, Fig. 4.1)."""
 _GRAINS = 4
 """Number of grains across a blurred head; a face needs some 16 to be recognized (Harmon & Julesz 1973)."""
-_LEAST_PX = 16.0
-"""Radius of a head of which nothing but some points is known, px: below some 32 px across, faces are not recognized."""
 _FACE = ("nose", "eye", "ear", "head", "face", "mouth", "chin", "brow", "vertex", "fhd", "bhd")
 """Parts of names of points of a head; the last two are of markers around it."""
 
@@ -192,8 +190,8 @@ def _by_points(names: Sequence[str], points_px: Array, head_px: float) -> list[C
         return [around(points_px[known], head_px)]
     is_whole = any("ankle" in name.lower() for name in np.array(names)[known])
     extent = float(np.hypot(*np.ptp(points_px[known], axis=0)))
-    # A person who is seen in part has an extent that says nothing of the size of the head.
-    least = _HEAD_SHARE * extent if is_whole else max(head_px, _HEAD_SHARE * extent, _LEAST_PX)
+    # The extent of a person who is seen in part says nothing of the size of the head; a smaller face is none.
+    least = _HEAD_SHARE * extent if is_whole else max(head_px, _HEAD_SHARE * extent, _GRAINS**2)
     return [around(points_px[known & is_face], least)]
 
 
