@@ -23,9 +23,8 @@ def work_under_way(state: State, stored: StoredWork) -> Iterator[Advice]:
     elif state.finding.running:
         yield _finding(state.finding)
     if state.acquisition.running:
-        yield _work(
-            f"Acquiring the sizes of {stored.people[state.acquisition.person].name}", state.acquisition, "sizes"
-        )
+        text = f"Acquiring the sizes of {stored.people[state.acquisition.person].name}"
+        yield msgspec.structs.replace(_work(text, state.acquisition, "sizes"), is_timed=False)
     for of, (text, work) in {
         "calibration": ("Checking the cameras", state.calibration),
         "clocks": ("Working on the clocks", state.clocks),
@@ -51,7 +50,9 @@ def _stop(of: str) -> Action:
 
 def _finding(finding: FindState) -> Advice:
     if not finding.trying:
-        return _in_chain(_work("Finding people", finding, "find"), finding, finding.step)
+        # Sizes are fitted until nothing moves.
+        advice = msgspec.structs.replace(_work("Finding people", finding, "find"), is_timed=False)
+        return _in_chain(advice, finding, finding.step)
     take = () if finding.takable is None else (Action("take_found", "Take this pose", finding.takable),)
     text = finding.trying[:1].upper() + finding.trying[1:]
     advice = Advice("find", text, (*take, _stop("find")), "work", finding.share, at_most_s=finding.left_s)

@@ -171,6 +171,9 @@ def test_time_is_left_only_where_the_share_grows_evenly():
     """The estimate ends when no pose moves, which nobody knows before."""
     runs = [state(track=TrackState(True, 0, 8, 8, 4, 9, stage=stage)) for stage in ("tracking", "back", "solve")]
     assert [advise(now, TRACKED)[0].is_timed for now in runs] == [True, True, False]
+    sizes = FindState(running=True, steps=("find", "sizes"), step="sizes", stage="acquiring sizes", share=0.4)
+    acquired = AcquisitionState(True, "fitting", 0.4)
+    assert [advise(now, PLACED)[0].is_timed for now in (state(finding=sizes), state(acquisition=acquired))] == [False] * 2
 
 
 def test_nothing_is_said_of_what_is_over():

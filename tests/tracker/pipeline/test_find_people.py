@@ -176,6 +176,15 @@ def test_two_good_frames_whose_heights_agree_end_the_search(
     assert len({t.frame for t in trials} - {None}) == n_tried
 
 
+def test_a_longest_time_is_said_once_no_other_generator_can_follow(session, silhouettes, monkeypatch):
+    """Others take another time, which nobody knows before."""
+    _, trials = searched(session, monkeypatch, [DOUBTFUL, GOOD, DOUBTFUL, DOUBTFUL], [(1.8, 1.6)] * 4)
+    known = [t.left_s is not None for t in trials if t.frame is not None]
+    assert known == [False, False, True, True]
+    _, doubtful = searched(session, monkeypatch, [DOUBTFUL] * 4, [(1.8, 1.6)] * 4)
+    assert not any(t.left_s is not None for t in doubtful if not t.generators)
+
+
 def test_a_search_shows_its_frames_and_can_be_ended_with_the_best(session, silhouettes, monkeypatch):
     def take(trying):
         if trying.number == 3:

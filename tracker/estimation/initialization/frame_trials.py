@@ -59,7 +59,8 @@ class Trying(NamedTuple):
     n_figures: int | None
     """Number of people's figures on the frame; None before they are found."""
     left_s: float | None
-    """Longest time that the search still takes, s, by what trials took so far; None before the first has ended."""
+    """Longest time that the search still takes, s, by what trials took so far; None before the first has ended, and
+    while no start is good and other generators may follow."""
     best: FirstPoses | None
     """The best poses so far, of any frame."""
 
@@ -166,7 +167,7 @@ class _Trial:
             )
         self._show, self._ended = show, threading.Event()
         self.found, self._errors = list[FirstPoses](), list[TrackerError]()
-        self._pace, self._n_figures = PartPace(), dict[int, int]()
+        self._n_figures = dict[int, int]()
         self.begin(1, 0)
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
         self._finder = SilhouetteFinder(session.cameras, observer.recording, step=self._step)
@@ -192,16 +193,18 @@ class _Trial:
             generators: names of unusual ones.
         """
         self._frame: int | None = None
+        self._pace = PartPace()  # other generators take another time
         self._number, self._n_done, self._n_frames, self._n_later = 0, 0, n_frames, n_later
         self._generators = generators
 
     def _step(self) -> None:
         if self._ended.is_set():
             raise _EndedError
-        n_left = self._n_frames - self._n_done + (0 if self.has_good else self._n_later)
         best = self.best() if self.found else None
         seen = None if self._frame is None else self._n_figures.get(self._frame)
-        left_s, of = self._pace.left_s(n_left), (self._number, self._n_frames, self._generators)
+        is_last = self.has_good or not self._n_later  # nobody knows how long other generators take
+        left_s = self._pace.left_s(self._n_frames - self._n_done) if is_last else None
+        of = (self._number, self._n_frames, self._generators)
         self._show(Trying(self._frame, *of, seen, left_s, best))
 
     def _source(self, silhouettes: Silhouettes, floor: GroundPlane) -> "Source":
