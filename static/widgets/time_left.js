@@ -49,7 +49,7 @@ export class TimeLeft {
  * @param {number} seconds
  */
 export function timeText(seconds) {
-  if (seconds < 5) return "a few seconds left";
+  if (seconds < 10) return "a few seconds left"; // steps of five are half of it
   if (seconds < 90) return `${5 * Math.ceil(seconds / 5)} s left`;
   const minutes = Math.ceil(seconds / 60);
   return minutes < 100 ? `${minutes} min left` : `${Math.round(minutes / 60)} h left`;
