@@ -578,7 +578,7 @@ class FakeEndpoint:
                 add(camera, 0, "epipolar", "#ff5d8f", np.array([[0, v, WIDTH - 1, v]]))
         header = {
             "type": "overlay", "frame": self.state["frame"], "seq": self.seq, "job": candidate is not None,
-            "paths": paths, "outlines": [], "handles": handles, "pins": [], "triangulation": None,
+            "paths": paths, "outlines": [], "handles": handles, "heads": [], "pins": [], "triangulation": None,
             "out_of_reach": self.out_of_reach,
         }  # fmt: skip
         await self.send_binary(header, np.concatenate(segments).astype("<f4").tobytes(), sockets)
