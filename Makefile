@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 PIP_INSTALL := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile --constraint constraints.txt --editable
 SITE := $(VENV)/site
 # Interpreters that a release is tried with.
-RELEASE_PYTHONS ?= $(foreach version,3.11 3.12 3.13,$(shell python$(version) -c $(WHERE) 2>/dev/null))
+RELEASE_PYTHONS ?= $(foreach version,3.11 3.12 3.13 3.14,$(shell python$(version) -c $(WHERE) 2>/dev/null))
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := quadrille app tracker tests
 # Set by `test` to what shows one line of a step.

@@ -30,7 +30,8 @@ INTERPRETERS = os.environ.get("QUADRILLE_RELEASE_PYTHONS", "").split()
 LINKED = "linked"
 MOST_BYTES = 12e6
 """Size of the wheel: 8 MB of bundled footage, which hardly compresses, and 2 MB of code with room to double."""
-FOLDERS = {"app": "app", "tracker": "tracker", "static": "app/static", "sample_sessions": "app/sample_sessions"}
+FOLDERS = {name: name for name in ("quadrille", "app", "tracker")}
+FOLDERS |= {name: f"app/{name}" for name in ("static", "sample_sessions")}
 """Folders of the repository, and their places in the wheel."""
 DOCUMENTS = {"README.md", "CHANGELOG.md", "LICENSE", "SECURITY.md", "CITATION.cff"}
 EVERY_HELP = """
@@ -44,7 +45,7 @@ for name in _COMMANDS:
     except SystemExit as end:
         assert not end.code, name
 """
-WHERE = "import app, tracker; print(app.__file__, tracker.__file__)"
+WHERE = "import app, quadrille, tracker; print(app.__file__, quadrille.__file__, tracker.__file__)"
 
 
 def account(home):

@@ -20,11 +20,11 @@ FRAMES = "0:3"
 @pytest.fixture
 def recording(tmp_path):
     """Three cameras, their calibration, the empty scene and reference joints, named as there."""
-    (tmp_path / "empty").mkdir()
+    (tmp_path / "recording" / "background").mkdir(parents=True)
     calibration = (SAMPLE / "calibration.toml").read_text("utf-8")
     for old, new in CAMERAS.items():
-        shutil.copy(SAMPLE / f"{old}.mp4", tmp_path / f"{new}.mp4")
-        shutil.copy(SAMPLE / "background" / f"{old}.png", tmp_path / "empty" / f"{new}.png")
+        shutil.copy(SAMPLE / f"{old}.mp4", tmp_path / "recording" / f"{new}.mp4")
+        shutil.copy(SAMPLE / "background" / f"{old}.png", tmp_path / "recording" / "background" / f"{new}.png")
         calibration = calibration.replace(f"[{old}]", f"[{new}]").replace(f'"{old}"', f'"{new}"')
     sections = [section for section in re.split(r"^(?=\[)", calibration, flags=re.MULTILINE) if "LEFT" not in section]
     (tmp_path / "calibration.toml").write_text("".join(sections), "utf-8")

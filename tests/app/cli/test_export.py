@@ -130,7 +130,7 @@ def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--format", "fbx"], ["a format among trc, csv, mot, coco, bvh, glb, c3d", "found 'fbx'", "--format"]),
+        (["--format", "fbx"], ["a format among trc, csv, mot, coco, bvh, glb", "found 'fbx'", "--format"]),
         (["--format", "trc", "--out", "{}/a.csv"], ["--out to end in .trc", "'a.csv'", "rename it to a.trc"]),
         (["--out", "{}/a"], ["a format among", "no known suffix in 'a'"]),
         (["--out", "{}/none/a.trc"], ["in a folder that exists", "none"]),
@@ -140,6 +140,7 @@ def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
         (["--frames", "2", "--keyframes-only"], ["in frames 2, found none that is a keyframe", "--keyframes-only"]),
         (["--frames", "3:4", "--person", "ann"], ["expected poses of 'ann' in frames 3:4, found none"]),
         (["--frames", "5:6", "--person", "bob", "--skip-lost"], ["found none that is not lost"]),
+        (["--blur-faces"], ["expected --blur-faces with pictures, found format trc, which writes none"]),
         (["--view", "cam0"], ["expected no option 'view' with format trc", "it takes axes, units"]),
         (
             ["--format", "mot", "--out", "{}/a.mot", "--units", "mm"],
