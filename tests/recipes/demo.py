@@ -22,6 +22,7 @@ PAGE = """<!doctype html>
 <html lang="en">
 <meta charset="utf-8" />
 <meta name="viewport" content="width=device-width, initial-scale=1" />
+<link rel="icon" href="data:," />
 <title>Quadrille: what it does, without installing it</title>
 <style>
   :root {{ color-scheme: dark light; font: 16px/1.5 system-ui, sans-serif; }}
