@@ -23,7 +23,7 @@ from typing import Any
 import psutil
 
 IS_PORTABLE = sys.platform == "win32" or os.environ.get("QUADRILLE_PORTABLE") == "1"
-"""Whether neither Unix sockets, nor forks, nor what Linux tells of processes are used."""
+"""Whether neither Unix sockets, nor forks, nor the files in `/proc` of Linux are used."""
 _IS_LINUX = sys.platform.startswith("linux") and not IS_PORTABLE
 FORKS = _IS_LINUX
 """Whether a process may begin as a copy of this one. macOS has forks that its own libraries do not survive."""
@@ -86,7 +86,7 @@ def open_unlinked(path: Path) -> int:
 
 
 def is_mine(found: os.stat_result) -> bool:
-    """Return whether a file is of this account, where the system tells."""
+    """Return whether a file is of this account; files of Windows always are."""
     return not hasattr(os, "getuid") or found.st_uid == os.getuid()
 
 

@@ -61,7 +61,7 @@ class Handle:
 
 @dataclass(frozen=True)
 class HeadCircle:
-    """What hides a head in one view, undistorted px."""
+    """A circle that hides a head in one view, undistorted px."""
 
     camera: int
     u: float

@@ -24,7 +24,7 @@ SECRET = "X-Quadrille-Secret"
 
 
 class ViserPlace(NamedTuple):
-    """Where viser is reached."""
+    """The place at which viser is reached."""
 
     path: Path | None
     """Its Unix socket; None where the system has none."""
@@ -48,7 +48,7 @@ class PrivateViser:
         A later `configure_theme` must pass `show_share_button=False` again.
 
         Raises:
-            TrackerError: viser did not listen where it was told; nothing listens then.
+            TrackerError: viser listens on another port than the given one; it is stopped then.
         """
         self._folder = _private_folder()
         try:

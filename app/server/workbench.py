@@ -191,7 +191,7 @@ async def _until_interrupted(serving: Coroutine[Any, Any, None], is_chosen: asyn
     for number in (signal.SIGINT, *ENDING_SIGNALS) if is_program else ():
         try:
             loop.add_signal_handler(number, task.cancel)
-        except NotImplementedError:  # not of all systems
+        except NotImplementedError:  # loops of Windows have no such handlers
             signal.signal(number, lambda *_: loop.call_soon_threadsafe(task.cancel))
     await asyncio.wait({task, choice}, return_when=asyncio.FIRST_COMPLETED)
     if not choice.cancel():

@@ -44,7 +44,8 @@ def with_site_links(text: str, source: str, place: str) -> str:
 def build(out: Path) -> None:
     """Build the site; a warning is an error."""
     with tempfile.TemporaryDirectory() as temporary:
-        docs = shutil.copytree(ROOT / "docs", Path(temporary) / "docs", ignore=shutil.ignore_patterns("site", "examples"))
+        is_left_out = shutil.ignore_patterns("site", "examples")
+        docs = shutil.copytree(ROOT / "docs", Path(temporary) / "docs", ignore=is_left_out)
         sources = {f"docs/{p.relative_to(docs).as_posix()}": p.relative_to(docs).as_posix() for p in docs.rglob("*.md")}
         for source, place in (sources | OUTSIDE).items():
             text = (ROOT / source).read_text("utf-8")

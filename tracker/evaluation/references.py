@@ -57,18 +57,34 @@ def read_joints(
             at several frames.
     """
     given = read_joint_map(joint_map) if joint_map is not None else None
+    asked = tuple(given.markers.values()) if given else ()
+    table, where = read_person(path, fps, asked, "joints")
+    placed = place_rows(remap_axes(table, axes), where, fps, known)
+    names, mapping = name_points(placed.names, given, str(path))
+    return joints_of(replace(placed, names=names), str(path), mapping if names != placed.names else given)
+
+
+def read_person(path: Path, fps: float | None, asked: Sequence[str], kind: str) -> tuple[MarkerTable, str]:
+    """Return the points of the only person in a file, as they stand in it, and how messages name the file.
+
+    Args:
+        path: the file, of any layout of points in space that `observations.readers` lists.
+        fps: frame rate of the session, 1/s; None if the file must have its own.
+        asked: names of points that are looked for, for files that put subjects before names.
+        kind: what the points are: "joints" or "markers".
+
+    Raises:
+        FormatError: the file is malformed, has no points in space, or has several people.
+    """
     layout, files = find_files([path])
     where = f"{FORMATS[layout].program} file {path}"
     if layout not in SPACE_FORMATS:
-        raise FormatError(f"expected joints in space, found the {where}; import it, or choose another file")
+        raise FormatError(f"expected {kind} in space, found the {where}; import it, or choose another file")
     read = SPACE_FORMATS[layout].read([file for file, _ in files], None, fps)
-    asked = tuple(given.markers.values()) if given else ()
     tables = [own for _, table in read for own in by_subject(table, asked)]
     if len(tables) != 1:
-        raise FormatError(f"{where}: expected the joints of one person, found those of {len(tables)}; keep one in it")
-    placed = place_rows(remap_axes(tables[0], axes), where, fps, known)
-    names, mapping = name_points(placed.names, given, str(path))
-    return joints_of(replace(placed, names=names), str(path), mapping if names != placed.names else given)
+        raise FormatError(f"{where}: expected the {kind} of one person, found those of {len(tables)}; keep one in it")
+    return tables[0], where
 
 
 def placement(session: Session, first_frame: int | None = None, clock: Clock | None = None) -> Placement:

@@ -12,12 +12,10 @@ from tracker.estimation.fitting.keypoints import GROSS_SIGMAS
 from tracker.evaluation.markers.joint_centres import joint_centres
 from tracker.evaluation.markers.marker_set import LANDMARKS, read_marker_set
 from tracker.evaluation.metrics import best_rigid
-from tracker.evaluation.references import Reference
-from tracker.formats.joint_tables.subjects import by_subject
+from tracker.evaluation.references import Reference, read_person
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.interchange.observations.readers import FORMATS, SPACE_FORMATS, find_files
 from tracker.interchange.plausibility.body_likelihood import PRIORS
 from tracker.interchange.plausibility.lags import find_lag
 
@@ -82,16 +80,8 @@ def read_centres(path: Path, marker_set: str) -> MarkerTable:
         FormatError: see `read_marker_reference`.
     """
     chosen = read_marker_set(marker_set)
-    layout, files = find_files([path])
-    if layout not in SPACE_FORMATS:
-        found = f"{FORMATS[layout].program} file {path}"
-        raise FormatError(f"expected markers in space, found the {found}; choose another file")
     asked = [name for landmark in LANDMARKS for name in chosen.names(landmark)]
-    read = SPACE_FORMATS[layout].read([file for file, _ in files], None, None)
-    tables = [own for _, table in read for own in by_subject(table, asked)]
-    if len(tables) != 1:
-        raise FormatError(f"{path}: expected the markers of one person, found those of {len(tables)}; keep one in it")
-    (table,) = tables
+    table, _ = read_person(path, None, asked, "markers")
     column = {name: i for i, name in enumerate(table.names)}
     landmarks = {
         landmark: table.points[:, column[name]]
