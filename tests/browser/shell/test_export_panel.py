@@ -64,7 +64,7 @@ async def test_a_format_is_chosen_and_its_file_downloaded(fresh_page):
     async with page.expect_event("console"):  # the browser reports each answer of 400
         await page.click("#export-start")
     await shows(page, "document.querySelector('#export-progress.is-failed')?.textContent.includes('found none')")
-    assert asked[-1] == "/bvh?person=person+1&axes=y-up&units=m&frames=5%3A6&skip_lost=1"
+    assert "/bvh?person=person+1&axes=y-up&units=m&frames=5%3A6&skip_lost=1" in asked
     page.errors.clear()
     await page.select_option("#export-format", "mp4")
     assert await labels.all_inner_texts() == [
