@@ -61,7 +61,7 @@ class ExportArguments:
     pixels: Annotated[Literal["original", "undistorted"] | None, _choice("original|undistorted")] = None
     """openpose, masks, dataset: of the footage (default), or without distortion, with such pictures and cameras."""
     mesh: Annotated[Literal["ply", "obj", "stl", "glb"] | None, _choice("ply|obj|stl|glb")] = None
-    """meshes, hulls: format of the files, by default ply."""
+    """meshes, hulls: format of the files, by default ply; glb is y-up, in metres."""
     blur_faces: bool = False
     """mp4, gif, webp, dataset, scene, undistorted pictures: blur the heads of all people who are known."""
     split: Names = ()

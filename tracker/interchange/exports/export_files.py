@@ -30,6 +30,8 @@ _HOLDER = ".holder"
 """Name of a file in the temporary folder of an export: the program that makes it (`tracker.session.holder`)."""
 _BEFORE = ".before"
 """End of the name of a folder that is being replaced."""
+_OF_GLTF = {"axes": "y-up", "units": "m"}
+"""Axes and unit of all glTF files (glTF 2.0, Sect. 3.4)."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,9 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
             load_character(value)
         elif value not in allowed[name]:
             raise TrackerError(f"expected --{name} to be one of {', '.join(allowed[name])}, found '{value}'")
+    for name, value in _OF_GLTF.items() if values.get("mesh") == "glb" else ():
+        if values.setdefault(name, value) != value:
+            raise TrackerError(f"expected --{name} {value} with --mesh glb, as glTF has it, found '{values[name]}'")
     return replace(ExportOptions(chosen.axes, chosen.units), **values)  # pyrefly: ignore[bad-argument-type]
 
 

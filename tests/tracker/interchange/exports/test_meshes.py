@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from bodies import MODELS
+from gltf_validator import check_gltf
 from stored_motions import filmed, store_motion
 from true_poses import sample_with_poses
 
@@ -62,6 +63,28 @@ def test_a_scene_has_bodies_and_the_pictures_of_the_cameras_where_they_see(tmp_p
     expected = rigid.apply(T, surface(truth[0][1]))
     assert (vertices >= expected.min(axis=0) - 1e-4).all()
     assert (vertices <= expected.max(axis=0) + 1e-4).all()
+
+
+@pytest.mark.slow
+def test_the_khronos_validator_finds_no_error_in_bodies_and_scenes(tmp_path, couple):
+    motion = read_motion(couple[0], (0, 1), [1])
+    write_scene(motion, ExportOptions("y-up"), [tmp_path / "a.glb"], lambda: None)
+    write_bodies(motion, ExportOptions("y-up", mesh="glb"), [tmp_path / "m"], lambda: None)
+    for path in (tmp_path / "a.glb", *(tmp_path / "m").iterdir()):
+        check_gltf(path)
+
+
+def test_bodies_as_gltf_stand_as_it_says(tmp_path, couple):
+    (folder,) = quadrille.export(couple[0], tmp_path / "m", "meshes", frames=[1], options={"mesh": "glb"})
+    low, high = trimesh.load(folder / "ann_000001.glb", force="mesh").bounds
+    expected = rigid.apply(file_from_world(couple[0], "y-up"), surface(couple[1][0][1]))
+    np.testing.assert_allclose([low, high], [expected.min(axis=0), expected.max(axis=0)], atol=1e-5)
+
+
+@pytest.mark.parametrize("option", [{"axes": "calibration"}, {"units": "mm"}])
+def test_other_axes_and_units_of_gltf_are_refused(tmp_path, couple, option):
+    with pytest.raises(TrackerError, match=r"expected --(axes y-up|units m) with --mesh glb, as glTF has it, found"):
+        quadrille.export(couple[0], tmp_path / "m", "meshes", options={"mesh": "glb", **option})
 
 
 def test_a_scene_of_several_frames_is_refused(tmp_path, couple):
