@@ -12,6 +12,8 @@ from hypothesis import configuration, settings
 
 from tracker.formats.model_toml import load_model
 
+# Until all tests are collected: it would go through them again and again, a fifth of the time.
+gc.disable()
 # Programs that tests start remember their sessions there, not in the user's list.
 os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / "quadrille-test-state")
 # Stores sync each commit: in memory the tests need a sixth less time. Those of one run take 0.7 GB.
@@ -76,6 +78,7 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(*GC_THRESHOLDS)
+    gc.enable()
 
 
 @pytest.fixture(autouse=True)

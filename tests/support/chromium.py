@@ -4,11 +4,10 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
-from playwright.sync_api import sync_playwright
-
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+SHELL = "chromium-headless-shell"
+"""Chromium without windows: a third less processor time."""
+NAMES = (SHELL, "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = [
     "--no-sandbox",
     "--use-gl=angle",
@@ -33,20 +32,12 @@ def install():
     """Install Chromium by the system's packages where that is allowed, else Playwright's own."""
     root = [] if os.geteuid() == 0 else ["sudo", "-n"]
     if shutil.which("apt-get") and (not root or shutil.which("sudo")):
-        commands = ([*root, "apt-get", *arguments] for arguments in (["update"], ["install", "-y", "chromium"]))
-        if all(subprocess.run(command, check=False).returncode == 0 for command in commands):
-            return
-    subprocess.run([sys.executable, "-m", "playwright", "install", "chromium"], check=True)
+        for arguments in (["update"], ["install", "-y", SHELL], ["install", "-y", "chromium"]):
+            done = subprocess.run([*root, "apt-get", *arguments], check=False)
+            if done.returncode == 0 and arguments[0] == "install":
+                return
+    subprocess.run([sys.executable, "-m", "playwright", "install", "--only-shell", "chromium"], check=True)
 
 
-def main():
-    if chromium_path():
-        return
-    with sync_playwright() as playwright:
-        has_own = Path(playwright.chromium.executable_path).exists()
-    if not has_own:
-        install()
-
-
-if __name__ == "__main__":
-    main()
+if __name__ == "__main__" and not chromium_path():
+    install()

@@ -113,6 +113,7 @@ def test_lenses_are_taken_and_a_lacking_height_is_said(run, footage, tmp_path):
     assert "the world has z up" in text
 
 
+@pytest.mark.slow
 def test_footage_without_a_person_is_refused(run, footage, tmp_path):
     videos = [footage / c.name for c in CAMERAS]
     result = run("calibrate", "--silhouettes", "--videos", *videos, "--out", tmp_path / "c.toml", "--json")

@@ -153,6 +153,7 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
         assert [row.frame for row in store.frames("person")] == [0, 2]
 
 
+@pytest.mark.slow
 def test_the_contour_method_reports_its_normal_matrices(run, session):
     run("init", session, *WITH_POSE)
     words = ("track", session, "--frames", "0:2", "--method", "contour", "--paper")
@@ -183,6 +184,7 @@ def test_tracking_says_that_kernels_may_have_to_be_compiled(run, session, tmp_pa
     assert ("it may take a minute or two" in run("track", session, "--frames", "0:2")[2]) is not compiled
 
 
+@pytest.mark.slow
 def test_tracking_leaves_what_is_locked(run, session):
     run("init", session, *WITH_POSE, "--frame", "0")
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:

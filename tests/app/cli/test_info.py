@@ -4,6 +4,7 @@ import json
 from contextlib import closing
 
 import numpy as np
+import pytest
 from command_line import WITH_POSE, output_of
 
 from tracker.footage.start_times import StartTime, time_code_frames
@@ -14,6 +15,7 @@ from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 
 
+@pytest.mark.slow
 def test_poses_of_an_earlier_calibration_are_counted(run, session):
     for frame in (3, 4):
         assert run("init", session, *WITH_POSE, "--frame", frame)[0] == 0

@@ -56,6 +56,7 @@ def imported(run, session, tmp_path, monkeypatch, film_once):
     return session
 
 
+@pytest.mark.slow
 def test_exchanged_legs_come_first(run, imported):
     report = json.loads(output_of(run("judge", imported, "--of", "net", "--json")))
     assert [f["frame"] for f in report["frames"]] == list(FRAMES)
@@ -85,5 +86,6 @@ def test_the_report_is_one_file_with_pictures(run, imported, tmp_path):
     assert path.read_text("utf-8") == text
 
 
+@pytest.mark.slow
 def test_unknown_observations_are_refused(run, imported):
     assert_refused(run("judge", imported, "--of", "other"), ["other", "net"])

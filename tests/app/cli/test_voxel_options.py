@@ -38,6 +38,7 @@ def test_init_by_voxels_refuses_sizes_that_show_no_limbs(run, session):
     assert not (session / "annotations.sqlite").exists()
 
 
+@pytest.mark.slow
 def test_people_are_not_searched_with_one_camera(run, tmp_path):
     words = ("new", tmp_path / "s", "--calibration", SAMPLE / "calibration.toml", "--videos", SAMPLE / "FRONT.mp4")
     out = output_of(run(*words))

@@ -58,6 +58,7 @@ async def at(page, frame):
     await shows(page, f"quadrille.state.target === {frame} && quadrille.state.state.frame === {frame}")
 
 
+@pytest.mark.slow
 async def test_tasks_are_counted_filtered_and_gone_through_by_a_key(page, endpoint, section):
     height = await page.locator("#timeline").evaluate("(element) => element.offsetHeight")
     await opened(page, endpoint)

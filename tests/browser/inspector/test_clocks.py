@@ -25,6 +25,7 @@ async def opened(page, endpoint):
     return found
 
 
+@pytest.mark.slow
 async def test_the_chosen_camera_is_nudged_and_a_clear_estimate_taken(page, endpoint):
     section = await opened(page, endpoint)
     fps = await page.evaluate("quadrille.state.session.fps")

@@ -32,6 +32,7 @@ async def test_after_another_start_the_page_goes_back_to_its_frame_and_person(br
     await page.context.close()
 
 
+@pytest.mark.slow
 async def test_a_lost_connection_is_said_and_mended_with_the_true_state(browser, endpoint, blank_viser):
     app = create_app(endpoint, blank_viser, Access(), static_folder())
     page = await (await browser.new_context()).new_page()

@@ -387,6 +387,7 @@ async def pulled(page, locator, dx, dy):
     await drag_mouse(page, (x, y), (x + dx, y + dy))
 
 
+@pytest.mark.slow
 async def test_panes_are_resized_by_their_borders_and_corners(page):
     automatic = await sizes_of(page)
     middle = await page.evaluate("quadrille.state.views[0]")

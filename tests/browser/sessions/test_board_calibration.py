@@ -51,6 +51,7 @@ async def test_a_calibration_is_shown_and_taken_into_the_form_of_a_new_session(f
     await until(lambda: (program.surveyed[-1]["calibration"], program.surveyed[-1]["up"]) == (CALIBRATED["out"], "-y"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["#stop-calibration", "#close-board-calibration"])
 async def test_a_calibration_that_is_stopped_or_closed_ends_its_request(form, how):
     page, program = form

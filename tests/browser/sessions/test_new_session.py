@@ -48,6 +48,7 @@ async def test_files_are_chosen_in_a_dialog(form):
     assert not await page.locator("#new-session").is_visible()
 
 
+@pytest.mark.slow
 async def test_several_files_of_one_calibration_are_marked(form):
     page, program = form
     await page.fill("#new-footage", "/data/videos")

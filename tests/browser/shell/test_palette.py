@@ -276,6 +276,7 @@ async def test_one_frame_without_a_pose_is_a_page_too(browser, endpoint, address
     await page.context.close()
 
 
+@pytest.mark.slow
 async def test_a_key_is_changed_in_the_list_and_kept_in_the_file(page, endpoint, keys_file):
     keys_file.write_text("Sideways = 3\n")  # a line that the page cannot read stays
     await page.keyboard.press("?")

@@ -39,6 +39,7 @@ def labels(folder):
         return [entry.label for entry in store.history()]
 
 
+@pytest.mark.slow
 def test_a_task_that_died_before_its_result_does_not_track_again(manifest, tmp_path):
     (task,) = manifest.tasks
     first = do_task(task, manifest.folder, lambda stage, share: None)

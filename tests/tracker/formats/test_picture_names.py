@@ -56,6 +56,7 @@ def test_numbers_of_cameras_objects_and_people_are_labels(pattern):
     assert len({(f.label, f.number) for f in found.values()}) == len(names)
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.integers(0, 99_999), min_size=2, max_size=20, unique=True),
     st.sampled_from(["", "left", "cam3_", "A1-", "2024-05-01_"]),

@@ -92,6 +92,7 @@ def test_a_clock_that_changes_within_the_recording_has_lost_whole_frames(n, word
     check.require_applicable([(SimpleNamespace(cost=2.0), SimpleNamespace(cost=1.0))])
 
 
+@pytest.mark.slow
 def test_a_camera_that_was_turned_within_the_recording_is_not_corrected():
     check = check_calibration(Seen([*viewed({}, range(5)), *viewed({1: turned(yaw_deg=1.0)}, range(5, 10))]))
     assert (check.since, check.lost) == ({"cam1": 5}, {})

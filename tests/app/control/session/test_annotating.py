@@ -89,6 +89,7 @@ def test_the_plan_is_there_after_a_restart(opened):
     wait_for(lambda: len(controller.state.annotation.tasks) == 3)
 
 
+@pytest.mark.slow
 def test_the_next_click_needs_poses_and_then_follows_the_error(controller):
     controller.proposing.start()
     wait_for(lambda: controller.state.annotation.proposed.number == 1)

@@ -95,6 +95,7 @@ def test_nothing_is_started_where_all_is_compiled(opened, empty_cache, monkeypat
     assert KernelCompiler().stages == frozenset(STAGES)
 
 
+@pytest.mark.slow
 def test_closing_ends_the_program_and_what_it_started(empty_cache):
     file = empty_cache / "child"
     compiler = KernelCompiler((*WITH_CHILD, str(file)))
@@ -150,6 +151,7 @@ def test_one_program_compiles_at_a_time(empty_cache, monkeypatch):
     assert not calls
 
 
+@pytest.mark.slow
 def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monkeypatch):
     """All of them, by tracking: those that two people need, the paper's search, and a room without a background."""
     tracked, priorities, stages, waited_for, beside = [], [], [], [], []

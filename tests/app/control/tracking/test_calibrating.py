@@ -61,6 +61,7 @@ def tracked(controller, tracker, until):
     tracker.track(controller, until=until, frames=until + 1)
 
 
+@pytest.mark.slow
 def test_poses_of_an_earlier_calibration_alone_are_tracked_again(placed, tracker):
     tracked(placed, tracker, 9)
     corrected(placed)

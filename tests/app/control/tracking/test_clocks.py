@@ -97,6 +97,7 @@ def test_an_estimate_without_evidence_ends_with_its_sentence(controller):
         assert (controller.state.clocks.failed, said in controller.state.clocks.message) == (True, True)
 
 
+@pytest.mark.slow
 def test_without_poses_the_pictures_show_a_fast_moment(controller):
     controller.clocks.find_moment((FRONT, BACK))
     wait_for(lambda: controller.state.clocks.moment)

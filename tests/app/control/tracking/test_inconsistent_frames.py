@@ -75,6 +75,7 @@ def test_a_view_contradicts_a_keyframe_until_it_is_confirmed_or_changed(steady, 
     assert checked(again).keyframes == ()
 
 
+@pytest.mark.slow
 def test_an_assessment_makes_a_keyframe_doubted_until_it_is_confirmed_marked_or_undone(steady):
     controller, place = steady
     values, saver = place(KEY, keyframe=True), controller.session_state.saver

@@ -77,6 +77,7 @@ def detector(controller, monkeypatch):
     return fake
 
 
+@pytest.mark.slow
 def test_detected_people_are_stored_and_shown(controller, detector):
     n = controller.session.n_frames
     for name in ("detected", "detected 2"):
@@ -172,6 +173,7 @@ def covered(controller):
     return min(view.silhouette.inside.mean() for view in evidence)
 
 
+@pytest.mark.slow
 def test_masks_are_used_at_once_in_place_of_the_background(controller, tmp_path):
     session = controller.session
     assert 0.001 < covered(controller) < 0.2

@@ -41,7 +41,10 @@ def shown(controller, frame):
     return [message.cost_px, *message.view_costs_px]
 
 
-@pytest.mark.parametrize("words", [(), ("--paper",), ("--cameras", "RIGHT", "BACK", "LEFT")])
+@pytest.mark.parametrize(
+    "words",
+    [(), *(pytest.param(w, marks=pytest.mark.slow) for w in (("--paper",), ("--cameras", "RIGHT", "BACK", "LEFT")))],
+)
 def test_each_place_has_the_same_cost_of_a_tracked_pose(run, session, opened, tmp_path, words):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     out = output_of(run("track", session, "--frames", f"0:{len(FRAMES)}", *words, "--json"))

@@ -68,6 +68,7 @@ def test_clicks_two_pixels_off_tilt_it_little_and_more_views_make_it_surer(opene
     assert controller.state.floor.picking.picks[0].error_px > 0.5
 
 
+@pytest.mark.slow
 def test_applied_it_is_kept_turns_who_stands_and_can_be_gone_back_from(opened, session):
     controller = opened()
     before = (session / "session.toml").read_text()

@@ -50,6 +50,7 @@ def test_it_lies_under_people_who_stand_about(stands):
     assert floor.n_places >= 9
 
 
+@pytest.mark.slow
 def test_frames_in_the_air_do_not_count(stands):
     about = [(x, y, 0.7 * x) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)]
     person = {k: stands(*place, raised=0.25 * (k % 3 == 1)) for k, place in enumerate(about)}
@@ -58,6 +59,7 @@ def test_frames_in_the_air_do_not_count(stands):
     assert floor.plane.offset_m == pytest.approx(HEIGHT_M, abs=0.002)
 
 
+@pytest.mark.slow
 def test_a_row_of_steps_shows_no_plane(stands):
     row = {k: stands(0.2 * k, 0.0, turn, 1e-4 * k) for k, turn in enumerate((0.01, -0.02, 0.01, 0.0, -0.01, 0.02))}
     with pytest.raises(TrackerError, match=r"expected feet that stood far from one line, found them within \d+ cm of"):

@@ -168,6 +168,7 @@ def test_a_board_at_one_distance_tells_no_focal_length():
     assert "film the board nearer, farther and tilted" in found.notes[0]
 
 
+@pytest.mark.slow
 def test_a_focal_length_that_is_as_good_as_unknown_is_refused():
     with pytest.raises(CalibrationError, match=r"focal length of camera 'a' to 10% at least, found .* of 20%"):
         calibrate_rig(*at_one_distance(0.01))

@@ -56,6 +56,7 @@ def test_errors_that_agree_within_stretches_are_found(agreement):
     assert equations.agreement(np.zeros((n, n))) == pytest.approx(max(agreement, 1.0), rel=0.2)
 
 
+@pytest.mark.slow
 def test_unknown_lenses_add_to_the_error():
     known = adjusted(hulls_of())
     means = tuple(replace(b, T_world_camera=c.T_world_camera) for b, c in zip(blanks(CAMERAS), CAMERAS, strict=True))

@@ -51,6 +51,7 @@ def dataset(tmp_path_factory, three):
     return out, summaries
 
 
+@pytest.mark.slow
 def test_pycocotools_reads_the_files_of_all_recordings_as_one(tmp_path, three, dataset):
     out, summaries = dataset
     joined = {"images": [], "annotations": [], "categories": None}

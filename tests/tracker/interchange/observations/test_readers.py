@@ -184,6 +184,7 @@ def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
         assert caught.value.remedy == Remedy("install_extra", extra="import")
 
 
+@pytest.mark.slow
 def test_a_library_that_hangs_or_dies(tmp_path, monkeypatch):
     (tmp_path / "a.slp").write_bytes(b"x")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

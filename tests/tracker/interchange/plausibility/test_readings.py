@@ -91,6 +91,7 @@ def test_lags_are_named_where_they_matter(case, lag):
     assert all(abs(frame + lag) <= 1 for frame in fields(problems, "frame")), problems
 
 
+@pytest.mark.slow
 def test_points_in_the_order_of_another_skeleton_are_refused(case):
     """Skeletons with as many points, or more of which the first are taken."""
     own = case.skeleton.counterparts(case.skeleton.points)

@@ -43,6 +43,7 @@ def test_the_same_seed_furnishes_the_same_room_and_another_another():
     assert np.mean(np.abs(first - other) > 0.05) > 0.05
 
 
+@pytest.mark.slow
 def test_rooms_of_each_kind_look_different():
     camera = make_cameras(4, SIZE, 0)[1]
     images = {kind: see_room(camera, 0, kind).image for kind in ROOMS}
