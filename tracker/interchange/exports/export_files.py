@@ -72,7 +72,7 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
             raise TrackerError(f"expected --{name} to be one of {', '.join(allowed[name])}, found '{value}'")
     for name, value in _OF_GLTF.items() if values.get("mesh") == "glb" else ():
         if values.setdefault(name, value) != value:
-            raise TrackerError(f"expected --{name} {value} with --mesh glb, as glTF has it, found '{values[name]}'")
+            raise TrackerError(f"expected {name} {value} of meshes as glTF, found '{values[name]}'; leave them out")
     return replace(ExportOptions(chosen.axes, chosen.units), **values)  # pyrefly: ignore[bad-argument-type]
 
 

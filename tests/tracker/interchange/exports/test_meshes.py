@@ -83,7 +83,7 @@ def test_bodies_as_gltf_stand_as_it_says(tmp_path, couple):
 
 @pytest.mark.parametrize("option", [{"axes": "calibration"}, {"units": "mm"}])
 def test_other_axes_and_units_of_gltf_are_refused(tmp_path, couple, option):
-    with pytest.raises(TrackerError, match=r"expected --(axes y-up|units m) with --mesh glb, as glTF has it, found"):
+    with pytest.raises(TrackerError, match=r"expected (axes y-up|units m) of meshes as glTF, found"):
         quadrille.export(couple[0], tmp_path / "m", "meshes", options={"mesh": "glb", **option})
 
 
