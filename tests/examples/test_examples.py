@@ -124,6 +124,7 @@ def test_a_strangers_metric_and_exporter_are_in_help_results_and_menu(packages, 
     assert "jerk-metric 1.0" in run(*app, "doctor", path=[packages])
 
 
+@pytest.mark.slow
 def test_packages_that_break_a_program_are_lines_of_the_doctor(tmp_path):
     points = "".join(f"[{group}]\nodd = odd:thing\n" for group in GROUPS)
     install(tmp_path, "odd", "print('odd text')\nraise SystemExit(3)", points)

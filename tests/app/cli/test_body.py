@@ -9,6 +9,7 @@ from command_line import WITH_POSE, assert_refused, stored
 from tracker.session.session import load_session
 
 
+@pytest.mark.slow
 def test_a_person_gets_feet_and_undo_takes_them_away(run, session, opened):
     assert run("init", session, *WITH_POSE, "--frame", "4", "--json")[0] == 0
     (before,) = stored(session).values()

@@ -90,6 +90,7 @@ def test_known_bias_limits_and_icc_come_back(run, apart):
     assert set(report["annotators"]) == {"ann", "ben"}
 
 
+@pytest.mark.slow
 def test_the_consensus_has_less_error_than_either(run, apart):
     """Written by one command, and both annotators and the consensus measured against the poses that they aimed at."""
     folder, work, _ = apart

@@ -314,6 +314,7 @@ def test_a_run_of_one_leaves_the_others_to_other_frames(anna, ben, tracker):
     assert anna.stored_poses.rows(0)[0] == [2, 3, 4, 5, 6]
 
 
+@pytest.mark.slow
 def test_a_verdict_on_a_pose_that_somebody_has_changed_since_is_refused(anna, ben):
     anna.annotating.plan(FrameChoice(frames="0"), None, [], each=False)
     drag(anna, "torso", (9.0, 0.0))

@@ -82,6 +82,7 @@ async def test_a_reader_that_stands_still_ends(monkeypatch):
         writer.close()
 
 
+@pytest.mark.slow
 async def test_a_page_stays_though_it_is_silent(monkeypatch):
     monkeypatch.setattr(connections, "ANSWER_S", 0.2)
     async with (

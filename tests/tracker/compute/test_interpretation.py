@@ -72,6 +72,7 @@ def test_an_interpreted_kernel_compiles_nothing(kernel):
     assert len(kernel.signatures) == 1
 
 
+@pytest.mark.slow
 def test_other_threads_compile(kernel):
     with interpreted():
         other = threading.Thread(target=kernel, args=(np.ones(3),))

@@ -58,6 +58,7 @@ def test_a_key_point_that_jumps_is_not_fast(session, recording):
     assert (found.source, abs(found.frame - 20) < 4) == ("key points", True)
 
 
+@pytest.mark.slow
 def test_without_both_the_pictures_show_one(session, recording):
     found = find_fast_moment(session, recording, VIEWS)
     assert found.source == "pictures"

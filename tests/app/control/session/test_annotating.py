@@ -23,6 +23,7 @@ def planned(controller, frames="0,5,9"):
     return controller.annotating
 
 
+@pytest.mark.slow
 def test_a_plan_goes_from_draft_to_verified_and_a_verdict_changes_no_pose(controller):
     annotating = planned(controller)
     assert states(controller) == [(0, "draft", ""), (5, "draft", ""), (9, "draft", "")]

@@ -77,6 +77,7 @@ def test_poses_of_an_earlier_calibration_alone_are_tracked_again(placed, tracker
     wait_for(lambda: placed.state.calibration.outdated == {0: (2, 3, 4, 5, 6, 7, 8, 9)})
 
 
+@pytest.mark.slow
 def test_without_a_keyframe_the_first_pose_is_tracked_again_too(placed, tracker):
     tracked(placed, tracker, 5)
     placed.ranges.mark(2, 2, "none")

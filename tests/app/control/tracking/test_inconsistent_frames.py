@@ -43,6 +43,7 @@ def checked(controller):
     return encoding.inconsistent(controller.state)
 
 
+@pytest.mark.slow
 def test_a_wrong_keyframe_stands_for_its_neighbours_and_is_left_unchanged(steady):
     controller, place = steady
     assert checked(controller).keyframes == ()
@@ -103,6 +104,7 @@ def test_an_assessment_makes_a_keyframe_doubted_until_it_is_confirmed_marked_or_
     assert checked(controller).keyframes == ()
 
 
+@pytest.mark.slow
 def test_a_confirmed_keyframe_is_judged_again_when_its_pose_changes(steady):
     controller, place = steady
     place(KEY, keyframe=True, off=0.9)

@@ -50,6 +50,7 @@ def at_rest(controller):
     return controller.state.observations
 
 
+@pytest.mark.slow
 def test_files_are_previewed_and_then_stored(controller, request_of):
     wait_for(lambda: controller.state.observations.sets == ())
     controller.observing.plan(request_of)
@@ -88,6 +89,7 @@ def test_detected_people_are_stored_and_shown(controller, detector):
     assert [s.name for s in outcome.sets] == ["detected", "detected 2"]
 
 
+@pytest.mark.slow
 def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller, detector):
     stopped = threading.Event()
 

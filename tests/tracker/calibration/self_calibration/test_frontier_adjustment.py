@@ -42,6 +42,7 @@ def center_error_m(cameras):
     return np.linalg.norm(scale * a @ R.T + t - b, axis=1).max()
 
 
+@pytest.mark.slow
 def test_a_rim_about_the_person_does_not_move_cameras():
     exact, rim = (center_error_m(adjusted(hulls_of(px)).cameras) for px in ((0, 0, 0), (2, -1, 0)))
     assert exact < 0.02

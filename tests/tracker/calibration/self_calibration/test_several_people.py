@@ -184,6 +184,7 @@ def test_people_whom_first_cameras_do_not_recognize_are_refused():
         calibrate_by_person(wrong, CAMERAS, STATURE_M, has_lenses=True)
 
 
+@pytest.mark.slow
 def test_heights_of_others_are_refused():
     with pytest.raises(CalibrationError, match="whom the files name, found 'eve' and the people ann, bob; correct the"):
         calibrate_by_person(detected(CAMERAS, JOINTS, tracks=ANN_BOB), CAMERAS, {"eve": 1.7}, has_lenses=True)

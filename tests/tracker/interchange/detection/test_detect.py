@@ -123,6 +123,7 @@ def test_a_bystander_whom_two_views_see_is_no_person_of_the_recording(tmp_path, 
     assert np.abs(own - motions[1]).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_a_poster_is_taken_last_though_it_is_always_there(tmp_path, couple):
     session, motion = couple[0], np.concatenate([couple[1][0], couple[1][0][::-1], couple[1][0]])
     poster = np.repeat(standing_points()[None], 3 * N, axis=0)

@@ -78,6 +78,7 @@ def test_pycocotools_reads_the_files_of_all_recordings_as_one(tmp_path, three, d
     assert {(a["person"], a["track_id"]) for a in coco.anns.values()} == {("ann", 0), ("bob", 1)}
 
 
+@pytest.mark.slow
 def test_splits_card_provenance_and_checksums_are_of_all(dataset):
     out, summaries = dataset
     splits = {"train": ["walk", "run"], "validation": [], "test": ["sit"]}

@@ -57,6 +57,7 @@ class BesideAnother:
         return []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("own", "is_everybody", "is_asked"), [(0.4, True, True), (0.4, False, False), (0.6, False, True)]
 )
