@@ -28,7 +28,7 @@ install: $(VENV)/.installed
 run: install
 	$(BIN)/quadrille
 
-# What must hold on every change: at most four minutes on two cores. The steps run beside one another. The kernels, for
+# What must hold on every change: at most five minutes on two cores. The steps run beside one another. The kernels, for
 # which others wait, have the highest priority; they are compiled from when the program is installed. Tests of the page
 # wait a lot: those of the library take what they leave. All steps run to their end: one run shows all that fails, and
 # one line with its time of each that passes.

@@ -28,7 +28,6 @@ def row(name, time_us, must=None):
     return Row(name, f"what {name} is", time_us, 2 * time_us, 1000.0, must)
 
 
-@pytest.mark.slow
 def test_the_painted_cost_is_honest(frame):
     """Written with other means, it says the same of poses, good and bad: to 0.3 px, and in the same order."""
     cost = frame.cost()

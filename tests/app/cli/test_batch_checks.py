@@ -77,8 +77,9 @@ WRONG = {
 """Rows that cannot be tracked, with what is said of each."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("way", ["--slurm", "--check", "--workers"])
+@pytest.mark.parametrize(
+    "way", ["--check", *(pytest.param(w, marks=pytest.mark.slow) for w in ("--slurm", "--workers"))]
+)
 def test_all_problems_are_listed_before_anything_is_written(lab, run, way):
     (lab / "t.csv").write_text("\n".join(["name,calibration,videos,height", *WRONG]))
     (lab / "plan.toml").write_text("""

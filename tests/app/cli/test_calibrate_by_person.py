@@ -66,7 +66,6 @@ def test_several_people_are_reported(run, footage, tmp_path):
     assert "below them" in text
 
 
-@pytest.mark.slow
 def test_wrong_people_are_refused(run, footage, tmp_path):
     out = tmp_path / "c.toml"
     assert_refused(

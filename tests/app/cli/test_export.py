@@ -80,7 +80,6 @@ def lab(tmp_path):
     return places
 
 
-@pytest.mark.slow
 def test_a_dataset_of_several_sessions(run, lab, tmp_path):
     out = tmp_path / "d"
     words = ("export", *lab, "--format", "dataset", "--pictures", "video", "--out", out)

@@ -24,7 +24,6 @@ def test_one_frame_and_another_camera(run, placed):
     assert best["mean_after_deg"] < last["mean_after_deg"] < best["mean_before_deg"]
 
 
-@pytest.mark.slow
 def test_the_sentence_for_a_person(run, placed):
     _, out, _ = run("observability", placed, "--another-camera")
     lines = out.splitlines()

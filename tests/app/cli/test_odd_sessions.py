@@ -65,7 +65,6 @@ def test_named_pipes_in_place_of_footage(run, session, kind):
     assert_refused(run("info", session), ["'pipe'", "expected a regular file, found a named pipe"])
 
 
-@pytest.mark.slow
 def test_a_trigger_in_a_store_by_mail_does_not_run(run, placed):
     trigger = "CREATE TRIGGER gone AFTER INSERT ON poses BEGIN DELETE FROM poses; END"
     altered(placed / "annotations.sqlite", trigger)

@@ -88,7 +88,6 @@ async def test_requests_that_are_not_http_leave_a_few_sentences(port_and_socket,
     assert 1 <= len(text.getvalue().splitlines()) <= 3 * len(ODD)
 
 
-@pytest.mark.slow
 async def test_a_server_without_descriptors_says_so_and_recovers(port_and_socket, monkeypatch):
     port, one = port_and_socket
     one.is_out = True

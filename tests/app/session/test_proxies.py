@@ -91,7 +91,6 @@ def test_the_page_looks_at_the_proxy_and_matches_the_footage(run, session, monke
         recording.close()
 
 
-@pytest.mark.slow
 def test_a_proxy_of_other_footage_is_not_looked_at(run, session):
     assert run("index", session)[0] == 0
     loaded = load_session(session)

@@ -138,7 +138,6 @@ def test_a_stopped_share_leaves_nothing(couple, tmp_path, name):
     assert sorted(tmp_path.iterdir()) == before
 
 
-@pytest.mark.slow
 def test_a_failure_at_the_end_leaves_what_was_there(couple, tmp_path, monkeypatch):
     motion, out = read_motion(couple, (0, 1)), tmp_path / "review"
     share(motion, out, LARGE)

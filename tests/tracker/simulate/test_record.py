@@ -128,7 +128,6 @@ def test_two_people_have_truth_each_and_masks_by_person(tmp_path):
             assert np.linalg.norm(own - source.camera.project(truth.points[0]).mean(axis=0)) < 8
 
 
-@pytest.mark.slow
 def test_an_interrupted_run_leaves_nothing(tmp_path):
     def interrupt(done, total):
         raise KeyboardInterrupt

@@ -151,7 +151,6 @@ def test_one_program_compiles_at_a_time(empty_cache, monkeypatch):
     assert not calls
 
 
-@pytest.mark.slow
 def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monkeypatch):
     """All of them, by tracking: those that two people need, the paper's search, and a room without a background."""
     tracked, priorities, stages, waited_for, beside = [], [], [], [], []

@@ -154,7 +154,6 @@ def test_keyframes_stay():
     assert found[3].statuses[0] != "lost"
 
 
-@pytest.mark.slow
 def test_locked_dofs_stay():
     body = load_model("gavrila34", 1.72)
     start = fit_to_points(body, joints_at(0.0)).pose
