@@ -75,8 +75,14 @@ async def handle_of(page, camera, point, person=0):
     return next((h["u"], h["v"]) for h in handles if (h["camera"], h["point"], h["person"]) == wanted)
 
 
+TO_CLIENT = """([c, u, v]) => new Promise((resolve) => {
+  requestAnimationFrame(() => setTimeout(() => resolve(quadrille.toClient(c, u, v))));
+})"""
+
+
 async def to_client(page, camera, u, v):
-    at = await page.evaluate("([c, u, v]) => quadrille.toClient(c, u, v)", [camera, u, v])
+    """The place of a pixel on the page, once the views have the size that they get in the next picture."""
+    at = await page.evaluate(TO_CLIENT, [camera, u, v])
     return at["x"], at["y"]
 
 
