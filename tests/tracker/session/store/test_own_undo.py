@@ -200,7 +200,7 @@ def test_a_long_history_is_not_read_for_the_last_edit(store):
             put(store, "anna", 1, x)
         counts.append((steps("anna"), steps("nobody")))
     (few, none), (as_few, as_none) = counts
-    assert as_few == few
+    assert abs(as_few - few) < 10, "not a step for each of a hundred edits"  # SQLite of today saves some
     assert as_none - none < 10 * 100, "one look at each author"
 
 
