@@ -88,7 +88,7 @@ docs: $(VENV)/.documented
 
 # Wheel and sdist in dist/, installed and tried with each of RELEASE_PYTHONS; needs a package index.
 release: $(VENV)/.tested
-	@test -n "$(RELEASE_PYTHONS)" || { echo "expected python3.11 to python3.13, found none: make release RELEASE_PYTHONS=..."; exit 1; }
+	@test -n "$(RELEASE_PYTHONS)" || { echo "expected python3.11 to python3.14, found none: make release RELEASE_PYTHONS=..."; exit 1; }
 	rm -rf dist
 	$(BIN)/python -m build --outdir dist
 	QUADRILLE_RELEASE_DIST=dist QUADRILLE_RELEASE_PYTHONS="$(RELEASE_PYTHONS)" $(BIN)/python -m pytest -m slow tests/release
