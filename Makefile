@@ -12,7 +12,7 @@ SITE := $(VENV)/site
 # Interpreters that a release is tried with.
 RELEASE_PYTHONS ?= $(foreach version,3.11 3.12 3.13 3.14,$(shell python$(version) -c $(WHERE) 2>/dev/null))
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
-PYTHON_FILES := quadrille app tracker tests
+PYTHON_FILES := quadrille app tracker tests docs
 # Set by `test` to what shows one line of a step.
 STEP =
 HIDE = $(if $(STEP),@)

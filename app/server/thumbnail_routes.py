@@ -20,12 +20,12 @@ _MAX_WAITING = 16
 """Number of thumbnails that may wait; a page requests two at a time."""
 _MAX_DIGITS = 9
 
-Make = Callable[[int, int, int | None], bytes | None]
-"""Makes the thumbnail of a person, frame and limb as JPEG; None if there is none."""
+Make = Callable[[int, int, int | None, bool], bytes | None]
+"""Makes the thumbnail of a person, frame and limb as JPEG, with blurred heads or not; None if there is none."""
 
 
 class ThumbnailRoutes:
-    """Answers `/thumbnail/PERSON/FRAME`, whose query `limb` names the limb that stands out."""
+    """Answers `/thumbnail/PERSON/FRAME`, whose query `limb` names the limb that stands out; `blurred` blurs heads."""
 
     def __init__(self, make: Make, is_busy: Callable[[], bool] = lambda: False) -> None:
         """Serve thumbnails.
@@ -57,7 +57,7 @@ class ThumbnailRoutes:
         def work() -> bytes | None:
             if request.transport is None or request.transport.is_closing():
                 return None  # nobody waits for it any more
-            return self._make(person, frame, limb)
+            return self._make(person, frame, limb, "blurred" in request.query)
 
         self._n_waiting += 1
         try:

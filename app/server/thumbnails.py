@@ -33,6 +33,8 @@ class _Wanted(NamedTuple):
     velocities: tuple[bytes | None, ...]
     """Their velocities likewise, where a camera needs them."""
     colors: tuple[str, ...]
+    is_blurred: bool
+    """Whether heads are."""
     cameras: Identity
     """Of the session: corrected ones make another thumbnail."""
 
@@ -50,13 +52,14 @@ class Thumbnails:
         self._controller, self._footage, self._cameras = controller, footage, controller.session.cameras
         self._drawn = lru_cache(_CACHED)(self._draw)
 
-    def jpeg(self, person: int, frame: int, limb: int | None) -> bytes | None:
+    def jpeg(self, person: int, frame: int, limb: int | None, is_blurred: bool = False) -> bytes | None:
         """Return a thumbnail of a stored pose as JPEG; None if there is no such pose or no view shows it.
 
         Args:
             person: index of the person.
             frame: of the pose.
             limb: index of the limb of the person's body that stands out; None, or one that it lacks, for none.
+            is_blurred: whether heads are blurred.
 
         Raises:
             RecordingError: the footage cannot be read.
@@ -73,7 +76,7 @@ class Thumbnails:
                 frame, list(stored).index(person), limb, tuple(b.model for b in bodies),
                 tuple(b.values.tobytes() for b in bodies),
                 tuple(None if b.velocity is None else b.velocity.tobytes() for b in bodies),
-                colors, Identity(self._controller.session.cameras),
+                colors, is_blurred, Identity(self._controller.session.cameras),
             )
         )  # fmt: skip
 
@@ -96,6 +99,8 @@ class Thumbnails:
         self._give_way()
         limb = thumbnails.limb_parts(bodies, wanted.person, wanted.limb)
         then = ahead(bodies, self._cameras[crop.camera].clock.ahead(wanted.frame))
+        if wanted.is_blurred and image is not None:
+            image = thumbnails.without_faces(image, cameras[crop.camera], then)
         return thumbnails.thumbnail(image, cameras[crop.camera], crop.region, then, wanted.colors, limb)
 
     def _follow_cameras(self) -> None:

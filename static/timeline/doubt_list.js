@@ -31,7 +31,7 @@ export function mountDoubtList(store, queue) {
   const moreButton = make("button", { type: "button", className: "doubt-more", title: "List less severe entries too" });
   const moreRow = make("li", {}, moreButton);
   /** @type {(keyof import("../model/store.js").Facts)[]} */
-  const listed = ["drawer", "timeline", "lanes", "session", "keyframeDoubts"];
+  const listed = ["drawer", "timeline", "lanes", "session", "keyframeDoubts", "layers"];
   moreButton.addEventListener("click", () => {
     limit = MAX_LISTED;
     show();
@@ -98,7 +98,7 @@ export function mountDoubtList(store, queue) {
   /** @param {Doubt} doubt */
   function keyOf({ person, spans, worst, status, limbs, keyframe }) {
     const cost = cellsOf(person)?.costs[worst];
-    return JSON.stringify([person, spans, worst, status, cost, limbs, keyframe]);
+    return JSON.stringify([person, spans, worst, status, cost, limbs, keyframe, store.facts.layers.shown.faces]);
   }
 
   /** @param {number} person */
@@ -112,12 +112,13 @@ export function mountDoubtList(store, queue) {
    * @returns {HTMLLIElement}
    */
   function makeRow(doubt) {
-    const { session, calibration } = store.facts;
+    const { session, calibration, layers } = store.facts;
     const { person, first, last, spans, worst, status, limbs, limb, keyframe } = doubt;
     const info = session?.people[person];
     const image = make("img", { alt: "", draggable: false });
     const cost = cellsOf(person)?.costs[worst] ?? 0;
-    loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}-${calibration?.revision ?? 1}`);
+    const query = `${limb === null ? "" : `limb=${limb}&`}${layers.shown.faces ? "blurred&" : ""}`;
+    loader.watch(image, `thumbnail/${person}/${worst}?${query}v=${cost}-${calibration?.revision ?? 1}`);
     const frames = `${first === last ? `frame ${first}` : `frames ${first}–${last}`}${spans.length > 1 ? `, in ${spans.length} stretches` : ""}`;
     const remark = cellsOf(person)?.get(worst)?.remark ?? "";
     const why =

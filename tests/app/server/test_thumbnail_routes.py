@@ -20,8 +20,9 @@ class Maker:
         self.asked, self.free, self.is_busy = [], threading.Event(), False
         self.free.set()
 
-    def make(self, person, frame, limb):
-        self.asked.append((person, frame, limb))
+    def make(self, *asked):
+        _person, frame, *_ = asked
+        self.asked.append(asked)
         assert self.free.wait(10)
         if frame == 404:
             return None
@@ -47,8 +48,8 @@ async def test_a_thumbnail_is_sent_as_jpeg(client):
     session, maker = client
     async with session.get("/thumbnail/1/31?limb=2&v=3.5") as response:
         assert (response.status, response.content_type, await response.read()) == (200, "image/jpeg", JPEG)
-    assert await status(session, "/thumbnail/0/7") == 200
-    assert maker.asked == [(1, 31, 2), (0, 7, None)]
+    assert await status(session, "/thumbnail/0/7?blurred&v=1") == 200
+    assert maker.asked == [(1, 31, 2, False), (0, 7, None, True)]
     assert await status(session, "/thumbnail/0/404") == 404
     assert await status(session, "/thumbnail/0/500") == 503
     for wrong in ("/thumbnail/x/1", "/thumbnail/0/-1", "/thumbnail/0/1?limb=a", f"/thumbnail/0/{10**12}"):
@@ -85,4 +86,4 @@ async def test_a_thumbnail_that_nobody_waits_for_is_not_made(client):
         maker.free.set()
         assert await first == 200
         assert await status(session, "/thumbnail/0/3") == 200
-    assert [frame for _, frame, _ in maker.asked] == [1, 3]
+    assert [frame for _, frame, *_ in maker.asked] == [1, 3]

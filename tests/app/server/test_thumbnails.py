@@ -39,6 +39,7 @@ def test_a_thumbnail_is_made_once_for_each_pose_and_limb(made):
     assert len(drawn) == 1
     assert found.jpeg(0, 0, None) != first
     assert found.jpeg(0, 0, 99) == found.jpeg(0, 0, None)  # a limb of another body
+    assert found.jpeg(0, 0, None, True) != found.jpeg(0, 0, None, False)
     drag(controller, "left_wrist", (30.0, 0.0))
     assert found.jpeg(0, 0, 1) != first
     assert found.jpeg(0, 1, 1) is None  # no pose

@@ -1,7 +1,7 @@
 """The queue of doubtful and lost poses: ranked, with thumbnails, walked through, resolved."""
 
 import pytest
-from page_driver import command, handle_of, shows, state_of, to_client, until
+from page_driver import command, handle_of, shows, state_of, to_client, toggle_layer, until
 
 ROWS = "[...document.querySelectorAll('#doubt-list li')]"
 LOADED = f"{ROWS}.every((row) => row.querySelector('img').naturalWidth > 0)"
@@ -25,6 +25,8 @@ async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(p
     assert {url.split("v=")[0] for url in endpoint.thumbnails} == {
         f"thumbnail/{person}/{frame}?limb={limb}&" for person in (0, 1) for frame, limb in ((50, 0), (31, 1))
     }
+    await toggle_layer(page, "faces")
+    await until(lambda: all("&blurred&" in url for url in endpoint.thumbnails[4:]) and len(endpoint.thumbnails) == 8)
     assert "4 to check" in await page.locator("#doubts-count").inner_text()
     await page.locator("#doubt-list .doubt").nth(1).click()
     await shows(page, "quadrille.state.state.frame === 50 && quadrille.state.state.person === 1")
