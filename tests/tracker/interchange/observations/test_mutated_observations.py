@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from functools import partial
+from pathlib import Path
 
 import joint_files
 import numpy as np
@@ -123,8 +124,9 @@ def _unit(kind):
     return (1.0 if kind.startswith("joints ") else 0.01) if kind in OF_JOINTS else None
 
 
-def run_forked(path, folder):
+def run_forked(words, **_):
     """Read a file in a fork of this process, which has loaded the libraries: a new one needs 2 to 7 s for that."""
+    path, folder = map(Path, words[-2:])
     child = multiprocessing.get_context("fork").Process(target=hdf5_process.main, args=(path, folder))
     child.start()
     child.join(SECONDS)
@@ -172,7 +174,7 @@ def test_mutated_observations_are_imported_or_refused(kind, n, tmp_path, monkeyp
     if package in APART:
         assert not read(kind, session, path, 1)  # by a process of its own
         hdf5_process.read_hdf5(folder / name)  # loads the libraries
-        monkeypatch.setattr(hdf5, "_run", run_forked)
+        monkeypatch.setattr(hdf5.subprocess, "run", run_forked)
     if kind.startswith("stored"):
         store_import(session, plan_import(session, ImportRequest("mp", (path,), ("ann",))))
         folder = session.folder / "observations" / "mp"
