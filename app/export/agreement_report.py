@@ -42,17 +42,15 @@ def write_report(copies: Copies, found: Agreement, tolerance_m: float | None, pa
         path: the file; it appears complete or not at all.
     """
     title = f"Agreement of {', '.join(copies.names)}"
-    order = (
-        "second annotator less the first" if len(copies.names) == 2 else "second less first annotator of the pair named"
-    )
+    order = " less ".join(reversed(copies.names)) if len(copies.names) == 2 else "second less first of the pair named"
     plotted = [(joint, found.joints[joint]) for joint in LIMB_JOINTS if joint in found.joints]
     plots = [_plot(_label(name, joint.pair, found), joint) for name, joint in plotted]
     body = [
-        f"<h1>{html.escape(title)}</h1><p>{len(copies.subjects)} poses. Differences: {order}. Intervals are 95%, each "
-        "of one joint or angle. Those of a joint hold along every line in space.</p>",
+        f"<h1>{html.escape(title)}</h1><p>{len(copies.subjects)} poses. Differences: {html.escape(order)}. Intervals are "
+        "95%, each of one joint or angle. Those of a joint hold along every line in space.</p>",
         *(f"<p>Note: {html.escape(note)}.</p>" for note in copies.notes),
         "<h2>Bland-Altman plots of the limb joints</h2>",
-        "<p>Difference against mean of two annotators, both along the line of the joint's bias. "
+        "<p>Difference against mean of two, both along the line of the joint's bias. "
         "Bands are the confidence intervals of bias and limits.</p>",
         f'<div class="plots">{"".join(plots)}</div>',
         *_joints(found),

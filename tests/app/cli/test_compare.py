@@ -138,6 +138,7 @@ def test_text_table_and_report(run, apart):
     assert len(rows) == 4 * len(JOINTS) + len(found["angles"])
     text = report.read_text("utf-8")
     assert text.count("<svg") == 12
+    assert "Differences: ben less ann. " in text
     assert "http" not in text
     assert_refused(run(*words), ["expected --csv at a path that is free"])
     assert run(*words, "--overwrite")[0] == 0
