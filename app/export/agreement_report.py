@@ -46,8 +46,8 @@ def write_report(copies: Copies, found: Agreement, tolerance_m: float | None, pa
     plotted = [(joint, found.joints[joint]) for joint in LIMB_JOINTS if joint in found.joints]
     plots = [_plot(_label(name, joint.pair, found), joint) for name, joint in plotted]
     body = [
-        f"<h1>{html.escape(title)}</h1><p>{len(copies.subjects)} poses. Differences: {html.escape(order)}. Intervals are "
-        "95%, each of one joint or angle. Those of a joint hold along every line in space.</p>",
+        f"<h1>{html.escape(title)}</h1><p>{len(copies.subjects)} poses. Differences: {html.escape(order)}. Intervals "
+        "are 95%, each of one joint or angle. Those of a joint hold along every line in space.</p>",
         *(f"<p>Note: {html.escape(note)}.</p>" for note in copies.notes),
         "<h2>Bland-Altman plots of the limb joints</h2>",
         "<p>Difference against mean of two, both along the line of the joint's bias. "
