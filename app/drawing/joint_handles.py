@@ -12,8 +12,9 @@ from app.state.state import State
 from tracker.body.model import PosedBody, ahead
 from tracker.evidence.contours import part_edges
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.interchange.exports.faces import around, head_surface
+from tracker.geometry.arrays import Array, Image, IntArray, Mask
+from tracker.geometry.cameras import Camera
+from tracker.interchange.exports.faces import Circle, around, blurred, head_surface
 from tracker.session.session import Session
 
 _SHORT_M = 0.01
@@ -143,15 +144,23 @@ def dragged_place(session: Session, state: State, drag: DragState) -> Array:
     return rigid.apply(T_world_part, np.array(drag.place_part))
 
 
+def without_faces(image: Image, heads: Sequence[HeadCircle], camera: int) -> Image:
+    """Return an undistorted image of a camera, (H, W, 3) RGB, with the heads in it blurred."""
+    return blurred(image, [Circle(np.array([h.u, h.v]), h.radius_px) for h in heads if h.camera == camera])
+
+
 def head_circles(session: Session, state: State, cameras: Collection[int]) -> list[HeadCircle]:
     """Return the circles of all people in some views, given by index, whether they are drawn or not."""
     found = []
     for time, group in at_one_time(picture_times(session, state.frame, cameras)):
-        bodies = [b for b in ahead(bodies_in(session, state), time) if "head" in b.model.part_index]
-        surfaces = [head_surface(body) for body in bodies]
+        bodies = ahead(bodies_in(session, state), time)
         for index in group:
-            for px in (session.cameras[index].camera.pinhole.project(surface) for surface in surfaces):
-                if (seen := np.isfinite(px).all(axis=1)).any():
-                    (u, v), radius_px = around(px[seen])
-                    found.append(HeadCircle(index, float(u), float(v), radius_px))
+            circles = circles_around_heads(bodies, session.cameras[index].camera.pinhole)
+            found += [HeadCircle(index, float(u), float(v), radius_px) for (u, v), radius_px in circles]
     return found
+
+
+def circles_around_heads(bodies: Sequence[PosedBody], camera: Camera) -> list[Circle]:
+    """Return what hides the heads of bodies in an undistorted image; a body may have no head."""
+    surfaces = (camera.project(head_surface(body)) for body in bodies if "head" in body.model.part_index)
+    return [around(px[seen]) for px in surfaces if (seen := np.isfinite(px).all(axis=1)).any()]

@@ -14,7 +14,6 @@ from tracker.body.model import PosedBody
 from tracker.evidence.contours import occluding_contours, part_edges
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, Region
-from tracker.interchange.exports.faces import around, blurred, head_surface
 
 SIZE_PX = 160
 """Width and height of a thumbnail, pixels."""
@@ -98,13 +97,6 @@ def thumbnail(
     # The limb also where it is occluded: that is often why it is lost.
     draw_lines(drawn, contour.pieces_px[limb[contour.parts]], overlay_colors.rgb(overlay_colors.NEUTRAL), 2)
     return pictures.footage(drawn, (SIZE_PX, SIZE_PX))
-
-
-def without_faces(image: Image, camera: Camera, bodies: Sequence[PosedBody]) -> Image:
-    """Return an undistorted image, (H, W, 3) RGB, with the heads of bodies blurred."""
-    heads = [camera.project(head_surface(body)) for body in bodies if "head" in body.model.part_index]
-    seen = [px[np.isfinite(px).all(axis=1)] for px in heads]
-    return blurred(image, [around(px) for px in seen if len(px)])
 
 
 def limb_parts(bodies: Sequence[PosedBody], person: int, limb: int | None) -> NDArray[np.bool_]:

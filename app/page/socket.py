@@ -135,6 +135,7 @@ class PageConnection:
             await asyncio.to_thread(self._controller.dragging.end, self._number)
             await asyncio.to_thread(self._controller.pinning.end, self._number)
             await asyncio.to_thread(self._controller.view_3d.pause, self._number, False)
+            await asyncio.to_thread(self._controller.view_3d.blur_faces, self._number, False)
             self._controller.cost_landscape.watch(self._number, False)
             self._controller.reasons.watch(self._number, False)
             self._controller.cost_map.leave(self._number)
@@ -212,6 +213,8 @@ class PageConnection:
                 self._sent_history = None
             case wire.SetView():
                 self._view = view_of(message, len(self._controller.session.cameras))
+                if self._visit.role == "host":  # others have no 3-D view
+                    self._controller.view_3d.blur_faces(self._number, "faces" in self._view.layers)
             case WatchProvenance(person=person):
                 if person is not None:
                     commands.check_index(self._controller, "person", person)

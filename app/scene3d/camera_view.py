@@ -10,6 +10,7 @@ import viser
 
 from app.control.controller import Controller
 from app.drawing.centred_image import centred, field_of_view
+from app.drawing.joint_handles import head_circles, without_faces
 from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.geometry import rigid
@@ -76,7 +77,8 @@ class CameraView:
         # One thread for states and reports, so that neither overtakes the other.
         self._latest: LatestWinsWorker[State | _Report] = LatestWinsWorker(self._take, "camera view")
         paused = ("drag", "is_pin_held", "pages_pausing_3d")
-        controller.subscribe(self._latest.offer, "snapped", "frame", "calibration", "footage", *paused)
+        blurred = ("pages_blurring_faces", "people")
+        controller.subscribe(self._latest.offer, "snapped", "frame", "calibration", "footage", *paused, *blurred)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
 
@@ -128,7 +130,10 @@ class CameraView:
             return
         seen = view.client.camera
         size = (seen.image_width, seen.image_height)
-        wanted = (state.snapped, state.frame, size, state.calibration.n_changes)
+        heads = (
+            head_circles(self._controller.session, state.drawn, [state.snapped]) if state.pages_blurring_faces else []
+        )
+        wanted = (state.snapped, state.frame, size, state.calibration.n_changes, *heads)
         if wanted == view.shown or min(size) < _LEAST_PX or state.is_3d_paused:
             return
         camera = self._cameras[state.snapped]
@@ -137,7 +142,7 @@ class CameraView:
             view.left is not None and _is_at(seen.position, seen.wxyz, self._cameras[view.left])
         ):
             view.before = _FreeView(seen.position, seen.look_at, seen.up_direction, seen.fov)
-        image = self._image(state.frame, state.snapped)
+        image = without_faces(self._image(state.frame, state.snapped), heads, state.snapped)
         with view.client.atomic():
             if view.camera != state.snapped:
                 view.arrived = _is_at(seen.position, seen.wxyz, camera)

@@ -8,6 +8,7 @@ import viser
 
 from app.control.controller import Controller
 from app.drawing.centred_image import aspect_around, centred, field_of_view
+from app.drawing.joint_handles import HeadCircle, head_circles, without_faces
 from app.runtime.jobs import LatestWinsWorker
 from app.state.calibration import CalibrationState, CorrectedFrame
 from app.state.state import State
@@ -36,11 +37,14 @@ class Frusta:
         self._n_changes = controller.state.calibration.n_changes
         self._corrected: list[viser.CameraFrustumHandle] = []
         self._previewed: CorrectedFrame | None = None
-        self._shown: int | None = None  # the frame of the images
+        self._shown: tuple[int, tuple[HeadCircle, ...]] | None = None  # the frame of the images, heads that are blurred
         self._handles = [self._add(index) for index in range(len(self._cameras))]
         self._labels = [server.scene.add_label(f"/cameras/{c.name}/name", c.name) for c in self._cameras]
         latest = LatestWinsWorker(self._show_images, "frusta")
-        controller.subscribe(latest.offer, "frame", "view_3d", "calibration", "footage", "drag", "track", "search")
+        controller.subscribe(
+            latest.offer, "frame", "view_3d", "calibration", "footage", "drag", "track", "search", "people",
+            "pages_blurring_faces",
+        )  # fmt: skip
         latest.offer(controller.state)
 
     def show(self, state: State) -> None:
@@ -104,21 +108,23 @@ class Frusta:
 
     def _show_images(self, state: State) -> None:
         """Put the images of a frame into the frusta after it has been shown for a moment."""
-        wanted = state.frame if state.view_3d.images and state.view_3d.cameras else None
+        indices = range(len(self._cameras))
+        heads = head_circles(self._controller.session, state.drawn, indices) if state.pages_blurring_faces else []
+        wanted = (state.frame, tuple(heads)) if state.view_3d.images and state.view_3d.cameras else None
         if wanted == self._shown:
             return
         if wanted is not None:
             time.sleep(_REST_S)
             now = self._controller.state
             # A browser that renders in software has no time for them during a tracking run.
-            if now.frame != wanted or now.drag is not None or now.is_3d_throttled:
+            if now.frame != state.frame or now.drag is not None or now.is_3d_throttled:
                 return  # the next state asks again
         self._shown = wanted
-        images = [None] * len(self._cameras) if wanted is None else self._controller.frames.images(wanted)
+        images = [None] * len(indices) if wanted is None else self._controller.frames.images(state.frame)
         small = []
-        for camera, image in zip(self._cameras, images, strict=True):
+        for index, (camera, image) in enumerate(zip(self._cameras, images, strict=True)):
             size = (_WIDTH_PX, round(_WIDTH_PX / aspect_around(camera)))
-            small.append(None if image is None else centred(np.asarray(image), camera, size))
+            small.append(None if image is None else centred(without_faces(image, heads, index), camera, size))
         with self._server.atomic():
             for handle, picture in zip(self._handles, small, strict=True):
                 handle.image = picture

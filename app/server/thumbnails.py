@@ -8,10 +8,12 @@ import numpy as np
 
 from app.control.controller import Controller
 from app.drawing import thumbnails
+from app.drawing.joint_handles import circles_around_heads
 from app.session.footage_crops import FootageCrops
 from app.state.identity import Identity
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody, ahead
+from tracker.interchange.exports.faces import blurred
 
 _CACHED = 256
 """Number of thumbnails that are kept, some 8 kB each."""
@@ -100,7 +102,7 @@ class Thumbnails:
         limb = thumbnails.limb_parts(bodies, wanted.person, wanted.limb)
         then = ahead(bodies, self._cameras[crop.camera].clock.ahead(wanted.frame))
         if wanted.is_blurred and image is not None:
-            image = thumbnails.without_faces(image, cameras[crop.camera], then)
+            image = blurred(image, circles_around_heads(then, cameras[crop.camera]))
         return thumbnails.thumbnail(image, cameras[crop.camera], crop.region, then, wanted.colors, limb)
 
     def _follow_cameras(self) -> None:

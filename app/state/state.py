@@ -113,6 +113,8 @@ class State:
     """For each page that drags: its number, and the sequence number of its last applied drag message."""
     pages_pausing_3d: frozenset[int] = frozenset()
     """Numbers of the pages that render the 3-D view in software and pause it during a drag."""
+    pages_blurring_faces: frozenset[int] = frozenset()
+    """Numbers of the pages that blur faces: pictures in the 3-D view, which is one for all, are blurred if one does."""
     view_3d: View3d = field(default_factory=View3d)
     prediction_note: str = ""
     """Origin of the predicted pose in the 3-D view, or why there is none; empty while it is not shown."""
@@ -283,6 +285,7 @@ class StateChanges(TypedDict, total=False):
     drag: DragState | None
     drag_seqs: tuple[tuple[int, int], ...]
     pages_pausing_3d: frozenset[int]
+    pages_blurring_faces: frozenset[int]
     view_3d: View3d
     prediction_note: str
     floor: FloorState

@@ -47,6 +47,14 @@ class View3dSettings:
             others = self._session_state.state.pages_pausing_3d - {page}
             self._session_state.set(pages_pausing_3d=others | {page} if paused else others)
 
+    def blur_faces(self, page: int, is_blurred: bool) -> None:
+        """Blur faces in pictures of the 3-D view while a page does so in its views, given by its number."""
+        with self._session_state.lock:
+            others = self._session_state.state.pages_blurring_faces - {page}
+            pages = others | {page} if is_blurred else others
+            if pages != self._session_state.state.pages_blurring_faces:
+                self._session_state.set(pages_blurring_faces=pages)
+
     def snap(self, camera: int | None) -> None:
         """Look through a camera, by index, with its image behind the bodies; None frees the view."""
         if camera is None or 0 <= camera < len(self._session_state.session.cameras):

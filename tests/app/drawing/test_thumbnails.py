@@ -8,7 +8,6 @@ from staging import cameras_around
 from app.drawing import thumbnails
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.interchange.exports.faces import head_surface
 
 ORANGE = "#ff8000"
 
@@ -42,17 +41,6 @@ def test_the_view_is_the_one_that_shows_the_limb(body):
 def test_a_person_that_no_view_shows_has_none(body):
     away = PosedBody(body.model, body.model.retract(body.values, 50.0 * (np.arange(body.model.n_dofs) == 0)))
     assert thumbnails.choose_crop([away], 0, None, cameras_around(1)) is None
-
-
-def test_heads_alone_are_blurred(body):
-    (camera,) = cameras_around(1)
-    sharp = np.random.default_rng(0).integers(0, 255, (camera.height, camera.width, 3)).astype(np.uint8)
-    blurred = thumbnails.without_faces(sharp, camera, [body])
-    head = camera.project(head_surface(body)).mean(axis=0).astype(int)
-    foot = camera.project(body.points_world[[body.model.point_names.index("left_ankle")]])[0].astype(int)
-    for (u, v), is_blurred in ((head, True), (foot, False)):
-        near = np.s_[v - 3 : v + 4, u - 3 : u + 4]
-        assert (blurred[near].std() < 0.4 * sharp[near].std()) == is_blurred
 
 
 @pytest.mark.parametrize("damaged", [False, True])
