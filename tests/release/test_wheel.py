@@ -161,6 +161,7 @@ def test_the_metadata_name_the_version_and_each_python(built):
         "3.11",
         "3.12",
         "3.13",
+        "3.14",
     ]
 
 
