@@ -129,7 +129,7 @@ class Hour:
         """Click the name of a person, if there are several; returns the number of clicks."""
         if len(self.people) == 1:
             return 0
-        await self.stranger.click(f"#people label[title^='Select {list(self.people)[person]} ']")
+        await self.stranger.click(f"#people label[title='Select {list(self.people)[person]}']")
         await self.stranger.until(f"quadrille.state.state.person === {person}")
         return 1
 
