@@ -153,14 +153,18 @@ def head_circles(session: Session, state: State, cameras: Collection[int]) -> li
     """Return the circles of all people in some views, given by index, whether they are drawn or not."""
     found = []
     for time, group in at_one_time(picture_times(session, state.frame, cameras)):
-        bodies = ahead(bodies_in(session, state), time)
+        surfaces = head_surfaces(ahead(bodies_in(session, state), time))
         for index in group:
-            circles = circles_around_heads(bodies, session.cameras[index].camera.pinhole)
+            circles = circles_around(surfaces, session.cameras[index].camera.pinhole)
             found += [HeadCircle(index, float(u), float(v), radius_px) for (u, v), radius_px in circles]
     return found
 
 
-def circles_around_heads(bodies: Sequence[PosedBody], camera: Camera) -> list[Circle]:
-    """Return what hides the heads of bodies in an undistorted image; a body may have no head."""
-    surfaces = (camera.project(head_surface(body)) for body in bodies if "head" in body.model.part_index)
-    return [around(px[seen]) for px in surfaces if (seen := np.isfinite(px).all(axis=1)).any()]
+def head_surfaces(bodies: Sequence[PosedBody]) -> list[Array]:
+    """Return points on the heads of the bodies that have one, (n, 3) each, world, metres."""
+    return [head_surface(body) for body in bodies if "head" in body.model.part_index]
+
+
+def circles_around(surfaces: Sequence[Array], camera: Camera) -> list[Circle]:
+    """Return what hides surfaces in an undistorted image."""
+    return [around(px[seen]) for px in map(camera.project, surfaces) if (seen := np.isfinite(px).all(axis=1)).any()]

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.control.controller import Controller
 from app.drawing import thumbnails
-from app.drawing.joint_handles import circles_around_heads
+from app.drawing.joint_handles import circles_around, head_surfaces
 from app.session.footage_crops import FootageCrops
 from app.state.identity import Identity
 from tracker.body.limbs import limbs
@@ -102,7 +102,7 @@ class Thumbnails:
         limb = thumbnails.limb_parts(bodies, wanted.person, wanted.limb)
         then = ahead(bodies, self._cameras[crop.camera].clock.ahead(wanted.frame))
         if wanted.is_blurred and image is not None:
-            image = blurred(image, circles_around_heads(then, cameras[crop.camera]))
+            image = blurred(image, circles_around(head_surfaces(then), cameras[crop.camera]))
         return thumbnails.thumbnail(image, cameras[crop.camera], crop.region, then, wanted.colors, limb)
 
     def _follow_cameras(self) -> None:
