@@ -10,10 +10,10 @@ from tracker.estimation.runs.path_assessment import RunPose
 from tracker.estimation.tracking.confidence import classify_limbs, probabilities
 from tracker.estimation.tracking.pose_errors import (
     elsewhere_odds,
+    even_odds,
     limb_odds,
     mass_odds,
     point_covariances,
-    unshown_odds,
 )
 from tracker.estimation.tracking.remarks import may_be_elsewhere, uncertain, without_uncertainty
 from tracker.pipeline.tracked_changes import number
@@ -29,19 +29,18 @@ def assessed_by_run(model: BodyModel, pose: PoseRecord, found: RunPose) -> PoseR
         found: what all frames of the run say about it.
     """
     errors = point_covariances(model, found.errors_m2)
+    n = len(limbs(model))
     searched = [found.is_searched and len(limb.parts) > 1 for limb in limbs(model)]
-    odds = np.stack([
-        limb_odds(model, errors), mass_odds(found.elsewhere), elsewhere_odds(found.by_colors, searched),
-        unshown_odds(found.is_shown),
-    ])  # fmt: skip
-    reasons = [""] * len(searched)
-    for i, source in enumerate(odds[:, :, 0].argmax(axis=0)):
-        if source == 1 and not found.others:  # else the remark on them says so
-            reasons[i] = f": elsewhere on {100 * found.elsewhere[i]:.0f}% of the likely paths"
-        elif source == 2:
-            reasons[i] = f": {found.against[i]}"
-        elif source == 3:
-            reasons[i] = ": fewer than two views show it"
+    shares = ["" if found.others else f": elsewhere on {100 * m:.0f}% of the likely paths" for m in found.elsewhere]
+    evidence = (
+        (limb_odds(model, errors), [""] * n),
+        (mass_odds(found.elsewhere), shares),  # the remark on others says so, too
+        (elsewhere_odds(found.by_colors, searched), [f": {against}" for against in found.against]),
+        (even_odds(found.is_shown), [": fewer than two views show it"] * n),
+        (even_odds(np.full(n, found.is_facing_sure)), [": contours do not tell which way the person faces"] * n),
+    )
+    odds = np.stack([of_limbs for of_limbs, _ in evidence])
+    reasons = [evidence[source][1][i] for i, source in enumerate(odds[:, :, 0].argmax(axis=0))]
     remarks = without_uncertainty(pose.remark, alternatives=True)
     if found.others:
         remarks.append(may_be_elsewhere(PosedBody(model, pose.values), found.others))

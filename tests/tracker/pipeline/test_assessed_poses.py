@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from run_poses import MOVED, run_pose
 
-from tracker.body.limbs import limbs
+from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.estimation.fitting.hypothesis import Hypothesis
@@ -12,6 +12,8 @@ from tracker.formats.model_toml import load_model
 from tracker.pipeline.assessed_poses import assessed_by_run
 from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row
 from tracker.session.store.records import PoseRecord
+
+FACING = "contours do not tell which way the person faces"
 
 
 def record(model, remark=""):
@@ -79,6 +81,13 @@ def test_a_limb_that_fewer_than_two_views_show_is_doubtful(gavrila):
     assert (assessment.status, assessment.remark) == ("doubtful", "left arm uncertain: fewer than two views show it")
     lost = assessed(gavrila, is_shown=at_limb(gavrila, False, rest=True), elsewhere=at_limb(gavrila, 0.9))
     assert lost.status == "lost"
+
+
+def test_all_limbs_are_doubtful_where_the_way_that_a_person_faces_is_not_sure(gavrila):
+    assessment = assessed(gavrila, is_facing_sure=False)
+    assert assessment.status == "doubtful"
+    assert assessment.remark == f"{limb_display_name(limbs(gavrila)[0].name)} uncertain: {FACING}"
+    assert min(assessment.limbs_lost) > 0.1
 
 
 def test_the_head_is_not_searched():

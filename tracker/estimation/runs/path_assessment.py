@@ -55,6 +55,8 @@ class RunPose(NamedTuple):
     """Cost of the poses of all people on the frame, px of the footage."""
     view_costs_px: tuple[float, ...] = ()
     """The same in each view, (V,)."""
+    is_facing_sure: bool = True
+    """Whether it is clear which way the person faces in the run."""
 
 
 def assessed_path(

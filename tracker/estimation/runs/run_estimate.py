@@ -8,7 +8,6 @@ problem moves its poses (`tracker.estimation.trajectory.solve`). The hypotheses 
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +21,8 @@ from tracker.estimation.by_frame.frame_problem import Bodies, with_body
 from tracker.estimation.by_frame.pose_score import common_evidence
 from tracker.estimation.by_frame.region_scorer import FrameEvidence
 from tracker.estimation.by_frame.settings import EstimationSettings
+from tracker.estimation.fitting.limb_exchange import turned_round
+from tracker.estimation.runs.facing import KNOWN, Facing, turning_nats
 from tracker.estimation.runs.frame_hypotheses import FrameHypotheses, Proposal
 from tracker.estimation.runs.path_assessment import RunPose, assessed_path
 from tracker.estimation.runs.path_search import PathSearch
@@ -100,6 +101,7 @@ class _RunEstimate:
         self._places = {k: i for i, k in enumerate(self._frames)}
         self._views: dict[int, tuple[ViewEvidence, ...]] = {}
         self._found: dict[int, dict[int, RunPose]] = {i: {} for i in run.subjects.tracked}
+        self._facing, self._learnt = dict.fromkeys(run.subjects.tracked, KNOWN), list[RegionModel]()
 
     def steps(self) -> Generator[Progress, None, dict[int, dict[int, RunPose]]]:
         """Do the work, block by block."""
@@ -124,7 +126,8 @@ class _RunEstimate:
             if k not in self._views:
                 self._views[k] = self._observe(k, [(i, p.pose) for i in people for p in proposals[k, i]])
             yield 2 * done
-        evidence = {k: self._evidence(k) for k in used}
+        colors = self._colors()
+        evidence = {k: self._evidence(k, colors) for k in used}
         done, searches = 2 * n, dict[int, PathSearch]()
         for turn in range(n_turns):
             for i in people:
@@ -150,7 +153,7 @@ class _RunEstimate:
                 cost = frame_cost(self._run.observer.origin.evidence(k), self._bodies(k))
                 known = {"cost_px": cost.total_px, "view_costs_px": tuple(map(float, cost.view_costs_px))}
                 for i in people:
-                    self._found[i][k] = assessed[i][t]._replace(**known)
+                    self._found[i][k] = assessed[i][t]._replace(is_facing_sure=self._facing[i].is_sure, **known)
 
     def _proposals(self, frame: int, person: int) -> list[Proposal]:
         """Return poses of a person on a frame by all that is known."""
@@ -188,18 +191,33 @@ class _RunEstimate:
         others = (with_body(here, i, PosedBody(here[i].model, pose, here[i].velocity)) for i, pose in proposals)
         return common_evidence(self._run.observer, frame, [here, *others], self._run.settings)
 
-    def _evidence(self, frame: int) -> FrameEvidence:
+    def _evidence(self, frame: int, colors: RegionModel) -> FrameEvidence:
         views = self._views[frame]
-        return FrameEvidence(views, self._colors, self._colors.frame(views, self._bodies(frame)))
+        return FrameEvidence(views, colors, colors.frame(views, self._bodies(frame)))
 
-    @cached_property
     def _colors(self) -> RegionModel:
-        """Appearance of the people and places of the run."""
-        observer, frames = self._run.observer, list[LearningFrame]()
-        for k in learning_frames(self._frames):
-            views = self._views.get(k) or self._observe(k)
-            frames.append(LearningFrame(tuple(map(with_colors_only, views)), self._bodies(k)))
-        return learn_regions(frames, observer.working_cameras, observer.empty_scenes())
+        """Return the appearance of the people and places of the run. It is learnt once, from people who face the way
+        that contours say."""
+        if not self._learnt:
+            observer, at = self._run.observer, learning_frames(self._frames)
+            nats, seen = {i: list[float]() for i in self._found if self._is_free(i)}, list[tuple[ViewEvidence, ...]]()
+            for k in at:
+                views = self._views.get(k) or self._observe(k)
+                for i, of_person in nats.items():
+                    of_person.append(turning_nats(views, self._bodies(k), i, self._run.settings))
+                seen.append(tuple(map(with_colors_only, views)))
+            self._facing |= {i: Facing.of(of_person) for i, of_person in nats.items()}
+            for i in (i for i, facing in self._facing.items() if facing.is_turned):
+                model = self._run.subjects.models[i]
+                turned = [turned_round(PosedBody(model, self._poses[k][i])) for k in self._frames]
+                self._take(self._frames, i, np.array(turned))
+            frames = [LearningFrame(views, self._bodies(k)) for k, views in zip(at, seen, strict=True)]
+            self._learnt.append(learn_regions(frames, observer.working_cameras, observer.empty_scenes()))
+        return self._learnt[0]
+
+    def _is_free(self, person: int) -> bool:
+        """Return whether nothing says which way a person faces: neither a keyframe nor a pose beside the run."""
+        return not self._run.around and not any(person in own for own in self._run.subjects.keyframes.values())
 
     def _solve(
         self, used: Sequence[int], person: int, search: PathSearch, done: int

@@ -85,12 +85,12 @@ def mass_odds(masses: Array) -> Array:
     return odds[:, None] + (0.0, -LOST_NATS)
 
 
-def unshown_odds(is_shown: Mask) -> Array:
-    """Return the log odds that each limb is off and lost, (n_limbs, 2), where fewer than two views show it.
+def even_odds(is_known: Mask) -> Array:
+    """Return the log odds that each limb is off and lost, (n_limbs, 2), where nothing says where it is, (n_limbs,).
 
-    It is then off as likely as not. Nothing follows of limbs that are shown, (n_limbs,).
+    It is then off as likely as not. Nothing follows of the other limbs.
     """
-    return np.where(is_shown, -np.inf, 0.0)[:, None] + (0.0, -LOST_NATS)
+    return np.where(is_known, -np.inf, 0.0)[:, None] + (0.0, -LOST_NATS)
 
 
 def beyond(radius_m: float, sigma_m: Array) -> Array:

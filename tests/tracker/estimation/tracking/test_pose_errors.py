@@ -13,10 +13,10 @@ from tracker.estimation.tracking.pose_errors import (
     SELDOM_NATS,
     beyond,
     elsewhere_odds,
+    even_odds,
     limb_odds,
     mass_odds,
     point_covariances,
-    unshown_odds,
 )
 
 
@@ -64,6 +64,6 @@ def test_colors_count_less_against_a_limb_that_was_searched():
 
 
 def test_a_limb_that_one_view_shows_is_off_as_likely_as_not():
-    odds = unshown_odds(np.array([True, False]))
+    odds = even_odds(np.array([True, False]))
     assert probabilities(odds[:, 0]).tolist() == [0.0, 0.5]
     assert [classify_limbs(odds[i : i + 1]) for i in range(2)] == ["good", "doubtful"]
