@@ -41,8 +41,8 @@ def write_second_pass(
     Args:
         n: number of tasks. They are drawn at random, but always the same ones.
     """
-    own = sorted((t for t in tasks if _is_for(t, annotator)), key=lambda task: derived_uid("repeat", task.row.uid))
-    return _write(folder, session, log, tasks, own[:n])
+    due = sorted((t for t in tasks if _is_for(t, annotator)), key=lambda task: derived_uid("repeat", task.row.uid))
+    return _write(folder, session, log, tasks, due[:n])
 
 
 def _write(folder: Path, session: Session, log: EditLog, tasks: Sequence[Task], own: Sequence[Task]) -> int:

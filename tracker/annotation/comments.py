@@ -53,15 +53,15 @@ def resolve_comment(store: AnnotationStore, start: str, resolved: bool = True, a
     Raises:
         TrackerError: no comment or several begin so.
     """
-    found = [comment for comment in read_comments(store) if start and comment.row.uid.startswith(start)]
-    if len(found) != 1:
+    named = [comment for comment in read_comments(store) if start and comment.row.uid.startswith(start)]
+    if len(named) != 1:
         raise TrackerError(
-            f"expected the first digits of one comment, found {len(found)} that begin with '{start}'; list the comments"
+            f"expected the first digits of one comment, found {len(named)} that begin with '{start}'; list the comments"
         )
-    row = found[0].row
+    row = named[0].row
     change = row._replace(uid=new_uid(), about=row.uid, text="", resolved=int(resolved), author=_by(author), time=now())
     store.tasks.add(comments=[change])
-    return found[0]
+    return named[0]
 
 
 def read_comments(store: AnnotationStore) -> list[Comment]:

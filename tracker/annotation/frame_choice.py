@@ -82,5 +82,5 @@ def _posture(pose: StoredPose) -> Array:
     """Return the joints in the frame of the root part, m, (3 * n_points,)."""
     body = pose.body
     T_root_world = np.linalg.inv(body.kinematics.Ts_world_part[0])
-    found: Array = (body.joint_centers_world @ T_root_world[:3, :3].T + T_root_world[:3, 3]).ravel()
-    return found
+    features: Array = (body.joint_centers_world @ T_root_world[:3, :3].T + T_root_world[:3, 3]).ravel()
+    return features

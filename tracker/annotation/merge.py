@@ -112,19 +112,19 @@ def _body(text: str) -> BodyModel:
 
 def _joined_revisions(revisions: Sequence[ModelRevision]) -> list[ModelRevision]:
     """Return each body model once, oldest first."""
-    found: dict[tuple[str, str], ModelRevision] = {}
+    first_of: dict[tuple[str, str], ModelRevision] = {}
     for r in sorted(revisions, key=lambda r: (r.time, r.person, r.toml)):
-        found.setdefault((r.person, r.toml), r)
-    return list(found.values())
+        first_of.setdefault((r.person, r.toml), r)
+    return list(first_of.values())
 
 
 def _joined_settings(a: EditLog, b: EditLog) -> dict[str, Any]:
     """Join settings by name and key. Of two other values, that of the copy with the later edit counts."""
     sides = [(_last(log), json.dumps(plain_settings(log), sort_keys=True), plain_settings(log)) for log in (a, b)]
     (*_, other), (*_, one) = sorted(sides, key=lambda side: side[:2])
-    found = _joined(one, other)
-    assert isinstance(found, dict)
-    return found
+    joined = _joined(one, other)
+    assert isinstance(joined, dict)
+    return joined
 
 
 def _last(log: EditLog) -> str:
@@ -146,10 +146,10 @@ def _joined_rows(a: Rows, b: Rows, conflicts: Sequence[Conflict]) -> Rows:
 
 def _by_uid(rows: Sequence[_Row]) -> list[_Row]:
     """Return each row once, the earlier one where two copies planned the same; earliest first."""
-    found: dict[str, _Row] = {}
+    first_of: dict[str, _Row] = {}
     for row in sorted(rows, key=lambda r: (r.time, r)):
-        found.setdefault(row.uid, row)
-    return list(found.values())
+        first_of.setdefault(row.uid, row)
+    return list(first_of.values())
 
 
 def _disagreements(conflicts: Sequence[Conflict]) -> tuple[list[TaskRow], list[StateRow]]:

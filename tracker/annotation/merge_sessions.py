@@ -62,8 +62,8 @@ def merge_sessions(a: Path, b: Path, into: Path, tolerance_m: float) -> MergeRep
     people = _people(later[1], earlier[1], merged) if earlier[0].revisions else later[1].people  # never opened
     session = replace(later[1], people=people)
     notes = write_session_copy(into, session, merged.log, merged.numbered, [later[1].folder, earlier[1].folder])
-    own = len(uids[0] - uids[1]), len(uids[1] - uids[0])
-    return MergeReport(len(merged.log.edits), own, tuple(merged.conflicts), tuple(notes))
+    only_here = len(uids[0] - uids[1]), len(uids[1] - uids[0])
+    return MergeReport(len(merged.log.edits), only_here, tuple(merged.conflicts), tuple(notes))
 
 
 def _has_one_origin(sessions: Sequence[Session], logs: Sequence[EditLog]) -> bool:

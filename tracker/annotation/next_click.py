@@ -120,11 +120,11 @@ def propose(
     while len(clicks) < n and (
         now_mm > (1 + hand.tolerance) * best_mm or any(p.errors.is_lost.any() for p in people.values())
     ):
-        found = _best(people, poses, working, total)
-        if found is None:
+        click = _best(people, poses, working, total)
+        if click is None:
             break
-        clicks.append(found)
-        now_mm -= found.gain_mm
+        clicks.append(click)
+        now_mm -= click.gain_mm
     return Proposals(tuple(clicks), float(error_mm), (max(0.0, float(error_mm) - half_mm), float(error_mm) + half_mm),
                      float(best_mm))  # fmt: skip
 
@@ -178,8 +178,8 @@ class _Person:
         for v, camera in enumerate(cameras):
             px, J = camera.project_with_jacobian(points)
             inside = np.all((px >= 0) & (px <= np.array(camera.size) - 1), axis=1) & (camera.depths(points) > 0)
-            own = np.einsum("nki,nkj->nij", J, J) * inside[:, None, None] / hand.sigma_px**2
-            self._information[v] = own.reshape(n_frames, n_joints, 3, 3)
+            information = np.einsum("nki,nkj->nij", J, J) * inside[:, None, None] / hand.sigma_px**2
+            self._information[v] = information.reshape(n_frames, n_joints, 3, 3)
         self._pairs = [*combinations(range(len(cameras)), min(2, len(cameras)))]
         by_hand = self._by_hand(slice(None))
         self._variances = np.empty((n_frames, n_joints))  # of a joint that is corrected, in the best views of its unit
@@ -268,9 +268,9 @@ class _Person:
         """Return the indices of the parts of a unit."""
         at = [self._model.point_names.index(n) for n, u in zip(self.errors.joints, self.errors.unit_of, strict=True)
               if u == unit]  # fmt: skip
-        own = {int(p) for p in self._model.proximal_parts[at]}
-        whole = [x.parts for x in limbs(self._model) if own & {*x.parts.tolist()}]
-        return np.unique(np.concatenate(whole)) if whole else np.array(sorted(own))
+        parts = {int(p) for p in self._model.proximal_parts[at]}
+        whole = [x.parts for x in limbs(self._model) if parts & {*x.parts.tolist()}]
+        return np.unique(np.concatenate(whole)) if whole else np.array(sorted(parts))
 
     def _carried(self, t: int) -> tuple[slice, Array]:
         """Return the frames to which an action is carried, within the keyframes around it, and its share on each."""
@@ -310,6 +310,6 @@ def _shown(bodies: Sequence[PosedBody], model: BodyModel, camera: Camera) -> Arr
     ends = seen.pieces_px.astype(np.float64).reshape(-1, 2, 2)
     lengths, middles = np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1), ends.mean(axis=1)
     inside = np.all((middles >= 0) & (middles <= np.array(camera.size) - 1), axis=1)
-    own = seen.parts < n
-    shown = np.bincount(seen.parts[own], (lengths * (~seen.occluded & inside))[own], n)
-    return np.asarray(shown / np.maximum(np.bincount(seen.parts[own], lengths[own], n), TINY))
+    is_of_body = seen.parts < n
+    shown = np.bincount(seen.parts[is_of_body], (lengths * (~seen.occluded & inside))[is_of_body], n)
+    return np.asarray(shown / np.maximum(np.bincount(seen.parts[is_of_body], lengths[is_of_body], n), TINY))

@@ -110,8 +110,8 @@ def is_disputed(store: AnnotationStore, person: str, frame: int) -> bool:
 
 def count_states(tasks: Sequence[Task]) -> dict[str, int]:
     """Return the number of tasks in each of `STATES`, and their `total` without withdrawn ones."""
-    found = Counter(task.state for task in tasks)
-    counts: dict[str, int] = {state: found[state] for state in STATES}
+    n_tasks = Counter(task.state for task in tasks)
+    counts: dict[str, int] = {state: n_tasks[state] for state in STATES}
     return counts | {"total": sum(counts.values())}
 
 

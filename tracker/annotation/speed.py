@@ -83,9 +83,9 @@ def _verified_poses(store: AnnotationStore, tasks: list[Task]) -> dict[str, set[
     for made in store.tasks.keyframe_edits():
         last[made.person, made.frame] = made.author
         makers[made.person, made.frame].add(made.author)
-    found: dict[str, set[tuple[str, int]]] = defaultdict(set)
+    verified: dict[str, set[tuple[str, int]]] = defaultdict(set)
     for row in (task.row for task in tasks if task.state == "verified"):
         at = row.person, row.frame
         if at in last:
-            found[row.annotator if row.annotator in makers[at] else last[at]].add(at)
-    return found
+            verified[row.annotator if row.annotator in makers[at] else last[at]].add(at)
+    return verified

@@ -43,25 +43,25 @@ class Conflict(NamedTuple):
 
 def poses_after(edits: Iterable[LoggedEdit], origins: Mapping[str, LoggedEdit]) -> dict[Pair, Shown]:
     """Return the poses after edits; `origins` are all edits by identity."""
-    found: dict[Pair, Shown] = {}
+    poses: dict[Pair, Shown] = {}
     for edit in edits:
         for key, row in edit.poses:
-            found.pop(key, None)
+            poses.pop(key, None)
             if row.pose is not None:
                 made = origins[row.made_in or edit.uid]
-                found[key] = Shown(row._replace(made_in=made.uid), made.time, made.author)
-    return found
+                poses[key] = Shown(row._replace(made_in=made.uid), made.time, made.author)
+    return poses
 
 
 def pins_after(edits: Iterable[LoggedEdit]) -> dict[PinKey, tuple[tuple[float, float], str, str]]:
     """Return the pins after edits: position, time and identity of the edit."""
-    found: dict[PinKey, tuple[tuple[float, float], str, str]] = {}
+    pins: dict[PinKey, tuple[tuple[float, float], str, str]] = {}
     for edit in edits:
         for key, place in edit.pins:
-            found.pop(key, None)
+            pins.pop(key, None)
             if place is not None:
-                found[key] = (place, edit.time, edit.uid)
-    return found
+                pins[key] = (place, edit.time, edit.uid)
+    return pins
 
 
 def join_poses(
@@ -153,5 +153,5 @@ def _with_alternative(row: PoseRow, other: PoseRow) -> PoseRow:
     """Return a pose with another one as its first alternative."""
     assert other.pose is not None
     cost = other.pose[COLUMNS.index("cost_px")]
-    found = ((other.pose[_BODY], other.pose[NUMBERS], cost), *row.alternatives)
-    return row._replace(alternatives=tuple(dict.fromkeys(found)))
+    alternatives = ((other.pose[_BODY], other.pose[NUMBERS], cost), *row.alternatives)
+    return row._replace(alternatives=tuple(dict.fromkeys(alternatives)))

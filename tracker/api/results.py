@@ -32,17 +32,17 @@ def read_poses(session: SessionOrFolder, person: PersonName = None, frames: Sequ
     Raises:
         SessionError: the person has no pose on these frames.
     """
-    found = open_session(session)
-    index = person_of(found, person)
-    motion = read_motion(found, [index], None if frames is None else frames_of(found, frames))
+    motion_of = open_session(session)
+    index = person_of(motion_of, person)
+    motion = read_motion(motion_of, [index], None if frames is None else frames_of(motion_of, frames))
     arrays = pose_arrays(motion, ExportOptions())
-    own = motion.people[index]
-    posed = [i for i, frame in enumerate(motion.frames) if frame in own.poses]
+    of_person = motion.people[index]
+    posed = [i for i, frame in enumerate(motion.frames) if frame in of_person.poses]
     return PoseSeries(
-        person=own.person.name,
+        person=of_person.person.name,
         frames=arrays.frames[posed],
         times_s=arrays.times_s[posed],
-        bodies=tuple(own.poses[motion.frames[i]].body for i in posed),
+        bodies=tuple(of_person.poses[motion.frames[i]].body for i in posed),
         names=arrays.points,
         joints=arrays.joints[posed, 0],
         covariances=arrays.covariances[posed, 0],

@@ -116,8 +116,8 @@ def frames_of(session: Session, frames: Sequence[int] | None) -> Sequence[int]:
     """
     wanted = range(session.n_frames) if frames is None else sorted({int(k) for k in frames})
     if not wanted or wanted[0] < 0 or wanted[-1] >= session.n_frames:
-        found = "none" if not wanted else f"{wanted[0]} to {wanted[-1]}"
-        raise TrackerError(f"expected frames from 0 to {session.n_frames - 1}, found {found}; correct them")
+        asked = "none" if not wanted else f"{wanted[0]} to {wanted[-1]}"
+        raise TrackerError(f"expected frames from 0 to {session.n_frames - 1}, found {asked}; correct them")
     steps = {b - a for a, b in pairwise(wanted)} or {1}
     return range(wanted[0], wanted[-1] + 1, steps.pop()) if len(steps) == 1 else wanted
 

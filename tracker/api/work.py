@@ -77,10 +77,10 @@ def find(
             return Found(None, ())
         used, settings = frames_of(stored.session, frames), FindSettings(keypoints=keypoints)
         sink = ProgressSink(progress)
-        found = find_people(stored.session, stored.observer, missing, used, settings, sink.report)
-        stored.store_found(found)
-        names = tuple(stored.session.people[i].name for i in found.poses)
-        return Found(found.frame, names, tuple(sentences(stored.session, found)))
+        first_poses = find_people(stored.session, stored.observer, missing, used, settings, sink.report)
+        stored.store_found(first_poses)
+        names = tuple(stored.session.people[i].name for i in first_poses.poses)
+        return Found(first_poses.frame, names, tuple(sentences(stored.session, first_poses)))
 
 
 def acquire(
@@ -110,10 +110,10 @@ def acquire(
         index = person_of(stored.session, person)
         used, settings = frames_of(stored.session, frames), AcquisitionSettings(n_frames=n_frames)
         report = ProgressSink(progress).report
-        found = acquire_body(stored.session, stored.observer, index, used, settings, report)
-        if found.is_better:
-            stored.store_body(index, found, found.frames[0])
-        return found
+        acquired = acquire_body(stored.session, stored.observer, index, used, settings, report)
+        if acquired.is_better:
+            stored.store_body(index, acquired, acquired.frames[0])
+        return acquired
 
 
 def track(

@@ -133,14 +133,14 @@ def _take_away(path: Path) -> Holder | None:
         os.rename(path, aside)  # of several workers that find it, one gets it
     except FileNotFoundError:
         return None
-    found = read_holder(aside)
-    if found != before:  # another worker has replaced it meanwhile, and gets it back
+    holder = read_holder(aside)
+    if holder != before:  # another worker has replaced it meanwhile, and gets it back
         with suppress(OSError):
             os.link(aside, path)
-        found = None
+        holder = None
     with suppress(OSError):  # a folder
         aside.unlink()
-    return found
+    return holder
 
 
 def _process(holder: Holder) -> tuple[str, str, str, int, str]:

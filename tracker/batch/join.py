@@ -203,14 +203,14 @@ class _Joiner:
         """
         stretch, step = part.stretch, self._division.range.step
         start, end = cuts.get(stretch.number), cuts.get(stretch.number + 1)
-        own = range(
+        frames = range(
             stretch.first if start is None else start.frame, stretch.last + 1 if end is None else end.frame, step
         )
         number, store = self._people.index(person), self._stores[stretch.number]
         seams = {k: s for cut in (start, end) if cut is not None for k, s in cut.seams.get(number, {}).items()}
         bodies = {r.id: writer.revision(person.name, r.toml) for r in store.model_revisions(person.name)}
         out = list[PoseChange | AssessmentChange]()
-        for frame, pose in self._poses(part, person, own).items():
+        for frame, pose in self._poses(part, person, frames).items():
             if pose.keyframe:
                 out.append(AssessmentChange.of(person.name, frame, pose))
                 continue
@@ -243,8 +243,8 @@ class _Joiner:
         return range(b.stretch.first, a.stretch.last + 1, self._division.range.step)
 
     def _poses(self, part: TrackedStretch, person: Person, frames: range) -> dict[int, PoseRecord]:
-        found = self._stores[part.stretch.number].poses(person.name, range(frames[0], frames[-1] + 1)) if frames else {}
-        return {k: pose for k, pose in found.items() if k in frames}
+        poses = self._stores[part.stretch.number].poses(person.name, range(frames[0], frames[-1] + 1)) if frames else {}
+        return {k: pose for k, pose in poses.items() if k in frames}
 
 
 class _Writer:

@@ -122,12 +122,12 @@ class Manifest:
     def result(self, task: RecordingTask) -> Result | None:
         """Return how a task ended; None if it has not. A task with a damaged file has failed."""
         try:
-            found = read_file(self.folder / "results" / f"{task.key}.json", Result)
+            result = read_file(self.folder / "results" / f"{task.key}.json", Result)
         except TrackerError as error:
             return damaged(str(error), error.remedy)
         is_whole = task.division is None and task.stretch is None
-        damage = self.divided(task).damage if found is None and is_whole else task.damage
-        return damaged(damage, None if task.damage else Remedy("do_again")) if damage else found
+        damage = self.divided(task).damage if result is None and is_whole else task.damage
+        return damaged(damage, None if task.damage else Remedy("do_again")) if damage else result
 
     def divided(self, task: RecordingTask) -> RecordingTask:
         """Return the task of a recording with its stretches, if it has some by now."""
@@ -183,11 +183,11 @@ class Manifest:
 
     def spent_on_stretches(self, task: RecordingTask) -> tuple[float, float]:
         """Return the time that the stretches of a recording took, by the clock and of processors, s."""
-        found = list[Result]()
+        results = list[Result]()
         for path in sorted((self.folder / "results").glob(f"{task.key}_*.json")):
             with suppress(TrackerError):  # a damaged one has failed
-                found += [result] if (result := read_file(path, Result)) else []
-        return sum(r.seconds for r in found), sum(r.cpu_seconds for r in found)
+                results += [result] if (result := read_file(path, Result)) else []
+        return sum(r.seconds for r in results), sum(r.cpu_seconds for r in results)
 
     def n_parts(self) -> int:
         """Return how many tasks are left that workers can do side by side: recordings, and stretches of long ones."""

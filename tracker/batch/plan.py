@@ -59,10 +59,10 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
 
     def over(self, other: "Settings") -> "Settings":
         """Return these settings, with those of another where they are not given. Options are merged one by one."""
-        own = {f: v for f in self.__struct_fields__ if (v := getattr(self, f)) is not None}
+        given = {f: v for f in self.__struct_fields__ if (v := getattr(self, f)) is not None}
         if self.options is not None:
-            own["options"] = {**(other.options or {}), **self.options}
-        return msgspec.structs.replace(other, **own)
+            given["options"] = {**(other.options or {}), **self.options}
+        return msgspec.structs.replace(other, **given)
 
 
 class _FolderFile(msgspec.Struct, forbid_unknown_fields=True):
@@ -133,24 +133,24 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
     for name in sorted(by_pattern.keys() & of_table.keys()):
         error = TrackerError("expected another name in the table than that of a session; change it")
         problems.append(Problem(f"plan {path}, '{name}'", error))
-    found = {**by_pattern, **of_table}
-    if not found and not problems:
+    footage_of = {**by_pattern, **of_table}
+    if not footage_of and not problems:
         raise TrackerError(
             f"plan {path}: expected sessions or a table with recordings, found none; 'sessions' takes paths such as "
             f"lab/*/session, of folders with {SESSION_FILE}"
         )
     if not problems:  # which hide names
-        known = ", ".join(sorted(found))[:300]
-        for name in sorted(row.recordings.keys() - found.keys()):
+        known = ", ".join(sorted(footage_of))[:300]
+        for name in sorted(row.recordings.keys() - footage_of.keys()):
             error = TrackerError(f"expected settings of recordings among {known}, found '{name}'; correct the name")
             problems.append(Problem(f"plan {path}", error))
     chosen = []
-    for name, (session, footage) in sorted(found.items()):
-        own = row.recordings.get(name, Settings())
+    for name, (session, footage) in sorted(footage_of.items()):
+        settings_of_row = row.recordings.get(name, Settings())
         try:
-            settings = own.over(_inherited(path.parent, session, row.settings))
+            settings = settings_of_row.over(_inherited(path.parent, session, row.settings))
         except TrackerError as error:
-            settings = own.over(row.settings)
+            settings = settings_of_row.over(row.settings)
             if not settings.skip:
                 problems.append(Problem(name, error))
         if not settings.skip:
@@ -163,7 +163,7 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
 
 def _by_pattern(row: _PlanFile, path: Path) -> tuple[dict[str, tuple[Path, Footage | None]], list[Problem]]:
     """Return the session folders that the patterns of a plan name, and problems of patterns."""
-    found, problems = dict[str, tuple[Path, Footage | None]](), list[Problem]()
+    folders_of, problems = dict[str, tuple[Path, Footage | None]](), list[Problem]()
     for pattern in row.sessions:
         try:
             folders = [p.resolve() for p in matches(path.parent, pattern) if p.is_dir()]
@@ -172,10 +172,10 @@ def _by_pattern(row: _PlanFile, path: Path) -> tuple[dict[str, tuple[Path, Foota
             for whole in folders:
                 check(str(whole), FilePath, "a path", TrackerError)
                 inside = whole.is_relative_to(path.parent)
-                found[(whole.relative_to(path.parent) if inside else whole).as_posix()] = (whole, None)
+                folders_of[(whole.relative_to(path.parent) if inside else whole).as_posix()] = (whole, None)
         except TrackerError as error:
             problems.append(Problem(f"plan {path}", error))
-    return found, problems
+    return folders_of, problems
 
 
 def _inherited(top: Path, session: Path, settings: Settings) -> Settings:

@@ -142,21 +142,21 @@ def _people(folder: Path, settings: Settings) -> list[_Assessed]:
 
     Long recordings are read in blocks, so that the memory that it takes does not grow with them.
     """
-    found = list[_Assessed]()
+    people = list[_Assessed]()
     try:
         session = load_session(folder)
         step = settings.stretch_frames or session.n_frames
         blocks = [range(a, min(a + step, session.n_frames)) for a in range(0, session.n_frames, step)]
         for person in settings.people or [p.name for p in session.people]:
-            own = list[_Assessed]()
+            parts = list[_Assessed]()
             for block in blocks:
                 with suppress(SessionError):  # no pose
-                    own.append(_assessed(read_poses(session, person, block)))
-            if own:
-                found.append(_Assessed(own[0].person, *map(np.concatenate, list(zip(*own, strict=True))[1:])))
+                    parts.append(_assessed(read_poses(session, person, block)))
+            if parts:
+                people.append(_Assessed(parts[0].person, *map(np.concatenate, list(zip(*parts, strict=True))[1:])))
     except TrackerError:
         return []
-    return found
+    return people
 
 
 def _assessed(poses: PoseSeries) -> _Assessed:
@@ -171,14 +171,14 @@ def _worst(people: Sequence[_Assessed]) -> tuple[int | None, str]:
 
     Keyframes are left out unless there is nothing else: a person has seen them.
     """
-    found = [
+    ranked = [
         (not seen, bool(doubted), float(np.nan_to_num(error)), -int(frame), person)
         for person, *columns in people
         for frame, error, doubted, seen in zip(*columns, strict=True)
     ]
-    if not found:
+    if not ranked:
         return None, ""
-    *_, frame, person = max(found)
+    *_, frame, person = max(ranked)
     return -frame, person
 
 

@@ -127,16 +127,16 @@ def _place(
     sources = [stored.sources(i) for i in people]
     if any(all(k in own for own in sources) for k in frames):
         return
-    found = _find(stored, people, frames, keypoints, progress)
+    first_poses = _find(stored, people, frames, keypoints, progress)
     poses = {}
     for i, other in zip(people, names or range(len(people)), strict=True):
-        named, first = people[other], found.poses[i]
+        named, first = people[other], first_poses.poses[i]
         model = stored.session.people[named].model
         if format_model(first.model) != format_model(model):  # a body keeps the size that it has in the whole recording
             body = PosedBody(model, retarget_pose(first.start.pose, first.model, model))
             first = first._replace(start=replace(first.start, body=body))
         poses[named] = first
-    stored.store_found(FirstPoses(found.frame, poses))
+    stored.store_found(FirstPoses(first_poses.frame, poses))
     stored.store_setting(FOUND, True)
 
 
@@ -150,10 +150,10 @@ def _find(
     for frame in tried:
         progress("finding first poses", 0.0)
         with suppress(TrackerError):
-            found = find_first_poses(
+            first_poses = find_first_poses(
                 session, observer, people, [frame], (cheapest,), say=lambda text: progress("finding first poses", 0.0)
             )
-            if found.is_good:
-                return found
+            if first_poses.is_good:
+                return first_poses
     sink = ProgressSink(progress)
     return find_people(session, observer, people, frames, FindSettings(keypoints=keypoints), sink.report, sink.show)

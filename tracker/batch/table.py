@@ -97,18 +97,18 @@ def matches(base: Path, pattern: str) -> list[Path]:
     Raises:
         TrackerError: a folder cannot be read, or has too much in it.
     """
-    found = {base}
+    paths = {base}
     for part in Path(pattern).parts:
-        folders = [path for path in found if os.path.isdir(path)]
+        folders = [path for path in paths if os.path.isdir(path)]
         if part == "**":
             below = (e for f in folders for e in entries_below(f, TrackerError, passes_unreadable=True))
-            found = {*folders, *(Path(e.path) for e in below if e.is_dir(follow_symlinks=False))}
+            paths = {*folders, *(Path(e.path) for e in below if e.is_dir(follow_symlinks=False))}
         elif set("*?[") & {*part}:
             accepts = partial(fnmatch, pat=part)
-            found = {path for folder in folders for path in paths_in(folder, TrackerError, accepts)}
+            paths = {path for folder in folders for path in paths_in(folder, TrackerError, accepts)}
         else:
-            found = {path for folder in folders if os.path.exists(path := folder / part)}
-    return sorted(found)
+            paths = {path for folder in folders if os.path.exists(path := folder / part)}
+    return sorted(paths)
 
 
 def _cells(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:

@@ -72,32 +72,32 @@ def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done | Div
     recording, settings = task.recording, task.recording.settings
     session, at = _session(recording), task.session(folder)
     key = _digest(task)
-    found = _tracked_before(at, key)
-    if found is None and task.stretch is not None:
+    tracked = _tracked_before(at, key)
+    if tracked is None and task.stretch is not None:
         assert task.division is not None
-        found = TrackedBefore(track_stretch(session, at, settings, task.division, task.stretch, progress))
-    elif found is None and task.division is not None:
+        tracked = TrackedBefore(track_stretch(session, at, settings, task.division, task.stretch, progress))
+    elif tracked is None and task.division is not None:
         joined = join(session, task.division, _parts(task, folder), key, progress)
         if isinstance(joined, Division):
             return joined
-        found = TrackedBefore(joined.tracked, joined.seams)
-    elif found is None:
+        tracked = TrackedBefore(joined.tracked, joined.seams)
+    elif tracked is None:
         session = _with_known_bodies(session, task, folder / "bodies")
         frames = frames_of(session, frames_to_track(settings, session))[:: settings.stride or 1]
         if isinstance(frames, range) and n_stretches(len(frames), settings.stretch_frames) > 1:
             division = begin(session, settings, frames, progress)
             _share_bodies(load_session(session.folder), task, folder / "bodies")
             return division
-        found = TrackedBefore(_track(session, recording, frames, progress))
+        tracked = TrackedBefore(_track(session, recording, frames, progress))
     with SessionLock(at), closing(AnnotationStore(at / session.annotations_path.name)) as store:
-        store.set_setting(_TRACKED, {"task": key, **msgspec.to_builtins(found)})
+        store.set_setting(_TRACKED, {"task": key, **msgspec.to_builtins(tracked)})
     if task.stretch is not None:
-        return Done(found.tracked, ())
+        return Done(tracked.tracked, ())
     _require_all(task)
     for part in task.stretches():
         shutil.rmtree(part.session(folder), ignore_errors=True)
     _share_bodies(load_session(session.folder), task, folder / "bodies")
-    return Done(found.tracked, _export(session, task, folder / "exports"), found.seams)
+    return Done(tracked.tracked, _export(session, task, folder / "exports"), tracked.seams)
 
 
 def _digest(task: RecordingTask) -> str:
@@ -129,9 +129,9 @@ def _parts(task: RecordingTask, folder: Path) -> list[TrackedStretch]:
     """
     parts = list[TrackedStretch]()
     for part in task.stretches():
-        found = _tracked_before(part.session(folder), _digest(part))
-        if found is not None and part.stretch is not None:
-            parts.append(TrackedStretch(part.stretch, part.session(folder), found.tracked))
+        tracked = _tracked_before(part.session(folder), _digest(part))
+        if tracked is not None and part.stretch is not None:
+            parts.append(TrackedStretch(part.stretch, part.session(folder), tracked.tracked))
     if not parts:
         _require_all(task)
     return parts
@@ -164,10 +164,10 @@ def _tracked_before(folder: Path, key: str) -> TrackedBefore | None:
     if not path.exists():
         return None
     with closing(AnnotationStore(path, read_only=True)) as store:
-        found: Any = store.setting(_TRACKED)
-    if found is None or found["task"] != key:
+        setting: Any = store.setting(_TRACKED)
+    if setting is None or setting["task"] != key:
         return None
-    return msgspec.convert({k: v for k, v in found.items() if k != "task"}, TrackedBefore)
+    return msgspec.convert({k: v for k, v in setting.items() if k != "task"}, TrackedBefore)
 
 
 def _with_known_bodies(session: Session, task: RecordingTask, bodies: Path) -> Session:

@@ -49,12 +49,12 @@ def work(
     manifest.make_folders()
     with one_blas_thread():  # a worker has its share of the cores already
         while not is_stopped() and (max_tasks is None or n_done < max_tasks) and not manifest.is_finished():
-            found = manifest.claim_next()
-            if found is None:
+            claimed = manifest.claim_next()
+            if claimed is None:
                 time.sleep(BEAT_S)
                 continue
             try:
-                n_done += _do(manifest, *found, do, is_stopped)
+                n_done += _do(manifest, *claimed, do, is_stopped)
             except InterruptedError:
                 break
     return n_done

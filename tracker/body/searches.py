@@ -24,5 +24,5 @@ class Search(NamedTuple):
     @classmethod
     def of(cls, kind: SearchKind, limbs: tuple[str, ...], before: float, after: float | None, taken: bool) -> "Search":
         """Return an entry with rounded costs: a tenth of a nat is a tenth of the odds."""
-        found = None if after is None or not isfinite(after) else round(float(after), 1)
-        return cls(kind, limbs, round(float(before), 1), found, bool(taken))
+        nats = None if after is None or not isfinite(after) else round(float(after), 1)
+        return cls(kind, limbs, round(float(before), 1), nats, bool(taken))

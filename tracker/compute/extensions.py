@@ -246,12 +246,12 @@ class _OwnThreadOutput:
 @cache
 def _installed() -> list[tuple[str, metadata.EntryPoint]]:
     """Return the entry points of our groups with their packages, by name."""
-    found: dict[tuple[str, str, str], tuple[str, metadata.EntryPoint]] = {}
+    entry_points: dict[tuple[str, str, str], tuple[str, metadata.EntryPoint]] = {}
     for package in metadata.distributions():
         for point in _points(package):  # a package may lie on the path twice: the first one counts
             if point.group in GROUPS:
-                found.setdefault((point.name, point.value, point.group), (_named(package), point))
-    return [found[key] for key in sorted(found)]
+                entry_points.setdefault((point.name, point.value, point.group), (_named(package), point))
+    return [entry_points[key] for key in sorted(entry_points)]
 
 
 def _points(package: metadata.Distribution) -> metadata.EntryPoints:

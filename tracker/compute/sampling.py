@@ -13,8 +13,8 @@ def spread_indices(n: int, most: int) -> NDArray[np.int64]:
 
 def without_gaps(ascending: Iterable[int]) -> list[NDArray[np.int64]]:
     """Part whole numbers into stretches of successive ones."""
-    found = np.fromiter(ascending, np.int64)
-    return [part for part in np.split(found, np.flatnonzero(np.diff(found) > 1) + 1) if len(part)]
+    numbers = np.fromiter(ascending, np.int64)
+    return [part for part in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(part)]
 
 
 def farthest_first(points: NDArray[np.float64], most: int, least: float = 0.0, fewest: int = 1) -> NDArray[np.int64]:

@@ -47,14 +47,14 @@ def distance_note(
     if not both.any():
         return None
     apart = _median_m(estimate[both], truth[both])
-    own = Reading(JointMap("the reference", {name: name for name in names}), axes)
+    as_given = Reading(JointMap("the reference", {name: name for name in names}), axes)
     known = {name: estimate[:, i] for i, name in enumerate(names)}
     in_file = truth @ axes_matrix(axes)  # the inverse of a rotation is its transpose
     vertical, is_near = floor_plane(up, None).normal, apart <= APART_M
     read = read_beside(known, in_file, frames, vertical, estimated.rate, ignores_offsets=is_near)
     if is_near:
-        return _lag_note(read, own)
-    why, remedy = _explanation(read, own, estimate[both], truth[both])
+        return _lag_note(read, as_given)
+    why, remedy = _explanation(read, as_given, estimate[both], truth[both])
     return f"the reference lies {apart:.2f} m from the poses (median over the joints){why}", remedy
 
 
@@ -68,9 +68,9 @@ def _lag_note(read: ReadPoints, own: Reading) -> tuple[str, Remedy] | None:
 def _explanation(read: ReadPoints, own: Reading, estimate: Array, truth: Array) -> tuple[str, Remedy]:
     """Say which change of the reference, (n, 3), brings it within `LOST_M` of the estimate, (n, 3)."""
     best = read.likeliest(own, [own.joint_map], in_space=True)[0]
-    found = _median_m(estimate, best.scale * truth @ axes_matrix(own.axes) @ axes_matrix(best.axes).T)
-    if found < LOST_M and best.scale == own.scale:
-        return "", Remedy("reference_axes", axes=best.axes, distance_m=found)
+    distance_m = _median_m(estimate, best.scale * truth @ axes_matrix(own.axes) @ axes_matrix(best.axes).T)
+    if distance_m < LOST_M and best.scale == own.scale:
+        return "", Remedy("reference_axes", axes=best.axes, distance_m=distance_m)
     if best.scale != own.scale:
         size = f"{1 / best.scale:.4g} times as large" if best.scale < 1 else f"{best.scale:.4g} times smaller"
         return f": it is {size}", Remedy("reference_units")

@@ -31,15 +31,15 @@ def evaluate_offsets(
         frames: the frames to compare.
         align: as there.
     """
-    found = joint_errors(*tables, frames, align)
-    R = found.R_align @ _rotations(motion, found.joints, frames)
-    local = np.einsum("nmji,nmj->nmi", R, found.vectors)
+    errors = joint_errors(*tables, frames, align)
+    R = errors.R_align @ _rotations(motion, errors.joints, frames)
+    local = np.einsum("nmji,nmj->nmi", R, errors.vectors)
     known = np.isfinite(local).all(axis=-1)
     counts = known.sum(axis=0)
     offsets = np.where(known[..., None], local, 0.0).sum(axis=0) / np.maximum(counts, 1)[:, None]
     rest = np.linalg.norm(local - offsets, axis=-1)
-    has = [(i, joint) for i, joint in enumerate(found.joints) if counts[i]]
-    limbs = rest[:, found.is_limb]
+    has = [(i, joint) for i, joint in enumerate(errors.joints) if counts[i]]
+    limbs = rest[:, errors.is_limb]
     limbs = limbs[np.isfinite(limbs)]
     return replace(
         result,

@@ -83,10 +83,10 @@ class ChapteredVideo:
     @property
     def stamps(self) -> TimeStamps | None:
         """Time stamps: the start of the first file, the worst regularity of all; None while frames are being listed."""
-        found = [c.stamps for c in self.chapters if c.stamps is not None]
-        if len(found) < len(self.chapters):
+        stamps = [c.stamps for c in self.chapters if c.stamps is not None]
+        if len(stamps) < len(self.chapters):
             return None
-        return found[0]._replace(jitter=max(s.jitter for s in found), n_gaps=sum(s.n_gaps for s in found))
+        return stamps[0]._replace(jitter=max(s.jitter for s in stamps), n_gaps=sum(s.n_gaps for s in stamps))
 
     @property
     def version(self) -> int:
@@ -162,11 +162,11 @@ def chapter_files(folder: Path) -> list[Path]:
 
 def next_chapter(path: Path) -> Path | None:
     """Return the file beside a video that continues it by its name, as GoPro, Sony, Canon and DJI number files."""
-    found = _GOPRO.fullmatch(path.stem)
-    if found is not None and found["first"]:
-        stem = f"GP01{found['first']}"
-    elif found is not None:
-        stem = f"{found['codec']}{int(found['chapter']) + 1:02}{found['recording']}"
+    parts = _GOPRO.fullmatch(path.stem)
+    if parts is not None and parts["first"]:
+        stem = f"GP01{parts['first']}"
+    elif parts is not None:
+        stem = f"{parts['codec']}{int(parts['chapter']) + 1:02}{parts['recording']}"
     elif (number := _NUMBERED.fullmatch(path.stem)) is not None:
         stem = f"{number[1]}{int(number[2]) + 1:0{len(number[2])}}{number[3] or ''}"
     else:
@@ -177,7 +177,7 @@ def next_chapter(path: Path) -> Path | None:
 
 def _order(path: Path) -> list[tuple[int, int | str]]:
     """Return a sort key: GoPro's recordings and chapters, else digits as numbers."""
-    found = _GOPRO.fullmatch(path.stem)
-    if found is not None:
-        return [(0, int(found["recording"] or found["first"])), (0, int(found["chapter"] or 0))]
+    parts = _GOPRO.fullmatch(path.stem)
+    if parts is not None:
+        return [(0, int(parts["recording"] or parts["first"])), (0, int(parts["chapter"] or 0))]
     return natural_order(path)

@@ -47,14 +47,14 @@ def picture_numbers(names: Sequence[str], may_repeat: bool = False) -> PictureNu
         alone = next(iter(places)) if len(places) == 1 else None
         return PictureNumbers(alone, reason="" if alone else f"'{names[0]}' alone does not show which number counts")
     running = [c for c in places if len(set(c)) > 1]
-    own = [c for c in running if len(set(c)) == len(names) and _follows(c, _times(words, ()))]
-    by_one = [c for c in own if _usual_step(c) == 1]
-    found = by_one or [c for c in own if _usual_step(c)]
+    whole = [c for c in running if len(set(c)) == len(names) and _follows(c, _times(words, ()))]
+    by_one = [c for c in whole if _usual_step(c) == 1]
+    found = by_one or [c for c in whole if _usual_step(c)]
     times = _times(words, {places[c] for c in by_one})
     if not by_one and times is not None:
         found = []  # parts of a time
-    if not found and times is None and own and len(running) == 1:
-        times = tuple(map(float, own[0]))
+    if not found and times is None and whole and len(running) == 1:
+        times = tuple(map(float, whole[0]))
     if not found and times is not None and len(set(times)) < len(times):
         times = None
     if may_repeat and not found and times is None:
@@ -119,12 +119,12 @@ def _times(words: Sequence[Sequence[str]], index: Collection[tuple[int, int]]) -
         parts = [_DIGITS.split(text) for text in name]
         for i, k in index:
             parts[i][k] = "#"
-        found = _TIME.search("".join(map("".join, parts)))
-        if found is None:
+        time = _TIME.search("".join(map("".join, parts)))
+        if time is None:
             return None
-        wholes.append(_whole_seconds(found))
-        digits.append(found["fraction"] or found["short"] or found["part"] or "0")
-        is_number = is_number or found["seconds"] is not None
+        wholes.append(_whole_seconds(time))
+        digits.append(time["fraction"] or time["short"] or time["part"] or "0")
+        is_number = is_number or time["seconds"] is not None
     fractions = _fractions(digits)
     if fractions is None:
         if is_number:

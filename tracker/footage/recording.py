@@ -284,9 +284,9 @@ def read_mask(source: CameraSource, k: int) -> NDArray[np.uint8] | None:
         return None
     mask = read_unchanged(path, f"{where}: mask")
     if mask is None or mask.ndim != 2 or mask.dtype != np.uint8:
-        found = "no image" if mask is None else f"{mask.dtype} with {mask.shape[2] if mask.ndim > 2 else 1} channels"
+        shape = "no image" if mask is None else f"{mask.dtype} with {mask.shape[2] if mask.ndim > 2 else 1} channels"
         raise RecordingError(
-            f"{where}: expected a gray 8-bit image as mask, found {found} in {path}; export masks as single-channel PNG"
+            f"{where}: expected a gray 8-bit image as mask, found {shape} in {path}; export masks as single-channel PNG"
         )
     check_size(source.camera.name, path, mask.shape[1::-1], source.camera.size)
     return np.asarray(mask, dtype=np.uint8)

@@ -115,7 +115,7 @@ def _gps_time(container: InputContainer, at_most_s: float = 20.0) -> StartTime |
 
     One GPS time comes each second. The first ones may come before the satellites are found.
     """
-    found: list[float] = []
+    times: list[float] = []
     for stream in container.streams.data:
         if stream.metadata.get("handler_name", "").strip("\0 \t\x0b") != "GoPro MET" or stream.time_base is None:
             continue
@@ -125,11 +125,11 @@ def _gps_time(container: InputContainer, at_most_s: float = 20.0) -> StartTime |
             at_s = float(packet.pts * stream.time_base)
             if at_s > at_most_s:
                 break
-            found += [time - at_s for time in _gps_times(bytes(packet))][:1]
-    if not found:
+            times += [time - at_s for time in _gps_times(bytes(packet))][:1]
+    if not times:
         return None
-    seconds = sorted(found)[len(found) // 2]
-    step_s = max(found) - min(found) if len(found) > 1 else 1.0
+    seconds = sorted(times)[len(times) // 2]
+    step_s = max(times) - min(times) if len(times) > 1 else 1.0
     return StartTime(GPS_TIME, f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%d %H:%M:%S.%f}", seconds, step_s)
 
 

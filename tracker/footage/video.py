@@ -198,27 +198,27 @@ class VideoFile:
         if self._closed:
             raise RecordingError(f"{self._where} has been closed")
         try:
-            found = self._present_version()
+            version = self._present_version()
         except RecordingError:
             self._release()
             raise
-        if found == self._opened_version:
+        if version == self._opened_version:
             if self._reader is None:
                 try:
                     self._open()
                 except av.FFmpegError as error:
                     raise self._unreadable(error) from error
             return
-        if self._refused is not None and self._refused[0] == found:
+        if self._refused is not None and self._refused[0] == version:
             raise RecordingError(self._refused[1])
         self._release()
         try:
-            self._take_version(found)
+            self._take_version(version)
         except (av.FFmpegError, RecordingError) as error:
             self._release()
             failure = self._unreadable(error) if isinstance(error, av.FFmpegError) else error
             if not isinstance(error, OSError):  # as a network drive has that is not there for a moment
-                self._refused = found, str(failure)
+                self._refused = version, str(failure)
             raise failure from error
 
     def _take_version(self, found: FileVersion) -> None:

@@ -108,10 +108,10 @@ class PoseAudit:
     def _read(self, person: int, frames: range) -> dict[int, _Known]:
         """Return the stored poses of a person by frame, without those of a body with other values."""
         session, who = self._session, self._session.people[person]
-        found = read_stored_poses(session.annotations_path, who.name, who.model, frames)
+        stored = read_stored_poses(session.annotations_path, who.name, who.model, frames)
         return {
             k: _Known(own.record, retarget_pose(own.body.values, own.body.model, who.model))
-            for k, own in found.items()
+            for k, own in stored.items()
             if own.body.model.value_names == who.model.value_names
         }
 
@@ -122,13 +122,13 @@ class PoseAudit:
             name, model = self._session.people[i].name, self._session.people[i].model
             revision = self._store.add_model_revision(name, format_model(model))
             for k, pose in of_person.items():
-                own = self._known[i][k].record
-                if own.keyframe:
-                    yield assessed_keyframe(model, name, k, own.values, pose)
+                record = self._known[i][k].record
+                if record.keyframe:
+                    yield assessed_keyframe(model, name, k, record.values, pose)
                     continue
-                row = assessed_by_run(model, own, pose)
+                row = assessed_by_run(model, record, pose)
                 if self._plan.replaces:
-                    before = None if "interpolated" in own.sources else replace(own, reviewed=False)
+                    before = None if "interpolated" in record.sources else replace(record, reviewed=False)
                     row = estimated_row(model, before, pose, revision, settings)
                 yield pose_change(name, k, row, pose, revision)
 
@@ -167,8 +167,8 @@ class PoseAudit:
         step, people = stretch[1] - stretch[0], range(len(self._session.people))
 
         def poses_on(k: int) -> list[Array | None]:
-            found = [self._read(i, range(k, k + 1)) for i in people]
-            return [own[k].pose if own else None for own in found]
+            stored = [self._read(i, range(k, k + 1)) for i in people]
+            return [own[k].pose if own else None for own in stored]
 
         return poses_beside(stretch[0], -step, poses_on) | poses_beside(stretch[-1], step, poses_on)
 

@@ -99,11 +99,11 @@ def acquire_body(
         begin, end = number / rounds, (number + 1) / rounds
         between = (begin + end) / 2  # tracking takes about half of a round
         tracked = _tracked_with(body, session, observer, person, frames, known, part_of(report, begin, between))
-        found = _acquire(observer, _with_joints(tracked, joints), settings, part_of(report, between, end))
-        body, number = found.body, number + 1
+        acquired = _acquire(observer, _with_joints(tracked, joints), settings, part_of(report, between, end))
+        body, number = acquired.body, number + 1
         is_enough = len(tracked.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
-        if number == rounds or is_enough or not found.is_better:
-            return found
+        if number == rounds or is_enough or not acquired.is_better:
+            return acquired
 
 
 def _with_joints(known: PosedFrames, joints: Mapping[int, PointTargets]) -> PosedFrames:
@@ -192,8 +192,8 @@ def with_acquired_bodies(recording: PosedRecording, session: Session, report: Re
     bodies, generic = dict[BodyModel, BodyModel](), generic_people(session)
     for n, person in enumerate(generic):
         part = part_of(report, n / len(generic), (n + 1) / len(generic), "acquiring sizes")
-        found = acquire_body(session, recording.observer, person, range(session.n_frames), AcquisitionSettings(), part)
-        bodies[session.people[person].model] = found.body
+        best = acquire_body(session, recording.observer, person, range(session.n_frames), AcquisitionSettings(), part)
+        bodies[session.people[person].model] = best.body
     return recording.with_bodies(bodies)
 
 

@@ -152,8 +152,8 @@ def contradiction(recording: PosedRecording) -> str:
         return ""
     n = int(np.clip(len(usable) // 10, MIN_FRAMES, N_FRAMES))
     seen = recording.seen(recording.diverse(usable, n))
-    found = glance(seen, [SizeParameters(b.model) for b in seen[0].bodies], recording.fps)
-    judged = _judged(recording, seen, found)
+    glanced = glance(seen, [SizeParameters(b.model) for b in seen[0].bodies], recording.fps)
+    judged = _judged(recording, seen, glanced)
     return "; ".join(f"{words.partition(': ')[0]} or the body has other sizes" for words in judged.contradictions)
 
 

@@ -147,9 +147,9 @@ def outdated_frames(session: Session, store: AnnotationStore) -> dict[str, list[
     """Return the frames on which people have poses of an earlier calibration, by name; nobody without such frames."""
     present, out = present_revision(store), {}
     for person in session.people:
-        found = [k for k, r in revisions_of_poses(store, person.name).items() if r != present]
-        if found:
-            out[person.name] = found
+        outdated = [k for k, r in revisions_of_poses(store, person.name).items() if r != present]
+        if outdated:
+            out[person.name] = outdated
     return out
 
 
@@ -163,8 +163,8 @@ def outdated_sizes(session: Session, store: AnnotationStore) -> list[str]:
     sizes_edits, last = store.setting(SIZES_EDITS, {}), dict[str, int]()
     for edit in sorted(done.intersection(map(int, sizes_edits))):
         last.update({name: edit for name, _, _ in sizes_changed(sizes_edits, edit)})
-    own = [p.name for p in session.people if not has_preset_proportions(p.model)]
-    return [name for name in own if last.get(name, corrected_by) < corrected_by]
+    acquired = [p.name for p in session.people if not has_preset_proportions(p.model)]
+    return [name for name in acquired if last.get(name, corrected_by) < corrected_by]
 
 
 def same_calibration(one: Session, other: Session) -> bool:

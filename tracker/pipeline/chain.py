@@ -144,12 +144,12 @@ def begin_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
         names = ", ".join(f"'{opened.session.people[i].name}'" for i in missing)
         raise TrackerError(f"expected a pose of {names}, found none", Remedy("find_or_place"))
     if missing and plan.find is not None:
-        found = find_people(opened.session, opened.observer, missing, track.frames, plan.find, sink.report, sink.show)
+        poses = find_people(opened.session, opened.observer, missing, track.frames, plan.find, sink.report, sink.show)
         sink.report(FINDING, 1.0)  # the last chance to stop before anything is stored
-        opened.store_found(found)
-        for sentence in sentences(opened.session, found):
+        opened.store_found(poses)
+        for sentence in sentences(opened.session, poses):
             sink.report(FINDING, 1.0, sentence)
-        start = found.frame
+        start = poses.frame
     else:
         start = start_frame([opened.sources(i) for i in track.people], track.frames)
     people = tuple(i for i in track.people if start in opened.sources(i))

@@ -54,10 +54,10 @@ def find_fast_moment(
         if moments:
             _, frame, centers = max(moments, key=lambda m: m[0])
             return FastMoment(frame, centers, source)
-    found = max(_picture_changes(recording, cameras, views, report), key=lambda m: m[0])
-    if not found[0] > 0:
+    fastest = max(_picture_changes(recording, cameras, views, report), key=lambda m: m[0])
+    if not fastest[0] > 0:
         raise TrackerError("expected something that moves in both views, found nothing; choose other views")
-    return FastMoment(found[1], found[2], "pictures")
+    return FastMoment(fastest[1], fastest[2], "pictures")
 
 
 _Moment = tuple[float, int, tuple[tuple[float, float], ...]]

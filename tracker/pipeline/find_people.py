@@ -103,21 +103,21 @@ def find_people(
     by_points = None
     for name in list_observations(session) if settings.keypoints is None else [settings.keypoints]:
         try:
-            found = fit_to_contours(session, observer, find_by_keypoints(session, people, frames, name), go_on)
+            first_poses = fit_to_contours(session, observer, find_by_keypoints(session, people, frames, name), go_on)
         except TrackerError:
             if settings.keypoints is not None:
                 raise
             continue
-        if found.is_good or settings.keypoints is not None:
-            return found
-        by_points = by_points or found
+        if first_poses.is_good or settings.keypoints is not None:
+            return first_poses
+        by_points = by_points or first_poses
     try:
-        found = find_first_poses_anywhere(session, observer, people, tried, settings.voxel_m, say, shown)
+        first_poses = find_first_poses_anywhere(session, observer, people, tried, settings.voxel_m, say, shown)
     except TrackerError:
         if by_points is None:
             raise
         return by_points
-    return found if found.is_good or by_points is None else by_points
+    return first_poses if first_poses.is_good or by_points is None else by_points
 
 
 def first_record(first: FirstPose, revision: int) -> PoseRecord:

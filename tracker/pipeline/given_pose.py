@@ -156,14 +156,14 @@ def _views(session: Session, person: Person, pose: Array) -> tuple[Framing, ...]
     Raises:
         TrackerError: it is in no picture.
     """
-    found = framings([c.camera for c in session.cameras], person.model.points_world(pose))
-    if not any(f.n_inside for f in found):
-        listed = "; ".join(f"'{f.camera}' {f.text}" for f in found)
+    framing = framings([c.camera for c in session.cameras], person.model.points_world(pose))
+    if not any(f.n_inside for f in framing):
+        listed = "; ".join(f"'{f.camera}' {f.text}" for f in framing)
         raise TrackerError(
             f"expected '{person.name}' in the picture of a camera, found nobody there ({listed})",
             Remedy("check_world_of_file"),
         )
-    return found
+    return framing
 
 
 def _differences(found: Sequence[str], expected: Sequence[str]) -> str:

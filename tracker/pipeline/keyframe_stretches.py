@@ -105,8 +105,8 @@ def with_seam(model: BodyModel, pose: PoseRecord, seam: Seam) -> PoseRecord:
 
 def between_keyframes(keyframes: Keyframes, person: int, frames: Sequence[int]) -> dict[int, tuple[int, int]]:
     """Return the keyframes of a person before and after each of some frames that lies between two, by frame."""
-    own = sorted(k for k, of_people in keyframes.items() if person in of_people)
-    return {k: (a, b) for a, b in pairwise(own) for k in frames if a < k < b}
+    of_person = sorted(k for k, of_people in keyframes.items() if person in of_people)
+    return {k: (a, b) for a, b in pairwise(of_person) for k in frames if a < k < b}
 
 
 def pose_checksum(pose: Array) -> str:

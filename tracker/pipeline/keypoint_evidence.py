@@ -99,13 +99,13 @@ def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[
         who = session.people[person].name
         if person not in points:
             raise TrackerError(f"expected key points of '{who}' in '{name}', found none; import them, too")
-        own = {k: len(points[person].places(k)) for k in frames}
-        if max(own.values()) < 4:
+        n_points = {k: len(points[person].places(k)) for k in frames}
+        if max(n_points.values()) < 4:
             raise TrackerError(
                 f"expected a frame with four joints of '{who}' in '{name}', found none; place the body by hand",
                 Remedy("place_body"),
             )
-        known = {k: n + own[k] for k, n in known.items() if own[k] >= 4}
+        known = {k: n + n_points[k] for k, n in known.items() if n_points[k] >= 4}
     if not known:
         raise TrackerError(
             f"expected a frame on which '{name}' has four joints of everybody, found none; find people one by one"
@@ -118,7 +118,7 @@ def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[
         seen = points[person]
         bodies[person] = fit_to_keypoints(at_observed_height(session.people[person].model, seen), seen, tried)
         costs[person] = learn_seen_body(bodies[person], seen, cameras).costs(bodies[person], seen, cameras)
-    frame = min(tried, key=lambda k: sum(own[k] for own in costs.values()))
+    frame = min(tried, key=lambda k: sum(of_person[k] for of_person in costs.values()))
     starts = {i: Hypothesis(bodies[i][frame], SOURCE, costs[i][frame], is_measured=False) for i in people}
     return FirstPoses(
         frame, {i: FirstPose(frame, start, "doubtful", float("nan"), True, ()) for i, start in starts.items()}
@@ -129,9 +129,9 @@ def at_observed_height(model: BodyModel, points: BodyPoints) -> BodyModel:
     """Return a body in preset sizes at the height at which most of its segments are as long as those observed."""
     if not has_preset_sizes(model):
         return model
-    own = segment_lengths(model.named_points_world(model.neutral()))
+    lengths = segment_lengths(model.named_points_world(model.neutral()))
     seen = segment_lengths({n: points.joints_world[:, i] for i, n in enumerate(points.names)})
-    ratio = float(np.median([seen[n] / own[n] for n in own]))
+    ratio = float(np.median([seen[n] / lengths[n] for n in lengths]))
     return model.with_height(float(np.clip(model.height_m * ratio, *HEIGHT_LIMITS_M)))
 
 
@@ -146,8 +146,8 @@ def seen_joints(model: BodyModel, points: BodyPoints, n_frames: int) -> dict[int
         n_frames: number of frames from which sizes are acquired.
     """
     sigma_m, frames = _OFFSET_M * n_frames**0.5, range(len(points.joints_world))
-    found = {k: place_joints(model, points.places(k), sigma_m) for k in frames}
-    return {k: t for k, t in found.items() if len(t.points)}
+    placed = {k: place_joints(model, points.places(k), sigma_m) for k in frames}
+    return {k: t for k, t in placed.items() if len(t.points)}
 
 
 def learn_seen_bodies(

@@ -49,12 +49,12 @@ def frames_around(frame: int, posed: Sequence[int]) -> list[int]:
         frame: the frame.
         posed: frames on which everybody has a pose, ascending.
     """
-    found, there = {frame}, set(posed)
+    stretch, there = {frame}, set(posed)
     for beside in (*[k for k in posed if k < frame][-1:], *[k for k in posed if k > frame][:1]):
         step = beside - frame
         way = itertools.takewhile(lambda k: k in there, (frame + i * step for i in range(1, HISTORY_FRAMES + 1)))
-        found.update(way)
-    return sorted(found)
+        stretch.update(way)
+    return sorted(stretch)
 
 
 def compared_pose(
@@ -84,8 +84,8 @@ def compared_pose(
     known = {k: pose.known[k] for k in frames}
     others = {(pose.frame, pose.person): [Proposal(values, "alternative") for values in pose.alternatives]}
     steps = estimate_run(RunFrames(observer, subjects, settings, session.fps, known, others, stays=True))
-    found = result_of(mapped(steps, lambda step: report("comparing poses", step.done / step.total)))
-    return found[pose.person][pose.frame]
+    estimate = result_of(mapped(steps, lambda step: report("comparing poses", step.done / step.total)))
+    return estimate[pose.person][pose.frame]
 
 
 def checked_pose(model: BodyModel, record: PoseRecord, found: RunPose) -> PoseRecord:

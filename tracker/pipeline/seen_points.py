@@ -28,10 +28,10 @@ def seen_points(
         pins: pins of the person on the frame, which go before the ends of drags.
     """
     index = {c.camera.name: i for i, c in enumerate(cameras)}
-    found = {(p, c): uv for p, views in record.settings.get(SEEN, {}).items() for c, uv in views.items()}
-    found |= {(pin.point, pin.camera): pin.position_px for pin in pins}
+    positions = {(p, c): uv for p, views in record.settings.get(SEEN, {}).items() for c, uv in views.items()}
+    positions |= {(pin.point, pin.camera): pin.position_px for pin in pins}
     out = []
-    for (point, camera), position_px in sorted(found.items()):
+    for (point, camera), position_px in sorted(positions.items()):
         if camera in index and point in model.point_names:
             u, v = cameras[index[camera]].camera.undistort_points(np.array(position_px))
             out.append(PointObservation(point, index[camera], (float(u), float(v))))

@@ -76,8 +76,8 @@ class TrackPlan:
         chosen = {k: v for k, v in named.items() if v is not None}
         start = [chosen] if chosen else []
         what = [frames[0], frames[-1], len(frames), self.people, *cameras, *start, settings]
-        found: list[Any] = json.loads(json.dumps(what))
-        return found
+        as_stored: list[Any] = json.loads(json.dumps(what))
+        return as_stored
 
 
 @contextmanager
@@ -201,24 +201,24 @@ def _tracked_before(
 def _others(store: AnnotationStore, session: Session, person: int, frame: int) -> tuple[Array, ...]:
     """Return the stored alternatives of a pose, (n_values,) each."""
     n_values = len(session.people[person].model.value_names)
-    found = store.alternatives(session.people[person].name, frame)
-    return tuple(other.values for other in found if len(other.values) == n_values)
+    alternatives = store.alternatives(session.people[person].name, frame)
+    return tuple(other.values for other in alternatives if len(other.values) == n_values)
 
 
 def _stored_starts(session: Session, store: AnnotationStore, plan: TrackPlan) -> dict[int, PoseRecord]:
     """Return the stored poses of the frame that a run goes out from, by index of the person."""
     if plan.start is None:
         return {}
-    found = {i: store.pose(session.people[i].name, plan.start) for i in plan.people}
-    return {i: record for i, record in found.items() if record is not None}
+    starts = {i: store.pose(session.people[i].name, plan.start) for i in plan.people}
+    return {i: record for i, record in starts.items() if record is not None}
 
 
 def _records_before(
     session: Session, store: AnnotationStore, frames: Sequence[int], subjects: Subjects
 ) -> dict[tuple[int, int], PoseRecord]:
     """Return the poses that an interrupted run has stored, by person and frame."""
-    found = {(i, k): store.pose(session.people[i].name, k) for i in subjects.tracked for k in frames}
-    return {at: record for at, record in found.items() if record is not None}
+    stored_poses = {(i, k): store.pose(session.people[i].name, k) for i in subjects.tracked for k in frames}
+    return {at: record for at, record in stored_poses.items() if record is not None}
 
 
 def _status(record: PoseRecord | None) -> Status:
@@ -263,14 +263,14 @@ def _poses_before(store: AnnotationStore, person: Person, first: int, step: int,
 
     past: list[Array] = []
     for frame in range(first - HISTORY_FRAMES * step, first, step):
-        found = pose(frame)
-        past = [] if found is None else [*past, found]
+        nearest = pose(frame)
+        past = [] if nearest is None else [*past, nearest]
     if past:
         return past
     near = [f for f in (first, *sorted(rows, key=lambda f: abs(f - first))) if f == first or (first - f) * step > 0]
-    found = next((p for p in map(pose, near) if p is not None), None)
-    if found is not None:
-        return [found]
+    nearest = next((p for p in map(pose, near) if p is not None), None)
+    if nearest is not None:
+        return [nearest]
     if not needed:
         return [person.model.neutral()]
     where = "before" if step > 0 else "after"

@@ -223,15 +223,15 @@ class TrackSession:
 
     def _estimated(self) -> Generator[EstimateStep, None, EstimatedRows]:
         settings, subjects = compared_by(self.tracker.settings), self.subjects
-        proposals = {at: [*found] for at, found in self._proposals.items()}
+        proposals = {at: [*estimate] for at, estimate in self._proposals.items()}
         for k, tracked in self.tracked.items():
             for i in subjects.tracked if tracked.alternatives else ():
                 proposals.setdefault((k, i), []).extend(Proposal(p, "alternative") for p in tracked.alternatives[i])
         poses = {k: tracked.poses for k, tracked in self.tracked.items()}
         before = {k: own for leg in self.legs for k, own in leg.history.items()}
         run = RunFrames(self.observer, subjects, settings, self.legs[0].run.fps, poses, proposals, before)
-        found = yield from mapped(estimate_run(run), lambda step: EstimateStep(*step))
-        return self._rows_estimated(found)
+        estimate = yield from mapped(estimate_run(run), lambda step: EstimateStep(*step))
+        return self._rows_estimated(estimate)
 
     def _rows_estimated(self, found: Mapping[int, Mapping[int, RunPose]]) -> EstimatedRows:
         """Return the rows of estimated poses, by person and frame."""

@@ -121,14 +121,14 @@ def keyframes_of(
         frames: that are looked at.
         fixed: indices of people all of whose poses are taken, because nobody tracks them.
     """
-    found: dict[int, dict[int, Array]] = {}
+    keyframes: dict[int, dict[int, Array]] = {}
     for index, person in enumerate(people):
         for row in store.frames(person.name):
             is_taken = row.frame in frames and (row.keyframe or index in fixed)
             record = store.pose(person.name, row.frame) if is_taken else None
             if record is not None and len(record.values) == len(person.model.value_names):
-                found.setdefault(row.frame, {})[index] = record.values
-    return found
+                keyframes.setdefault(row.frame, {})[index] = record.values
+    return keyframes
 
 
 def settings_record(settings: TrackerSettings) -> dict[str, Any]:

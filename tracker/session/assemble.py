@@ -301,21 +301,21 @@ def _fitted(entry: CameraEntry, footage: Footage, rescale: bool) -> Camera:
     )
     if is_multiple and rescale:
         return camera.scaled(size[0] / camera.width)
-    found = f"camera '{entry.name}': the calibration is for {camera.width}x{camera.height} pixels, and the footage has"
-    found += f" {size[0]}x{size[1]}"
+    sizes = f"camera '{entry.name}': the calibration is for {camera.width}x{camera.height} pixels, and the footage has"
+    sizes += f" {size[0]}x{size[1]}"
     if is_multiple:
         raise RecordingError(
-            f"{found}, a ratio of {ratio:g}, which is right only if the camera shows the same view at both sizes",
+            f"{sizes}, a ratio of {ratio:g}, which is right only if the camera shows the same view at both sizes",
             Remedy("rescale"),
         )
     if camera.size != size and max(abs(camera.width - size[0]), abs(camera.height - size[1])) == 1:
         raise RecordingError(
-            f"{found}: some programs write the index of the last pixel as size; correct 'size' in the calibration to "
+            f"{sizes}: some programs write the index of the last pixel as size; correct 'size' in the calibration to "
             f"{size[0]}, {size[1]}, and leave all else as it is"
         )
     if camera.size == size[::-1] and entry.eccentricity(size) < entry.eccentricity(camera.size) / 2:
         raise RecordingError(
-            f"{found}; its principal point shows that its size is height and width: exchange them in the calibration"
+            f"{sizes}; its principal point shows that its size is height and width: exchange them in the calibration"
         )
     check_size(entry.name, footage.path, size, camera.size)
     return camera
@@ -330,8 +330,8 @@ def _clocks(request: NewSession, footage: Mapping[str, Footage], fps: float) -> 
     by_names = None if request.offsets else find_name_starts(footage)
     files = {name: f.path for name, f in footage.items()}
     declared = [f.fps for f in footage.values() if f.fps is not None]
-    found = find_clock_starts(files, fps, declared) if by_names is None else [by_names]
-    clocks, notes = clock_notes(found, {name: f.n_frames for name, f in footage.items()})
+    starts = find_clock_starts(files, fps, declared) if by_names is None else [by_names]
+    clocks, notes = clock_notes(starts, {name: f.n_frames for name, f in footage.items()})
     if clocks is None:
         return None, notes
     if request.offsets:

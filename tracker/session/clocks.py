@@ -221,16 +221,16 @@ def _readings(table: MarkerTable, rates: Sequence[float]) -> dict[int, str]:
     rounding = _rounding_s(table) * rates[0]
     is_coarse = rounding > AGREE and len(table.times) < _ROWS_OF_COARSE_STAMPS
     agree = AGREE + rounding * is_coarse
-    found = {round(by_time[0]): stamps} if is_coarse else {}
+    by_second = {round(by_time[0]): stamps} if is_coarse else {}
     if any(abs(number - 1 - at) <= agree for at in by_time):
-        found[number - 1] = f"Frame# {number}, counted from 1, and {stamps}"
+        by_second[number - 1] = f"Frame# {number}, counted from 1, and {stamps}"
     if any(abs(number - at) <= agree for at in by_time):
-        found[number] = f"Frame# {number} and {stamps}, counted from 0"
+        by_second[number] = f"Frame# {number} and {stamps}, counted from 0"
         # Files that are counted from 1 in both are common; OrigDataStartFrame tells how a cut file counts.
         if number == 1 or (number > 1 and origin not in (None, 0, number)):
-            found[number - 1] = f"Frame# {number} and {stamps}, counted from 1"
-    if found.keys() & {number, number - 1}:
-        return found
+            by_second[number - 1] = f"Frame# {number} and {stamps}, counted from 1"
+    if by_second.keys() & {number, number - 1}:
+        return by_second
     return {number: f"Frame# {number}", round(by_time[0]): stamps}
 
 
@@ -274,9 +274,9 @@ def _interpolated(rows: Array, points: Array, frames: IntArray) -> Array:
     usual = float(np.median(np.diff(rows))) if len(rows) > 1 else 1.0
     is_gap = (span > 1.5 * usual) & (weight > 0) & (weight < 1)
     weight, first, second = weight[:, None, None], points[before], points[after]
-    found = np.where(weight <= 0, first, np.where(weight >= 1, second, first + weight * (second - first)))
-    found[is_gap] = np.nan
-    return np.asarray(found)
+    times = np.where(weight <= 0, first, np.where(weight >= 1, second, first + weight * (second - first)))
+    times[is_gap] = np.nan
+    return np.asarray(times)
 
 
 def _notes(table: MarkerTable, rows: Array, placed: MarkerTable, fps: float, is_chosen: bool) -> tuple[str, ...]:

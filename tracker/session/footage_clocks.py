@@ -208,13 +208,13 @@ def _followed_by(one: Chapter, other: Chapter, camera: str, folder: Path) -> str
     gap = _gap(one, other.path)
     if gap is not None and gap.is_none:
         return gap.source
-    found = "no clock in both that shows it"
+    reason = "no clock in both that shows it"
     if gap is not None:
         apart = f"{float(f'{abs(gap.seconds):.3g}'):g} s {'after' if gap.seconds > 0 else 'before'}"
-        found = f"that {other.path.name} begins {apart} "
-        found += f"{one.path.name} ends by its {gap.source}"
+        reason = f"that {other.path.name} begins {apart} "
+        reason += f"{one.path.name} ends by its {gap.source}"
     raise RecordingError(
-        f"camera '{camera}': expected the videos in {folder} to follow one another, found {found}; give one file, or "
+        f"camera '{camera}': expected the videos in {folder} to follow one another, found {reason}; give one file, or "
         "join them without a gap"
     )
 
@@ -308,9 +308,9 @@ def _paired_by_time(folders: Mapping[str, ImageFolder], times: Mapping[str, Arra
     for name, own in times.items():
         own_steps = steps[name]
         if own_steps is None or not len(common):
-            found = "too uneven to show" if own_steps is None else "without a common span, which would show"
+            reason = "too uneven to show" if own_steps is None else "without a common span, which would show"
             raise RecordingError(
-                f"camera '{name}': the times in the names of {folders[name].path} are {found} which pictures are of "
+                f"camera '{name}': the times in the names of {folders[name].path} are {reason} which pictures are of "
                 "one instant",
                 Remedy("pair_images"),
             )

@@ -36,8 +36,8 @@ def side_parts(folder: Path) -> SideParts:
 
 
 def _folder_named(folder: Path, names: tuple[str, ...]) -> Path | None:
-    found = paths_in(folder, SessionError, lambda name: name.lower() in names)
-    return next((path for path in found if path.is_dir()), None)
+    files = paths_in(folder, SessionError, lambda name: name.lower() in names)
+    return next((path for path in files if path.is_dir()), None)
 
 
 def footage_in(folder: Path) -> list[Path]:
@@ -56,13 +56,13 @@ def footage_in(folder: Path) -> list[Path]:
         return footage_in(inner)
     beside = (*_BACKGROUND, *_MASKS)
     folders = [path for path in entries if path.is_dir() and path.name.lower() not in beside]
-    found = videos or [path for path in folders if _has_footage(path)]
-    if not found:
+    footage = videos or [path for path in folders if _has_footage(path)]
+    if not footage:
         raise SessionError(
             f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
             "choose the folder that holds the footage of all cameras"
         )
-    return found
+    return footage
 
 
 def _has_footage(folder: Path) -> bool:

@@ -97,10 +97,10 @@ def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
         raise RecordingError("folders of images have no frame rate", Remedy("give_rate"))
     check(wanted, FrameRate, "the given rate" if fps is not None else "footage", RecordingError)
     if fps is None and any(not same_rate(rate, wanted) for rate in rates.values()):
-        found = ", ".join(f"'{name}' {rate:.6g}" for name, rate in rates.items())
+        listed = ", ".join(f"'{name}' {rate:.6g}" for name, rate in rates.items())
         shaky = [f"'{name}': {_irregularity(f)}" for name, f in footage.items() if _jitter(f) > _NOTED_JITTER]
         raise RecordingError(
-            f"expected one frame rate for all cameras, found {found}{''.join(f' ({s})' for s in shaky)}",
+            f"expected one frame rate for all cameras, found {listed}{''.join(f' ({s})' for s in shaky)}",
             Remedy("give_common_rate", fps=f"{usual_rate(wanted):g}"),
         )
     return wanted
@@ -173,9 +173,9 @@ def common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int], sh
                 f"{offsets[name]}; check the footage and the offsets"
             )
     if not shorten and len({f.n_frames for f in footage.values()}) > 1 and len(set(rest.values())) > 1:
-        found = ", ".join(f"'{name}' {f.n_frames}" for name, f in footage.items())
+        listed = ", ".join(f"'{name}' {f.n_frames}" for name, f in footage.items())
         raise RecordingError(
-            f"expected videos of the same number of frames, found {found}",
+            f"expected videos of the same number of frames, found {listed}",
             Remedy("give_frame_offset", n=min(rest.values())),
         )
     return min(rest.values())
@@ -190,12 +190,12 @@ def common_offsets(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -
     if offsets or len(firsts) < len(footage):
         return dict(offsets)
     begin = max(firsts.values())
-    found = {}
+    matched = {}
     for name, f in footage.items():
         assert isinstance(f, ImageFolder)
         assert f.numbers is not None
-        found[name] = sum(n < begin for n in f.numbers)
-    return {name: n for name, n in found.items() if n}
+        matched[name] = sum(n < begin for n in f.numbers)
+    return {name: n for name, n in matched.items() if n}
 
 
 def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, int], shorten: bool = False) -> None:

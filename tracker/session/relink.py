@@ -75,8 +75,8 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
         RecordingError: a file is unreadable, or not the footage that the session was made of.
     """
     check_names(places.camera_paths, [c.camera.name for c in session.cameras], "camera", "the footage by camera")
-    found = _given(session, places)
-    asked = {(f.camera, f.kind) for f in found}
+    given = _given(session, places)
+    asked = {(f.camera, f.kind) for f in given}
     missing = [m for m in missing_files(session) if (m.camera, m.kind) not in asked]
     if places.search:
         named = _files_named({m.path.name for m in missing}, places.search)
@@ -85,15 +85,15 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
                 lost, named.get(same_form(lost.path.name), []), partial(_check, session, lost.camera, lost.kind)
             )
             if new is not None:
-                found.append(Relinked(lost.camera, lost.kind, lost.path, new))
-    _check_once(found)
-    if not found:
+                given.append(Relinked(lost.camera, lost.kind, lost.path, new))
+    _check_once(given)
+    if not given:
         return session, ()
     changes: dict[str, dict[str, Path]] = {}
-    for f in found:
+    for f in given:
         changes.setdefault(f.camera, {})[f.kind] = f.new
     cameras = tuple(replace(c, **changes.get(c.camera.name, {})) for c in session.cameras)  # pyrefly: ignore[bad-argument-type]
-    return save_camera_files(session, cameras), tuple(found)
+    return save_camera_files(session, cameras), tuple(given)
 
 
 def leave_masks(session: Session) -> Session:
@@ -120,7 +120,7 @@ def _given(session: Session, places: Places) -> list[Relinked]:
         )
     masked = _masked(session, places.masks) if places.masks is not None else ()
     by_name = {same_form(name): path for name, path in places.camera_paths.items()}
-    found = []
+    missing = []
     for source in session.cameras:
         name = source.camera.name
         given: dict[PathKind, Path] = {}
@@ -133,8 +133,8 @@ def _given(session: Session, places: Places) -> list[Relinked]:
         for kind, path in given.items():
             path = Path(os.path.abspath(path))
             _check(session, name, kind, path)
-            found.append(Relinked(name, kind, getattr(source, kind), path))
-    return found
+            missing.append(Relinked(name, kind, getattr(source, kind), path))
+    return missing
 
 
 def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, list[Path]]:

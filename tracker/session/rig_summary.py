@@ -100,9 +100,9 @@ def check_shared_view(cameras: Sequence[Camera]) -> None:
             if is_apart and _shows(other, near).all(axis=1).any():
                 return
     if len(cameras) > 1:
-        found = f"none of {len(cameras)}: they stand at one place or look at other ones; check their poses and the unit"
+        views = f"none of {len(cameras)}: they stand at one place or look at other ones; check their poses and the unit"
         raise CalibrationError.mismatch(
-            "calibration", "two cameras that can see a person together", found, Remedy("any_size")
+            "calibration", "two cameras that can see a person together", views, Remedy("any_size")
         )
 
 

@@ -288,14 +288,14 @@ def _read_uid(path: Path) -> str:
         SessionError: the file holds something else, or cannot be read.
     """
     try:
-        found = read_regular(path, 100).decode("ascii", "replace").strip()
+        uid = read_regular(path, 100).decode("ascii", "replace").strip()
     except FileNotFoundError:
         return ""
     except OSError as error:
         raise SessionError(f"{path} cannot be read: {error}; see that you may read it") from error
-    if not re.fullmatch("[0-9a-f]{32}", found):
-        raise SessionError(f"{path}: expected 32 hexadecimal digits, found {quoted(found)}; copy it again or remove it")
-    return found
+    if not re.fullmatch("[0-9a-f]{32}", uid):
+        raise SessionError(f"{path}: expected 32 hexadecimal digits, found {quoted(uid)}; copy it again or remove it")
+    return uid
 
 
 def _write_session(session: Session, into: Path) -> None:

@@ -160,5 +160,5 @@ def checked(data: Any, where: str) -> SessionFile:
     Raises:
         SessionError: it does not fit the declaration.
     """
-    found: SessionFile = check(data, SessionFile, where, SessionError)
-    return found
+    content: SessionFile = check(data, SessionFile, where, SessionError)
+    return content

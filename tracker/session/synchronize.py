@@ -78,11 +78,11 @@ def find_starts(session: Session, way: str, report: Report = unreported) -> tupl
     if way == "time code":
         return starts_by_clock(session)
     if way == "sound":
-        found = starts_by_sound(session)
+        starts = starts_by_sound(session)
     else:
         with Recording(session.cameras) as recording:
-            found = starts_by_flash(session, recording, report)
-    return found, clock_disagreement(session, way, found)
+            starts = starts_by_flash(session, recording, report)
+    return starts, clock_disagreement(session, way, starts)
 
 
 def starts_by_sound(session: Session) -> list[FoundStart]:
@@ -109,12 +109,12 @@ def starts_by_sound(session: Session) -> list[FoundStart]:
     for source, sound in heard:
         if source is first:
             continue
-        found = None if sound is None else sound_delay(sound_of_first, sound)
-        if found is None:
+        delay = None if sound is None else sound_delay(sound_of_first, sound)
+        if delay is None:
             out.append(FoundStart(source.camera.name, None, None, None, False))
             continue
-        start = first.start_frames + found.delay_s * session.fps
-        out.append(FoundStart(source.camera.name, start, 1000 * found.sigma_s, found.ratio, found.is_clear))
+        start = first.start_frames + delay.delay_s * session.fps
+        out.append(FoundStart(source.camera.name, start, 1000 * delay.sigma_s, delay.ratio, delay.is_clear))
     return out
 
 
@@ -129,15 +129,15 @@ def starts_by_flash(session: Session, recording: Recording, report: Report = unr
     Raises:
         RecordingError: footage cannot be read.
     """
-    found, n = list[Flash | None](), len(session.cameras)
+    flashes, n = list[Flash | None](), len(session.cameras)
     for i in range(n):
         report("comparing by flash", i / n)
-        found.append(find_flash(recording, i, session.n_frames))
-    first, seen = session.cameras[0], found[0]
+        flashes.append(find_flash(recording, i, session.n_frames))
+    first, seen = session.cameras[0], flashes[0]
     if seen is None or not seen.is_clear:
         return [FoundStart(c.camera.name, None, None, None, False) for c in session.cameras[1:]]
     out = []
-    for source, flash in zip(session.cameras[1:], found[1:], strict=True):
+    for source, flash in zip(session.cameras[1:], flashes[1:], strict=True):
         if flash is None:
             out.append(FoundStart(source.camera.name, None, None, None, False))
             continue
@@ -199,13 +199,13 @@ def footage_clocks(session: Session, starts_by: str = "session") -> tuple[dict[s
         RecordingError: images cannot be read, or their names do not show which are of one instant.
     """
     read = {c.camera.name: read_start_times(c.footage, c.camera.name) for c in session.cameras}
-    found = {name: f"{starts[0].source} {starts[0].text}" for name, starts in read.items() if starts}
+    sources = {name: f"{starts[0].source} {starts[0].text}" for name, starts in read.items() if starts}
     chosen, notes = _clocks(session)
     if chosen is None:
-        return found, notes
-    found = {name: found.get(name, chosen.source) for name in chosen.starts}
+        return sources, notes
+    sources = {name: sources.get(name, chosen.source) for name in chosen.starts}
     starts = {c.camera.name: c.start_frames for c in session.cameras}
-    return found, disagreement(starts_by, starts, chosen.source, chosen.starts)
+    return sources, disagreement(starts_by, starts, chosen.source, chosen.starts)
 
 
 def _clocks(session: Session) -> tuple[ClockStarts | None, list[str]]:
@@ -215,8 +215,8 @@ def _clocks(session: Session) -> tuple[ClockStarts | None, list[str]]:
     if all(path.is_dir() for path in files.values()):
         by_names = find_name_starts({name: open_footage(path, name) for name, path in files.items()})
     declared = [c.declared_fps for c in session.cameras if c.declared_fps is not None]
-    found = find_clock_starts(files, session.fps, declared) if by_names is None else [by_names]
-    return clock_notes(found, n_frames)
+    starts = find_clock_starts(files, session.fps, declared) if by_names is None else [by_names]
+    return clock_notes(starts, n_frames)
 
 
 def with_starts(session: Session, starts: Mapping[str, float], rates: Mapping[str, float]) -> Session:

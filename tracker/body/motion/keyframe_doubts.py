@@ -74,7 +74,7 @@ def raised_views(
         costs_px: cost of each view on the keyframe, (n_views,); None without edges.
         others_px: the same on the frames around it that are not in doubt, (n, n_views).
     """
-    found = list[RaisedView]()
+    raised = list[RaisedView]()
     for camera, cost_px in enumerate(costs_px):
         known = [row[camera] for row in others_px if camera < len(row)]
         usual = [px for px in known if px is not None]
@@ -82,8 +82,8 @@ def raised_views(
             continue
         usual_px = float(np.median(usual))
         if cost_px > _RAISED * usual_px and cost_px > usual_px + _RAISED_PX:
-            found.append(RaisedView(camera, cost_px, usual_px))
-    return tuple(sorted(found, key=lambda view: view.usual_px / view.cost_px))
+            raised.append(RaisedView(camera, cost_px, usual_px))
+    return tuple(sorted(raised, key=lambda view: view.usual_px / view.cost_px))
 
 
 def _farthest(offsets: Array) -> NeighbourGap:

@@ -88,11 +88,11 @@ def _step_and_flips(model: BodyModel, to: Array, start: Array) -> tuple[Array, l
     winds = ~model.dof_is_length & np.isinf(model.limits).all(axis=1)
     step = np.where(winds, np.remainder(step + np.pi, 2 * np.pi) - np.pi, step)
     for joint in _euler_joints(model):
-        own = step[joint.dofs]
-        if own @ own <= np.pi**2 / 2:  # to the other set, both outer angles go by 180 degrees less
+        rotation = step[joint.dofs]
+        if rotation @ rotation <= np.pi**2 / 2:  # to the other set, both outer angles go by 180 degrees less
             continue
         other = joint.other(np.asarray(to)[joint.values], start[joint.values]) - start[joint.values]
-        if other @ other < own @ own:
+        if other @ other < rotation @ rotation:
             step[joint.dofs] = other
             flipped.append(int(joint.dofs[1]))
     return step, flipped

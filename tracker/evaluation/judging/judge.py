@@ -85,8 +85,8 @@ class Judgement:
     @property
     def worst(self) -> list[Doubt]:
         """All limbs, the most likely and farthest off first."""
-        found = [Doubt(k, limb, v) for k, of_frame in self.frames.items() for limb, v in of_frame.items()]
-        return sorted(found, key=lambda d: (-round(d.verdict.probability_off, 2), -d.verdict.distance_m))
+        doubts = [Doubt(k, limb, v) for k, of_frame in self.frames.items() for limb, v in of_frame.items()]
+        return sorted(doubts, key=lambda d: (-round(d.verdict.probability_off, 2), -d.verdict.distance_m))
 
     @property
     def share_in_order(self) -> float:
@@ -193,8 +193,8 @@ def judge_person(
 
 def _throughout(read: ReadPoints) -> tuple[int, tuple[str, ...]]:
     """Return by how many frames joints lag behind tracked ones, 0 if that is not clear, and how they are misread."""
-    own = Reading(JointMap("the import", {name: name for name in read.names}))
-    lag, found = read.lag(own), contradictions(read, own, [own.joint_map], 0, in_space=True)
+    reading = Reading(JointMap("the import", {name: name for name in read.names}))
+    lag, found = read.lag(reading), contradictions(read, reading, [reading.joint_map], 0, in_space=True)
     of_limbs = ("shift_points", "check_world_of_file")  # lags and places, which are judged anyway
     misread = tuple(str(f) for f in found if f.remedy is None or f.remedy.code not in of_limbs)
     return 0 if lag is None else -lag.frames, misread
@@ -229,8 +229,8 @@ def _lost(own: StoredPose, limb: str) -> float:
 
     model, last = own.body.model, LIMBS[limb][1]
     part = model.point_parts[model.point_names.index(last)]
-    found = [p for x, p in zip(limbs(model), own.record.limbs_lost, strict=False) if part in x.parts]
-    return float(found[0]) if found else 0.0
+    lost = [p for x, p in zip(limbs(model), own.record.limbs_lost, strict=False) if part in x.parts]
+    return float(lost[0]) if lost else 0.0
 
 
 def _constant(
@@ -254,12 +254,12 @@ def _turned(own: StoredPose, name: str, step: Array) -> Array:
 
 def _directions(offset: Array) -> str:
     words = (("forward", "back"), ("left", "right"), ("up", "down"))
-    found = [
+    directions = [
         f"{100 * abs(x):.0f} cm {ahead if x > 0 else behind}"
         for x, (ahead, behind) in zip(offset, words, strict=True)
         if abs(x) > _NOTABLE_M / 3
     ]
-    return ", ".join(found)
+    return ", ".join(directions)
 
 
 def _reason(
@@ -272,10 +272,10 @@ def _reason(
     at = {n: i for i, n in enumerate(imported.names)}
     model = own.body.model
     if all(j in at for joints in pair for j in joints):
-        found = np.array([imported.joints_world[frame][[at[j] for j in joints]] for joints in pair])
+        imported_places = np.array([imported.joints_world[frame][[at[j] for j in joints]] for joints in pair])
         centers = own.body.joint_centers_world
         places = np.array([centers[[model.point_names.index(j) for j in joints]] for joints in pair])
-        if reasons.is_exchanged(found, places):
+        if reasons.is_exchanged(imported_places, places):
             return f"{kind}s exchanged"
     said = [] if outside is None else outside.sentences(limb, imported.joints_world[frame], at)
     if any(jumps[at[j]] for j in LIMBS[limb] if j in at):

@@ -39,8 +39,8 @@ class MarkerSet(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     def names(self, landmark: str) -> tuple[str, ...]:
         """Return the names under which a file may have a landmark, the likeliest first."""
-        found: tuple[str, ...] = getattr(self.landmarks, landmark)
-        return found
+        markers: tuple[str, ...] = getattr(self.landmarks, landmark)
+        return markers
 
 
 def known_sets() -> tuple[str, ...]:
@@ -59,5 +59,5 @@ def read_marker_set(name: str) -> MarkerSet:
         raise FormatError(
             f"expected a marker set among {', '.join(known_sets())}, or a TOML file, found '{name}'; name one of them"
         )
-    found: MarkerSet = check(read_toml(path, _KIND), MarkerSet, f"marker set {path}", FormatError)
-    return found
+    marker_set: MarkerSet = check(read_toml(path, _KIND), MarkerSet, f"marker set {path}", FormatError)
+    return marker_set

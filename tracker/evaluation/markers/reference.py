@@ -132,16 +132,16 @@ def _lag(times: Array, ours: Array, marker_times: Array, theirs: Array, frame_s:
         return float(np.median(distances(lag_s)[known])) if is_covered else np.inf
 
     bounds = [(start - frame_s, start + frame_s) for start in _starts(times, ours, marker_times, theirs, frame_s)]
-    found = [minimize_scalar(distance_m, bounds=b, method="bounded") for b in bounds]
-    found.sort(key=lambda f: f.fun)
-    if not found or not np.isfinite(found[0].fun):
+    minima = [minimize_scalar(distance_m, bounds=b, method="bounded") for b in bounds]
+    minima.sort(key=lambda f: f.fun)
+    if not minima or not np.isfinite(minima[0].fun):
         raise FormatError(
             "expected markers over at least half of the tracked poses, found fewer at every lag; choose their recording"
         )
-    best, n_rows = float(found[0].x), PRIORS.posture_s / frame_s
+    best, n_rows = float(minima[0].x), PRIORS.posture_s / frame_s
     reach = int(np.ceil(n_rows))
     around = np.stack([distances(best + k * frame_s) for k in np.linspace(-reach, reach, 4 * reach + 1)])
-    others = [float(f.x) for f in found[1:] if abs(f.x - best) > PRIORS.posture_s and np.isfinite(f.fun)]
+    others = [float(f.x) for f in minima[1:] if abs(f.x - best) > PRIORS.posture_s and np.isfinite(f.fun)]
     rivals = [other for other in others if not _is_worse(distances(other), distances(best), n_rows)]
     if rivals or find_lag(around, reach, n_rows) is None:
         at = f" at {best:.2f} and {rivals[0]:.2f} s" if rivals else ""
@@ -217,9 +217,9 @@ def _at(wanted: Array, times: Array, points: Array) -> Array:
     is_gap = (np.rint(apart / np.median(np.diff(times))) > 1)[:, None, None]
     is_before, is_after = np.isclose(share, 0), np.isclose(share, 1)
     between = (1 - share) * points[after - 1] + share * points[after]
-    found = np.where(is_after, points[after], np.where(is_before, points[after - 1], between))
+    resampled = np.where(is_after, points[after], np.where(is_before, points[after - 1], between))
     is_known = is_before | is_after | ((share > 0) & (share < 1) & ~is_gap)
-    return np.asarray(np.where(is_known, found, np.nan))
+    return np.asarray(np.where(is_known, resampled, np.nan))
 
 
 def _rigid(moved: Array, ours: Array) -> Array:

@@ -137,13 +137,13 @@ class AnnotationStore:
 
     def alternatives(self, person: str, frame: int) -> tuple[Alternative, ...]:
         """Return the alternatives to a person's pose in a frame, best first."""
-        found = self._connection.all(
+        alternatives = self._connection.all(
             f"SELECT {rows.ALTERNATIVE_COLUMNS} FROM poses p JOIN alternatives a ON a.change = p.change "
             "WHERE p.person = ? AND p.frame = ? ORDER BY a.rank",
             (person, frame),
             lambda row: rows.row_to_alternative(row, f"an alternative to {rows.PoseLabel(person, frame)}"),
         )
-        return tuple(found)
+        return tuple(alternatives)
 
     def frames(self, person: str, within: range = ALL_FRAMES) -> list[FrameRow]:
         """Summarize the frames of a range in which the person has a pose, ascending; all frames by default."""
@@ -265,10 +265,10 @@ class AnnotationStore:
             DamagedStoreError: there is none.
         """
         sql = "SELECT id, person, toml, time FROM model_revisions WHERE id = ?"
-        found = self._connection.one(sql, (revision,), rows.row_to_revision)
-        if found is None:
+        stored = self._connection.one(sql, (revision,), rows.row_to_revision)
+        if stored is None:
             raise self._connection.damaged(f"a pose refers to model revision {revision}, which is missing")
-        return found
+        return stored
 
     def read_log(self) -> EditLog:
         """Read all that the store holds, without numbers of rows."""
@@ -311,12 +311,12 @@ class AnnotationStore:
 
     def setting(self, key: str, default: Any = None) -> Any:
         """Return a setting of the session, checked against its declaration; the default where it is not stored."""
-        found = self._connection.one(
+        stored = self._connection.one(
             "SELECT value FROM settings WHERE key = ?",
             (key,),
             lambda row: (checked_setting(key, rows.decoded_json(row[0], f"setting '{key}'")),),
         )
-        return default if found is None else found[0]
+        return default if stored is None else stored[0]
 
     def set_setting(self, key: str, value: Any) -> None:
         """Store a setting of the session. Settings are not part of the history."""

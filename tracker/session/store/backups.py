@@ -33,8 +33,8 @@ class Restored(NamedTuple):
 
 def backups_of(path: Path) -> list[Path]:
     """List the backups of a store, newest first. Backups of older programs, without a counter, are the oldest."""
-    found = (path.parent / FOLDER).glob(f"{path.stem}-*{path.suffix}")
-    return sorted(filter(Path.is_file, found), key=lambda backup: (_counter(backup), backup.name), reverse=True)
+    backups = (path.parent / FOLDER).glob(f"{path.stem}-*{path.suffix}")
+    return sorted(filter(Path.is_file, backups), key=lambda backup: (_counter(backup), backup.name), reverse=True)
 
 
 def _counter(backup: Path) -> int:

@@ -112,11 +112,11 @@ def differences(db: sqlite3.Connection, version: int) -> list[str]:
     Raises:
         sqlite3.Error: tables or columns are missing, or the file cannot be read.
     """
-    found = []
+    damaged = []
     known = {name: (n, total) for name, n, total in contents(db)}
     tables = [table for table in COLUMNS if version >= TABLES_SINCE or table not in LATER_TABLES]
     if set(known) != {*tables, _SCHEMA}:
-        found.append("the list of its tables is not as it was written")
+        damaged.append("the list of its tables is not as it was written")
     for table in tables:
         all_columns = COLUMNS[table]
         later = LATER_COLUMNS.get(version, {}).get(table, ())
@@ -127,14 +127,14 @@ def differences(db: sqlite3.Connection, version: int) -> list[str]:
         if wrong:
             listed = "; ".join(str(label) for (label,) in wrong[:_LISTED])
             more = f" and {len(wrong) - _LISTED} more" if len(wrong) > _LISTED else ""
-            found.append(f"rows of '{table}' are not as they were written ({listed}{more})")
+            damaged.append(f"rows of '{table}' are not as they were written ({listed}{more})")
             continue
         counted = tuple(db.execute(f"SELECT {_counted(table)}").fetchone())
         if table in known and counted != known[table]:
-            found.append(f"expected {known[table][0]} rows of '{table}' as they were written, found {counted[0]}")
+            damaged.append(f"expected {known[table][0]} rows of '{table}' as they were written, found {counted[0]}")
     if tuple(db.execute(f"SELECT {_counted_schema()}").fetchone()) != known.get(_SCHEMA):
-        found.append("the definitions of its tables are not as they were written")
-    return found
+        damaged.append("the definitions of its tables are not as they were written")
+    return damaged
 
 
 def _counted(table: str) -> str:
@@ -144,8 +144,8 @@ def _counted(table: str) -> str:
 
 def _counted_schema() -> str:
     """SQL for the number of definitions of the store's own tables and indices, and the sum of their checksums."""
-    own = ", ".join(f"'{table}'" for table in (*COLUMNS, "contents"))
-    rows = f"FROM {_SCHEMA} WHERE tbl_name IN ({own})"
+    tables = ", ".join(f"'{table}'" for table in (*COLUMNS, "contents"))
+    rows = f"FROM {_SCHEMA} WHERE tbl_name IN ({tables})"
     return f"(SELECT count(*) {rows}), (SELECT sum(row_checksum({_SCHEMA_COLUMNS})) {rows})"
 
 

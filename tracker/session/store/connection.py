@@ -137,9 +137,9 @@ class Connection:
             raise self.damaged("expected the poses of the session, found an empty file of 0 bytes")
         db = recovery.open_reader(self._path, _connect) if self._read_only else _connect(self._path, "rw")
         try:
-            found = verification.damage(db)
-            if found is not None:
-                raise self.damaged(found)
+            damage = verification.damage(db)
+            if damage is not None:
+                raise self.damaged(damage)
             version = schema.version(db)
             if version > schema.VERSION:
                 raise SessionError(

@@ -33,8 +33,8 @@ def foreign_definition(db: sqlite3.Connection) -> str | None:
 
 def _words(text: str) -> set[str]:
     """Return the words and other characters of a definition, without comments, in capitals."""
-    found = {(quoted or bare or other).upper() for quoted, bare, other in _WORD.findall(text)}
-    return found - {""}
+    words = {(quoted or bare or other).upper() for quoted, bare, other in _WORD.findall(text)}
+    return words - {""}
 
 
 @cache

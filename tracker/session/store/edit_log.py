@@ -144,13 +144,13 @@ class _ById(dict[int, T]):
 
 
 def _checked_edit(row: Sequence[Any]) -> _Edit:
-    found: _Edit = check(list(row), _Edit, f"edit {row[0]!r:.20}", DamagedStoreError)
-    return found
+    edit: _Edit = check(list(row), _Edit, f"edit {row[0]!r:.20}", DamagedStoreError)
+    return edit
 
 
 def _checked_move(*row: Any) -> Move:
-    found: Move = check(row, Move, f"the undo or redo of edit {row[1]!r:.40}", DamagedStoreError)
-    return found
+    move: Move = check(row, Move, f"the undo or redo of edit {row[1]!r:.40}", DamagedStoreError)
+    return move
 
 
 def _setting(row: Sequence[Any]) -> tuple[str, Any]:
@@ -198,7 +198,7 @@ def _poses(
     ):
         others.setdefault(change, []).append((bodies[body], values, cost_px))
     columns = ", ".join(f"c.{name}" for name in COLUMNS[:-1])
-    found: dict[int, list[tuple[Pair, PoseRow]]] = {}
+    poses: dict[int, list[tuple[Pair, PoseRow]]] = {}
     for change, edit, made_in, person, frame, *pose in connection.all(
         f"SELECT c.id, c.edit, c.made_in, c.person, c.frame, {columns}, coalesce(t.settings, c.settings) "
         "FROM pose_changes c LEFT JOIN program_settings t ON t.id = c.program_settings ORDER BY c.id",
@@ -210,8 +210,8 @@ def _poses(
             pose[_BODY], pose[_SETTINGS] = bodies[pose[_BODY]], sys.intern(pose[_SETTINGS])
             content = tuple(pose)
         row = PoseRow(content, None if made_in is None else numbers[made_in], tuple(others.get(change, ())))
-        found.setdefault(edit, []).append(((person, frame), row))
-    return found
+        poses.setdefault(edit, []).append(((person, frame), row))
+    return poses
 
 
 class Written(NamedTuple):

@@ -104,8 +104,8 @@ class EditTree:
         """Return person and frame of the poses and pins that an edit changes."""
         changed = "SELECT person, frame FROM {}_changes WHERE edit = ?1"
         sql = f"{changed.format('pose')} UNION {changed.format('pin')}"
-        found = self._connection.all(sql, (edit,), lambda row: (str(row[0]), rows.frame_number(row[1], f"edit {edit}")))
-        return set(found)
+        pairs = self._connection.all(sql, (edit,), lambda row: (str(row[0]), rows.frame_number(row[1], f"edit {edit}")))
+        return set(pairs)
 
     def _entries(self, start: str, onward: str, limit: int) -> list[HistoryEntry]:
         """Follow the tree from edit to edit; `start` and `onward` are SQL for their ids."""

@@ -97,11 +97,11 @@ def held_edits(db: sqlite3.Connection) -> set[int]:
 
 def _undone_own(db: sqlite3.Connection, author: str) -> tuple[int, str] | None:
     """Return the edit that redo in the tree would reach, and its label; None if it is not the annotator's."""
-    found = db.execute(
+    edit = db.execute(
         "SELECT id, label, author FROM edits WHERE parent IS (SELECT edit FROM head) ORDER BY id DESC LIMIT 1"
     ).fetchone()
-    is_own = found is not None and found[2] == author and found[0] not in _takers(db)
-    return (int(found[0]), str(found[1])) if is_own else None
+    is_own = edit is not None and edit[2] == author and edit[0] not in _takers(db)
+    return (int(edit[0]), str(edit[1])) if is_own else None
 
 
 def _last_own(db: sqlite3.Connection, author: str) -> int | None:
@@ -198,7 +198,7 @@ def _take_back(db: sqlite3.Connection, tree: EditTree, edit: int, author: str, i
 def _last_changes(db: sqlite3.Connection, kind: str, edit: int) -> list[tuple[int, int | None, bool]]:
     """Return for each pose or pin that an edit changed the last change, the one before the edit, and if it holds."""
     key, content = KEYS[kind]
-    found = db.execute(
+    pairs = db.execute(
         f"SELECT max(c.id), p.previous FROM {kind}_changes c JOIN (SELECT min(id) AS first, {key} FROM {kind}_changes "
         f"WHERE edit = ?1 GROUP BY {key}) f USING ({key}) JOIN {kind}_changes p ON p.id = f.first "
         f"WHERE c.edit = ?1 GROUP BY f.first",
@@ -206,7 +206,7 @@ def _last_changes(db: sqlite3.Connection, kind: str, edit: int) -> list[tuple[in
     ).fetchall()
     columns = _copied(db, kind)
     changes = []
-    for last, before in found:
+    for last, before in pairs:
         sql = f"SELECT {columns} FROM {kind}_changes WHERE {content} IS NOT NULL AND id = "
         left = db.execute(f"{sql} ?", (last,)).fetchone()
         of = f"({key}) = (SELECT {key} FROM {kind}_changes WHERE id = ?)"

@@ -161,59 +161,59 @@ def row_to_record(row: Sequence[Any], where: object) -> PoseRecord:
     Raises:
         DamagedStoreError: a value is impossible.
     """
-    found: _Pose = _checked(row, _Pose, where)
-    values, sources = _array(found.numbers, where), _sources(found.sources, where)
+    pose: _Pose = _checked(row, _Pose, where)
+    values, sources = _array(pose.numbers, where), _sources(pose.sources, where)
     if len(sources) != len(values):
         raise DamagedStoreError(f"{where}: expected a source for each of {len(values)} values, found {len(sources)}")
     return PoseRecord(
-        values, sources, found.model_revision, bool(found.keyframe), found.status, found.cost_px,
-        settings(found.settings, where),
-        found.author, found.time, found.program, _costs(found.view_costs_px, where), _costs(found.part_costs_px, where),
-        found.remark or "", bool(found.reviewed), _numbers(found.limbs, where), _covariances(found.errors, where),
-        _trace(found.trace, where),
+        values, sources, pose.model_revision, bool(pose.keyframe), pose.status, pose.cost_px,
+        settings(pose.settings, where),
+        pose.author, pose.time, pose.program, _costs(pose.view_costs_px, where), _costs(pose.part_costs_px, where),
+        pose.remark or "", bool(pose.reviewed), _numbers(pose.limbs, where), _covariances(pose.errors, where),
+        _trace(pose.trace, where),
     )  # fmt: skip
 
 
 def row_to_frame_row(row: Sequence[Any], where: object) -> FrameRow:
     """Convert a row of `FRAME_ROW_COLUMNS`."""
-    found: _Summary = _checked(row, _Summary, where)
+    summary: _Summary = _checked(row, _Summary, where)
     return FrameRow(
-        found.frame, SOURCES[min(_known(found.sources, where))], found.status, found.cost_px,
-        bool(found.keyframe), _costs(found.view_costs_px, where), found.remark or "",
-        bool(found.keyframe or found.reviewed), bool(found.others and not found.keyframe),
-        _numbers(found.limbs, where), bool(found.assessed_since), found.change,
+        summary.frame, SOURCES[min(_known(summary.sources, where))], summary.status, summary.cost_px,
+        bool(summary.keyframe), _costs(summary.view_costs_px, where), summary.remark or "",
+        bool(summary.keyframe or summary.reviewed), bool(summary.others and not summary.keyframe),
+        _numbers(summary.limbs, where), bool(summary.assessed_since), summary.change,
     )  # fmt: skip
 
 
 def row_to_frame_pose(row: Sequence[Any], where: object) -> FramePose:
     """Convert a row of `FRAME_POSE_COLUMNS`."""
-    found: _FramePose = _checked(row, _FramePose, where)
-    costs_px = _costs(found.view_costs_px, where)
-    return FramePose(found.frame, _array(found.numbers, where), found.cost_px, costs_px, found.model_revision)
+    pose: _FramePose = _checked(row, _FramePose, where)
+    costs_px = _costs(pose.view_costs_px, where)
+    return FramePose(pose.frame, _array(pose.numbers, where), pose.cost_px, costs_px, pose.model_revision)
 
 
 def row_to_alternative(row: Sequence[Any], where: object) -> Alternative:
     """Convert a row of `ALTERNATIVE_COLUMNS`; the inverse of `alternative_to_row`."""
-    found: _Alternative = _checked(row, _Alternative, where)
-    return Alternative(_array(found.numbers, where), found.model_revision, found.cost_px)
+    alternative: _Alternative = _checked(row, _Alternative, where)
+    return Alternative(_array(alternative.numbers, where), alternative.model_revision, alternative.cost_px)
 
 
 def row_to_pin(row: Sequence[Any], where: object) -> Pin:
     """Convert the columns point, camera, u and v."""
-    found: _Pin = _checked(row, _Pin, where)
-    return Pin(found.point, found.camera, (found.u, found.v))
+    pin: _Pin = _checked(row, _Pin, where)
+    return Pin(pin.point, pin.camera, (pin.u, pin.v))
 
 
 def row_to_entry(row: Sequence[Any]) -> HistoryEntry:
     """Convert the columns id, label, author and time of an edit that is not undone."""
-    found: HistoryEntry = check(list(row), HistoryEntry, f"edit {row[0]!r:.40}", DamagedStoreError)
-    return found
+    entry: HistoryEntry = check(list(row), HistoryEntry, f"edit {row[0]!r:.40}", DamagedStoreError)
+    return entry
 
 
 def row_to_revision(row: Sequence[Any]) -> ModelRevision:
     """Convert the columns id, person, toml and time."""
-    found: ModelRevision = check(list(row), ModelRevision, f"model revision {row[0]!r:.40}", DamagedStoreError)
-    return found
+    revision: ModelRevision = check(list(row), ModelRevision, f"model revision {row[0]!r:.40}", DamagedStoreError)
+    return revision
 
 
 def settings(text: Any, where: object) -> dict[str, Any]:
@@ -298,8 +298,8 @@ def values_to_blob(values: Array) -> bytes:
 def _trace(text: str | None, where: object) -> tuple[Search, ...] | None:
     if text is None:
         return None
-    found = check(decoded_json(text, where), list[Search], f"{where}, searches", DamagedStoreError)
-    return tuple(found)
+    searches = check(decoded_json(text, where), list[Search], f"{where}, searches", DamagedStoreError)
+    return tuple(searches)
 
 
 def _triangles(errors: Array | None) -> bytes | None:
@@ -343,13 +343,13 @@ def _blob(costs_px: Sequence[float | None]) -> bytes | None:
 
 def _numbers(blob: bytes | None, where: object) -> tuple[float, ...]:
     """Decode numbers; the inverse of `_blob` where all are known."""
-    found = () if blob is None else tuple(number for (number,) in iter_unpack("<d", _whole(blob, where)))
-    if not all(map(isfinite, found)):
-        raise DamagedStoreError(f"{where}: expected finite numbers, found {found!r:.60}")
-    return found
+    values = () if blob is None else tuple(number for (number,) in iter_unpack("<d", _whole(blob, where)))
+    if not all(map(isfinite, values)):
+        raise DamagedStoreError(f"{where}: expected finite numbers, found {values!r:.60}")
+    return values
 
 
 def _costs(blob: bytes | None, where: object) -> tuple[float | None, ...]:
     """Decode costs; the inverse of `_blob`."""
-    found = () if blob is None else iter_unpack("<d", _whole(blob, where))
-    return tuple(c if isfinite(c) else None for (c,) in found)
+    values = () if blob is None else iter_unpack("<d", _whole(blob, where))
+    return tuple(c if isfinite(c) else None for (c,) in values)

@@ -153,10 +153,10 @@ def upgrade(db: sqlite3.Connection) -> int:
     Returns:
         The version that the store then has. It is newer than `VERSION` if a newer program has upgraded it meanwhile.
     """
-    found = version(db)
-    if found < VERSION:
-        _run(db, [s for v in range(found, VERSION) for s in _UPGRADES[v]])
-    return max(found, VERSION)
+    stored_version = version(db)
+    if stored_version < VERSION:
+        _run(db, [s for v in range(stored_version, VERSION) for s in _UPGRADES[v]])
+    return max(stored_version, VERSION)
 
 
 def _run(db: sqlite3.Connection, statements: Sequence[str]) -> None:
@@ -169,24 +169,24 @@ def _run(db: sqlite3.Connection, statements: Sequence[str]) -> None:
 
 def show_as_new(db: sqlite3.Connection) -> None:
     """Make an older store readable like one of today's without writing to it."""
-    found = version(db)
-    if found == VERSION:
+    stored_version = version(db)
+    if stored_version == VERSION:
         return
-    if found >= checksums.TABLES_SINCE:
+    if stored_version >= checksums.TABLES_SINCE:
         db.execute("CREATE TEMP VIEW task_states AS SELECT *, NULL AS pose FROM main.task_states")
         return
     for table in checksums.LATER_TABLES:
         columns = checksums.COLUMNS[table].split(", ")
         db.execute(f"CREATE TEMP VIEW {table} AS SELECT {', '.join(f'NULL AS {c}' for c in columns)} WHERE 0")
     db.execute(f"CREATE TEMP VIEW edits AS SELECT *, {identities.DERIVED} AS uid FROM main.edits")
-    if found == 9:
+    if stored_version == 9:
         return
-    added = ", ".join(c if " AS " in c else f"NULL AS {c}" for c in _MISSING_COLUMNS[found])
+    added = ", ".join(c if " AS " in c else f"NULL AS {c}" for c in _MISSING_COLUMNS[stored_version])
     db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {added} FROM main.pose_changes")
-    if found < 5:
+    if stored_version < 5:
         nulls = ", ".join(f"NULL AS {column}" for column in ("change", "rank", "model_revision", "numbers", "cost_px"))
         db.execute(f"CREATE TEMP VIEW alternatives AS SELECT {nulls} WHERE 0")
-    if found < 6:
+    if stored_version < 6:
         no_programs = "SELECT NULL AS id, NULL AS settings WHERE 0"
-        programs = no_programs if found < 3 else f"SELECT * FROM main.{_FORMER_SETTINGS}"
+        programs = no_programs if stored_version < 3 else f"SELECT * FROM main.{_FORMER_SETTINGS}"
         db.execute(f"CREATE TEMP VIEW program_settings AS {programs}")

@@ -217,8 +217,8 @@ class TaskLog:
 
     def _all(self, table: str, row_type: Callable[..., T], order: str) -> list[T]:
         def convert(row: tuple[Any, ...]) -> T:
-            found: T = check(list(row), row_type, f"row {row[0]!r:.40} of {table}", DamagedStoreError)
-            return found
+            decoded: T = check(list(row), row_type, f"row {row[0]!r:.40} of {table}", DamagedStoreError)
+            return decoded
 
         fields = ", ".join(TABLES[table]._fields)
         return self._connection.all(f"SELECT {fields} FROM {table} ORDER BY {order}", (), convert)
@@ -244,8 +244,8 @@ def write_rows(db: sqlite3.Connection, found: Rows) -> None:
 
 
 def _planned(*columns: Any) -> _PlannedRow:
-    found: _PlannedRow = check(columns, _PlannedRow, f"the pose of frame {columns[1]!r:.20}", DamagedStoreError)
-    return found
+    planned: _PlannedRow = check(columns, _PlannedRow, f"the pose of frame {columns[1]!r:.20}", DamagedStoreError)
+    return planned
 
 
 def _made(row: Sequence[Any]) -> MadePose:
