@@ -62,8 +62,9 @@ def pin_marks(session: Session, state: State) -> list[PinMark]:
         if not pins or person in state.visibility.hidden:
             continue
         for point, camera, position_px, _ in pins:
-            view, time = session.cameras[camera].camera.pinhole, session.cameras[camera].clock.ahead(state.frame)
-            u, v = view.project(bodies[person].ahead(time).points_world[info.model.point_names.index(point)])
+            source, index = session.cameras[camera], info.model.point_names.index(point)
+            then = bodies[person].ahead(source.clock.offset_frames(state.frame))
+            u, v = source.camera.pinhole.project(then.points_world[index])
             out.append(PinMark(camera, person, point, *position_px, finite_or_none(u), finite_or_none(v)))
     return out
 

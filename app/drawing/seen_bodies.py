@@ -17,7 +17,7 @@ def bodies_in(session: Session, state: State, poses: Sequence[Array] | None = No
 
 def picture_times(session: Session, frame: int, cameras: Iterable[int]) -> dict[int, float]:
     """Return by how many frames the pictures of some cameras, by index, were taken later than a frame."""
-    return {index: session.cameras[index].clock.ahead(frame) for index in sorted(cameras)}
+    return {index: session.cameras[index].clock.offset_frames(frame) for index in sorted(cameras)}
 
 
 def at_one_time(times: Mapping[int, float]) -> Iterator[tuple[float, list[int]]]:

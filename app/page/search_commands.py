@@ -48,7 +48,7 @@ def _cost_map(controller: Controller, page: int, message: wire.ShowCostMap) -> N
         controller.cost_map.watch(page, message.person, message.dofs)
 
 
-def _set_two(controller: Controller, _: int, message: wire.SetCostMapPlace) -> None:
+def _set_cost_map_place(controller: Controller, _: int, message: wire.SetCostMapPlace) -> None:
     factors = dof_labels.factors(controller.models[message.person])
     values = [v / factors[d] if d < len(factors) else np.nan for v, d in zip(message.values, message.dofs, strict=True)]
     controller.pose_edits.set_along(message.person, message.dofs, values)
@@ -72,7 +72,7 @@ SEARCH_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.TakeCandidate: lambda controller, _, m: controller.replay.take(m.run, m.candidate),
     wire.ShowLandscape: lambda controller, _, m: controller.cost_landscape.choose(m.dof),
     wire.ShowCostMap: _cost_map,
-    wire.SetCostMapPlace: _set_two,
+    wire.SetCostMapPlace: _set_cost_map_place,
     wire.AskReason: _reason,
     wire.SetLandscapeDof: lambda controller, _, m: controller.pose_edits.set_along(m.person, [m.dof], [m.value]),
 }

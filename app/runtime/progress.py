@@ -93,7 +93,7 @@ class Reporter:
         began, shown = time.monotonic(), 0
 
         def left_text(share: float) -> str:
-            return share_text(share, time.monotonic() - began) if is_timed else ""
+            return time_left_text(share, time.monotonic() - began) if is_timed else ""
 
         columns = (TextColumn(what), BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[left]}"))
         if self._silent or not self._console.is_terminal:
@@ -116,7 +116,7 @@ class Reporter:
             yield advance
 
 
-def share_text(share: float, elapsed_s: float) -> str:
+def time_left_text(share: float, elapsed_s: float) -> str:
     """Return the time that the rest of the work will take, such as `, 12 s left`; empty if unknown.
 
     Args:

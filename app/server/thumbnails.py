@@ -100,7 +100,7 @@ class Thumbnails:
         image = self._footage.image(crop.camera, wanted.frame)
         self._give_way()
         limb = thumbnails.limb_parts(bodies, wanted.person, wanted.limb)
-        then = ahead(bodies, self._cameras[crop.camera].clock.ahead(wanted.frame))
+        then = ahead(bodies, self._cameras[crop.camera].clock.offset_frames(wanted.frame))
         if wanted.is_blurred and image is not None:
             image = blurred(image, circles_around(head_surfaces(then), cameras[crop.camera]))
         return thumbnails.thumbnail(image, cameras[crop.camera], crop.region, then, wanted.colors, limb)

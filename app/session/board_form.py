@@ -47,13 +47,13 @@ def calibrate_cameras(form: BoardForm, report: Report) -> None:
         report: called with `progress`, the share that is done and a text; at the end with `failed` and a sentence, or
             `calibrated` and the result. It may raise to end the work.
     """
-    from app.runtime.progress import share_text
+    from app.runtime.progress import time_left_text
     from tracker.calibration.boards.footage_calibration import calibrate_footage
 
     began = time.monotonic()
 
     def advance(stage: str, share: float, text: str = "", /) -> None:
-        left = share_text(share, time.monotonic() - began)
+        left = time_left_text(share, time.monotonic() - began)
         report("progress", {"share": share, "text": f"{stage.capitalize()}: {100 * share:.0f}%{left}"})
 
     try:

@@ -29,7 +29,7 @@ def view_lines(motion: ExportedMotion, frame: int, views: Sequence[WorkingView])
     found = drawn_paths(motion, frame, range(len(views)))
     out = []
     for index, view in enumerate(views):
-        ahead = motion.session.cameras[index].clock.ahead(frame)
+        ahead = motion.session.cameras[index].clock.offset_frames(frame)
         lines = []
         for k, (person, body) in enumerate(people):
             if not motion.is_exported(person, frame):

@@ -60,7 +60,7 @@ class FloorState:
 def with_mark(picking: Picking, cameras: Sequence[Camera], camera: int, u: float, v: float) -> Picking:
     """Mark the current point in a view, undistorted px, in place of its former mark there."""
     marks = (*(m for m in picking.picks[-1].marks if m[0] != camera), (camera, u, v))
-    return _solved(replace(picking, picks=(*picking.picks[:-1], _met(marks, cameras))), cameras)
+    return _solved(replace(picking, picks=(*picking.picks[:-1], _triangulated(marks, cameras))), cameras)
 
 
 def with_next(picking: Picking) -> Picking:
@@ -75,10 +75,10 @@ def without_last(picking: Picking, cameras: Sequence[Camera]) -> Picking:
     picks = picking.picks
     if not picks[-1].marks and len(picks) > 1:
         picks = picks[:-1]
-    return _solved(replace(picking, picks=(*picks[:-1], _met(picks[-1].marks[:-1], cameras))), cameras)
+    return _solved(replace(picking, picks=(*picks[:-1], _triangulated(picks[-1].marks[:-1], cameras))), cameras)
 
 
-def _met(marks: tuple[tuple[int, float, float], ...], cameras: Sequence[Camera]) -> Pick:
+def _triangulated(marks: tuple[tuple[int, float, float], ...], cameras: Sequence[Camera]) -> Pick:
     if len(marks) < 2:
         return Pick(marks)
     found = triangulate([cameras[m[0]] for m in marks], np.array([m[1:] for m in marks]))

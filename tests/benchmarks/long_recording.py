@@ -98,7 +98,7 @@ def long_reference(source: Path, path: Path, n: int, fps: float) -> None:
 def report(manifest: Manifest, memory: dict[str, tuple[float, float]]) -> None:
     """Print the table of stretches, and the seams."""
     (task,) = manifest.tasks
-    parts = [t for t in manifest.divided(task).stretches() if manifest.result(t) is not None]
+    parts = [t for t in manifest.with_stretches(task).stretches() if manifest.result(t) is not None]
     print("frames            processor time, s   memory at the beginning and at most, MB")
     for part in parts:
         assert part.stretch is not None

@@ -126,10 +126,10 @@ class Manifest:
         except TrackerError as error:
             return damaged(str(error), error.remedy)
         is_whole = task.division is None and task.stretch is None
-        damage = self.divided(task).damage if result is None and is_whole else task.damage
+        damage = self.with_stretches(task).damage if result is None and is_whole else task.damage
         return damaged(damage, None if task.damage else Remedy("do_again")) if damage else result
 
-    def divided(self, task: RecordingTask) -> RecordingTask:
+    def with_stretches(self, task: RecordingTask) -> RecordingTask:
         """Return the task of a recording with its stretches, if it has some by now."""
         try:
             division = None if task.damage else read_file(self.folder / STRETCHES / f"{task.key}.json", Division)
@@ -141,7 +141,7 @@ class Manifest:
         """Return the state of a task. A recording is running while one of its stretches is."""
         if (found := self.result(task)) is not None:
             return found.state
-        parts = [task, *self.divided(task).stretches()]
+        parts = [task, *self.with_stretches(task).stretches()]
         return "running" if any(claims.has_living(self._claim_path(part)) for part in parts) else "waiting"
 
     def counts(self) -> Counter[State]:
@@ -153,7 +153,7 @@ class Manifest:
         for task in self.tasks:
             if self.result(task) is not None or not all(self._has_bodies(self.tasks[i]) for i in task.after):
                 continue
-            task = self.divided(task)
+            task = self.with_stretches(task)
             parts = task.stretches()
             ended = [self.result(part) for part in parts]
             waiting = [part for part, result in zip(parts, ended, strict=True) if result is None]
@@ -163,7 +163,7 @@ class Manifest:
             for part in waiting or [task]:
                 if (held := claims.claim(self._claim_path(part))) is None:
                     continue
-                if self.result(part) is not None or self.divided(task).division != task.division:
+                if self.result(part) is not None or self.with_stretches(task).division != task.division:
                     held.release()  # it ended, or was divided, between the two looks
                     continue
                 return part, held
@@ -171,7 +171,7 @@ class Manifest:
 
     def _has_bodies(self, task: RecordingTask) -> bool:
         """Return whether a recording has the bodies that others wait for, or failed to."""
-        return self.result(task) is not None or self.divided(task).division is not None
+        return self.result(task) is not None or self.with_stretches(task).division is not None
 
     def divide(self, task: RecordingTask, held: Claim, division: Division) -> bool:
         """Write the stretches of a recording, or their right names, and give up its claim.
@@ -194,13 +194,13 @@ class Manifest:
         n = 0
         for task in self.tasks:
             if self.result(task) is None:
-                parts = self.divided(task).stretches()
+                parts = self.with_stretches(task).stretches()
                 n += max(1, sum(self.result(part) is None for part in parts)) if parts else task.n_expected
         return n
 
     def ended_parts(self) -> dict[str, tuple[RecordingTask, Result]]:
         """Return the tasks that have ended, and the stretches of long recordings, by their keys."""
-        parts = (part for task in self.tasks for part in (*self.divided(task).stretches(), task))
+        parts = (part for task in self.tasks for part in (*self.with_stretches(task).stretches(), task))
         return {part.key: (part, result) for part in parts if (result := self.result(part)) is not None}
 
     def is_finished(self) -> bool:
@@ -241,7 +241,7 @@ class Manifest:
         failed = [task for task in self.tasks if (found := self.result(task)) and found.state == "failed"]
         try:
             for task in failed:
-                divided = self.divided(task)
+                divided = self.with_stretches(task)
                 if divided.damage:  # its stretches would be taken for those of the next division
                     self._forget_stretches(task)
                 for part in [*divided.stretches(), task]:

@@ -102,7 +102,7 @@ def _row(manifest: Manifest, task: RecordingTask) -> RecordingRow:
         return row
     people = _people(Path(recording.session), recording.settings)
     known = np.concatenate([p.errors_mm[np.isfinite(p.errors_mm)] for p in people]) if people else np.zeros(0)
-    worst_frame, worst_person = _worst(people)
+    worst_frame, worst_person = _to_look_at(people)
     return RecordingRow(
         recording.name,
         recording.session,
@@ -166,7 +166,7 @@ def _assessed(poses: PoseSeries) -> _Assessed:
     return _Assessed(poses.person, poses.frames, errors_mm, doubted, poses.keyframes)
 
 
-def _worst(people: Sequence[_Assessed]) -> tuple[int | None, str]:
+def _to_look_at(people: Sequence[_Assessed]) -> tuple[int | None, str]:
     """Return the frame and the person to look at first: doubted ones before others, then the largest error.
 
     Keyframes are left out unless there is nothing else: a person has seen them.

@@ -137,8 +137,9 @@ class Observer:
         return tuple(v.view.camera for v in self._views)
 
     def ahead_frames(self, k: int) -> tuple[float, ...]:
-        """Return by how many frames the picture of each view was taken later than frame k; see `Clock.ahead`."""
-        return tuple(c.clock.ahead(shown) + shown - k for c, shown in zip(self.cameras, self._shown(k), strict=True))
+        """Return by how many frames the picture of each view was taken later than frame k; see `Clock`."""
+        shown = zip(self.cameras, self._shown(k), strict=True)
+        return tuple(c.clock.offset_frames(at) + at - k for c, at in shown)
 
     def _shown(self, k: int) -> list[int]:
         """Return the frame whose picture each view has on frame k: k, or that of the nearest time; see `in_time`."""

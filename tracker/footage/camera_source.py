@@ -35,7 +35,7 @@ class Clock:
     lost: tuple[LostFrames, ...] = ()
     """In the order of the frames."""
 
-    def ahead(self, frame: float) -> float:
+    def offset_frames(self, frame: float) -> float:
         """Return by how many frames the picture of a frame was taken later than the frame."""
         return self.ahead_frames + self.rate * frame + sum(lost.n for lost in self.lost if frame >= lost.since)
 
@@ -44,9 +44,9 @@ class Clock:
         found = []
         for first, end in pairwise((0, *(min(lost.since, n_frames) for lost in self.lost), n_frames)):
             if first < end:  # Between two losses the time of the picture is a straight line over the frames.
-                ahead = self.ahead(first) - self.rate * first
+                ahead = self.offset_frames(first) - self.rate * first
                 found.append(min(max(first, floor((frame - ahead) / (1 + self.rate) + 0.5)), end - 1))
-        return min(found, key=lambda k: abs(k + self.ahead(k) - frame))
+        return min(found, key=lambda k: abs(k + self.offset_frames(k) - frame))
 
     def with_lost(self, more: LostFrames) -> "Clock":
         """Return the clock of a camera that lost more frames."""

@@ -46,7 +46,7 @@ class Alternatives:
             found = self._stored()
             at = 0
             if rank is not None:
-                found, at = self._with_ranked(found, person, rank)
+                found, at = self._with_one_of_the_reason(found, person, rank)
             if not found:
                 raise TrackerError(
                     f"expected an alternative pose on frame {session_state.state.frame}, found none; "
@@ -65,7 +65,7 @@ class Alternatives:
         for change in changes:
             self._assess(change, edit)
 
-    def _with_ranked(
+    def _with_one_of_the_reason(
         self, found: dict[int, tuple[Alternative, ...]], person: int, rank: int
     ) -> tuple[dict[int, tuple[Alternative, ...]], int]:
         """Return alternatives with one of the reason's among them, by person, and its index.

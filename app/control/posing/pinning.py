@@ -285,7 +285,7 @@ class Pinning:
     def _timed(self, pins: Pins) -> list[list[PointObservation]]:
         """Return the pins of all people with the times of their pictures."""
         cameras, frame = self._session_state.session.cameras, self._session_state.state.frame
-        return [[p._replace(ahead_frames=cameras[p.camera].clock.ahead(frame)) for p in own] for own in pins]
+        return [[p._replace(ahead_frames=cameras[p.camera].clock.offset_frames(frame)) for p in own] for own in pins]
 
     def _save(self, drag: _PinDrag) -> None:
         """Save the gesture so far."""

@@ -61,7 +61,7 @@ class FramePoses:
 
     def velocities(self, frame: int) -> tuple[Array | None, ...]:
         """Return the velocity of each person by the stored poses around a frame; empty where no camera needs them."""
-        if not any(c.clock.ahead(frame) for c in self._session.cameras):
+        if not any(c.clock.offset_frames(frame) for c in self._session.cameras):
             return ()
         out: list[Array | None] = []
         for person in range(len(self._session.people)):

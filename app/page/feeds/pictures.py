@@ -77,7 +77,7 @@ class PictureSets:
             return frames.image(state.frame, camera, reduction), None
         if layer == "parts":
             shown = [i for i in range(len(session.people)) if i not in state.undrawn]
-            time, everybody = session.cameras[camera].clock.ahead(state.frame), bodies_in(session, state.drawn)
+            time, everybody = session.cameras[camera].clock.offset_frames(state.frame), bodies_in(session, state.drawn)
             bodies = [everybody[i].ahead(time) for i in shown]
             colors = overlays.part_colors([session.people[i] for i in shown])
             return pictures.parts(bodies, session.cameras[camera].camera.pinhole, colors, reduction), None

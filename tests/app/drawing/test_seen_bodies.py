@@ -67,7 +67,7 @@ def test_exported_keypoints_are_those_of_the_picture(late):
     session, state = late
     body = PosedBody(session.people[0].model, state.poses[0], state.velocities[0])
     cameras = [c.camera for c in session.cameras]
-    times = [c.clock.ahead(state.frame) for c in session.cameras]
+    times = [c.clock.offset_frames(state.frame) for c in session.cameras]
     found, plain = keypoints_in_views([body], cameras, times), keypoints_in_views([body], cameras)
     (then,) = keypoints_in_views([body.ahead(0.5)], [cameras[LATE]])
     np.testing.assert_allclose(found[LATE][0].points_px, then[0].points_px)

@@ -1,6 +1,6 @@
 """Progress of long work: the rate and the time left are those of a usual item."""
 
-from app.runtime.progress import Pace, Reporter, pace_text, share_text
+from app.runtime.progress import Pace, Reporter, pace_text, time_left_text
 
 
 def paced(durations):
@@ -47,9 +47,9 @@ def test_lines_where_there_is_no_terminal(capsys, monkeypatch):
 
 def test_time_left_of_work_whose_steps_differ_in_size():
     """A step of many hundredths at once said "439781.4/s, 0 s left"."""
-    assert share_text(0.25, 30.0) == ", 90 s left"
-    assert share_text(0.1, 60.0) == ", 9 min left"
-    assert share_text(0.0, 5.0) == share_text(1.0, 5.0) == ""
+    assert time_left_text(0.25, 30.0) == ", 90 s left"
+    assert time_left_text(0.1, 60.0) == ", 9 min left"
+    assert time_left_text(0.0, 5.0) == time_left_text(1.0, 5.0) == ""
 
 
 def test_shares_are_lines_where_there_is_no_terminal(capsys, monkeypatch):

@@ -16,14 +16,14 @@ LOSSES = [(), (LostFrames(10, 1),), (LostFrames(10, 2), LostFrames(20, 3)), (Los
 
 def test_pictures_after_a_lost_frame_are_later():
     clock = Clock(0.25, 0.01, (LostFrames(10, 1), LostFrames(20, -2)))
-    assert [clock.ahead(k) for k in (0, 9, 10, 19, 20)] == pytest.approx([0.25, 0.34, 1.35, 1.44, -0.55])
+    assert [clock.offset_frames(k) for k in (0, 9, 10, 19, 20)] == pytest.approx([0.25, 0.34, 1.35, 1.44, -0.55])
 
 
 @pytest.mark.parametrize("lost", LOSSES)
 @pytest.mark.parametrize(("ahead", "rate"), [(0.0, 0.0), (0.4, 0.03), (-1.3, -0.02)])
 def test_the_nearest_picture_is_found_as_by_trying_all(lost, ahead, rate):
     clock = Clock(ahead, rate, lost)
-    taken = np.array([k + clock.ahead(k) for k in range(N)])
+    taken = np.array([k + clock.offset_frames(k) for k in range(N)])
     for frame in range(N):
         nearest = clock.nearest(frame, N)
         assert abs(taken[nearest] - frame) == pytest.approx(np.abs(taken - frame).min(), abs=1e-12)

@@ -184,7 +184,7 @@ def test_the_nearest_picture_is_at_most_half_a_frame_away():
     for clock in (Clock(), Clock(0.5), Clock(-0.4), Clock(2.3), Clock(-1.7, 0.02)):
         for k in range(3, 30):
             shown = clock.nearest(k, 40)
-            assert abs(shown + clock.ahead(shown) - k) <= 0.52
+            assert abs(shown + clock.offset_frames(shown) - k) <= 0.52
     assert [Clock(0.5).nearest(k, 9) for k in range(9)] == [*range(9)]
     assert Clock(2.0).nearest(1, 9) == 0
     assert Clock(-2.0).nearest(8, 9) == 8

@@ -77,7 +77,7 @@ def test_a_drift_that_was_told_about_the_middle_is_stored_from_frame_0(session):
     corrections = np.zeros((len(session.cameras), N_CORRECTIONS))
     corrections[1, [TIME, DRIFT]] = 0.01, 0.004
     clock = with_corrections(session, corrections, middle_s=2.0).cameras[1].clock
-    late_s = [clock.ahead(t * session.fps) / session.fps for t in (0.0, 2.0, 3.0)]
+    late_s = [clock.offset_frames(t * session.fps) / session.fps for t in (0.0, 2.0, 3.0)]
     assert late_s == pytest.approx([0.002, 0.01, 0.014])
 
 

@@ -40,7 +40,7 @@ def test_times_pair_pictures_of_cameras_that_each_lost_another(room):
     assert [c.clock.lost for c in session.cameras] == [(LostFrames(5, 1),), (LostFrames(11, 1),)]
     for camera, own in zip(session.cameras, (front, left), strict=True):
         shown = own[0] + (own[camera.offset :] - own[0])
-        taken = [(k + camera.clock.ahead(k)) / 30 for k in range(session.n_frames)]
+        taken = [(k + camera.clock.offset_frames(k)) / 30 for k in range(session.n_frames)]
         assert taken == pytest.approx(shown - left[0], abs=1e-3)
     assert notes[0].startswith("the time in the names of the pictures of all cameras pairs frames ('front' from ")
     lost = (("front", 5), ("left", 11))

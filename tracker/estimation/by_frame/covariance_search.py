@@ -75,12 +75,12 @@ def _samples(model: BodyModel, pose: Array, scorer: PoseScorer, sigma: Array, dr
     # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))
-    steps[:, free] = _SCALE * np.linalg.solve(factor.T, _normal(_N_SAMPLES, len(free), draw).T).T
+    steps[:, free] = _SCALE * np.linalg.solve(factor.T, _normal_samples(_N_SAMPLES, len(free), draw).T).T
     return [model.clip(model.retract(pose, step)) for step in steps]
 
 
 @lru_cache(maxsize=8)
-def _normal(n: int, dims: int, draw: int) -> Array:
+def _normal_samples(n: int, dims: int, draw: int) -> Array:
     """Return the same standard normal samples, (n, dims), in each call of a draw: runs are repeatable."""
     out = np.random.default_rng(draw).normal(size=(n, dims))
     out.flags.writeable = False

@@ -135,7 +135,7 @@ class MiddleJoint:
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         place, J = self._derivatives(kinematics)
-        start, allowed_m = self._allowed
+        start, allowed_m = self._start_and_reach
         moved = float(np.linalg.norm(place - start))
         if moved <= allowed_m:
             return normal_equations(np.zeros(1), np.zeros((1, model.n_dofs)))
@@ -144,7 +144,8 @@ class MiddleJoint:
 
     def is_exceeded(self, pose: Array) -> bool:
         """Return whether the joint moved farther than is allowed."""
-        place, (start, allowed_m) = self.grabbed.model.kinematics(pose).Ts_world_part[self._part, :3, 3], self._allowed
+        start, allowed_m = self._start_and_reach
+        place = self.grabbed.model.kinematics(pose).Ts_world_part[self._part, :3, 3]
         return float(np.linalg.norm(place - start)) > allowed_m
 
     def prior(self) -> PosePrior:
@@ -169,7 +170,7 @@ class MiddleJoint:
         return place, self.grabbed.model.point_jacobian(kinematics, np.array([self._part]), place[None])[0]
 
     @cached_property
-    def _allowed(self) -> tuple[Array, float]:
+    def _start_and_reach(self) -> tuple[Array, float]:
         """Position of the joint at the grab, (3,), and how far it may move, metres.
 
         That is the length of the drag. A bent limb has a share of its bend more, because it folds no faster.

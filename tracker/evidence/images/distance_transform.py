@@ -76,12 +76,12 @@ def distance_image(edge_map: NDArray[np.bool_] | NDArray[np.uint8], limit_px: fl
     height, width = edge_map.shape
     out = np.empty((height, width), np.float32)
     rows = np.empty((5, width + 2 * _BORDER), np.float32)
-    _measure(np.ascontiguousarray(edge_map).view(np.uint8), np.float32(limit_px), rows, out)
+    _fill_distances(np.ascontiguousarray(edge_map).view(np.uint8), np.float32(limit_px), rows, out)
     return out
 
 
 @njit(**FAST_MATH)
-def _measure(edges: NDArray[np.uint8], limit: np.float32, rows: FloatArray, out: FloatArray) -> None:
+def _fill_distances(edges: NDArray[np.uint8], limit: np.float32, rows: FloatArray, out: FloatArray) -> None:
     """Fill a distance image: one pass of steps down and right, one pass of steps up and left.
 
     Args:

@@ -106,7 +106,7 @@ class Heads:
     def circles(self, view: int, frame: int) -> list[Circle]:
         """Return what hides the heads in a view on a frame; the view's own clock counts."""
         source = self._session.cameras[view]
-        at = frame + source.clock.ahead(frame)
+        at = frame + source.clock.offset_frames(frame)
         bodies = [body for person in self._people if (body := _body_at(person, at)) is not None]
         found = list[Circle]()
         for body in bodies:

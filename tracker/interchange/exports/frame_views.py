@@ -39,7 +39,7 @@ class FrameViews:
         """
         self._motion, self._cameras, self._frame = motion, cameras, frame
         self._people = motion.bodies(frame)
-        self._times = [source.clock.ahead(frame) for source in motion.session.cameras]
+        self._times = [source.clock.offset_frames(frame) for source in motion.session.cameras]
 
     def bodies(self, view: int) -> Sequence[PosedBody]:
         """Return the bodies of all people in the scene at the time of the picture."""

@@ -160,7 +160,7 @@ class ExportedMotion:
         This includes people whose pose is not exported, see `is_exported`.
         """
         shown = [p for p in self.people if frame in p.poses or frame in p.unselected]
-        if any(c.clock.ahead(frame) for c in self.session.cameras):
+        if any(c.clock.offset_frames(frame) for c in self.session.cameras):
             return [(p, p.moving(frame)) for p in shown]
         return [(p, p.body(frame)) for p in shown]
 

@@ -111,7 +111,7 @@ def timing_problems(
         fps: frames per second.
         decided: cameras whose offset the user has given; a note suffices.
     """
-    ahead = [c.clock.ahead(points.n_frames // 2) for c in cameras]
+    ahead = [c.clock.offset_frames(points.n_frames // 2) for c in cameras]
     problems, notes = [], []
     for name, n in view_shifts(points, [c.camera for c in cameras], fps, ahead).items():
         later = f"{abs(n)} frame{'s' * (abs(n) != 1)} {'later' if n > 0 else 'earlier'}"

@@ -14,7 +14,7 @@ from tracker.estimation.tracking.tracker import TrackerSettings
 from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
 from tracker.simulate.experiments.contour_run import RunResult, Scene, track_scene
-from tracker.simulate.experiments.convergence import Convergence, RoughStep, fit_rough_guess, measure_convergence
+from tracker.simulate.experiments.convergence import Convergence, RoughStep, fit_from_guess, measure_convergence
 from tracker.simulate.experiments.smooth_motion import smooth_motion
 from tracker.simulate.experiments.staged_views import ModelActor, SkinActor
 from tracker.simulate.people.outfit import Outfit
@@ -88,7 +88,7 @@ class ExperimentResult(NamedTuple):
     convergence: Sequence[Convergence]
     """Fits on the main run's scene, see `measure_convergence`."""
     rough: tuple[Sequence[RoughStep], Sequence[RoughStep]]
-    """Steps from a rough guess on its first frame, see `fit_rough_guess`."""
+    """Steps from a rough guess on its first frame, see `fit_from_guess`."""
 
     def main(self, method: str) -> RunResult:
         """Return the main run of a method: the model's own shape, with the paper's number of cameras."""
@@ -132,7 +132,7 @@ def run_contour_experiment(
     scene = make_scene(experiment, "own shape", experiment.n_cameras)
     no_sliding = {_NO_SLIDING: track_scene(scene, paper_settings("edges", sliding=False), experiment.seed)}
     report(total - 1)
-    convergence, rough = measure_convergence(scene, experiment.seed), fit_rough_guess(scene, experiment.seed)
+    convergence, rough = measure_convergence(scene, experiment.seed), fit_from_guess(scene, experiment.seed)
     report(total)
     models = {actor: load_model(_BODIES[actor], _HEIGHT_M) for actor in ACTORS}
     truth = _truth(experiment, models["own shape"])

@@ -113,7 +113,7 @@ def _iterations(model: BodyModel, start: Array, views: Sequence[ViewEvidence], m
         yield rms_at(model, fit.pose, distances, f"iteration {fit.iterations}")
 
 
-def fit_rough_guess(scene: Scene, seed: int = 0) -> tuple[tuple[RoughStep, ...], tuple[RoughStep, ...]]:
+def fit_from_guess(scene: Scene, seed: int = 0) -> tuple[tuple[RoughStep, ...], tuple[RoughStep, ...]]:
     """Fit the first frame of a scene from a rough guess: chain by chain, and all degrees of freedom at once.
 
     Args:

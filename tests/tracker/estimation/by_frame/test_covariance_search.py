@@ -5,7 +5,7 @@ from staging import SUIT, cameras_around, dressed, posed
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.estimation.appearance.part_colors import Colors
-from tracker.estimation.by_frame.covariance_search import _normal, _samples, search_along_covariance
+from tracker.estimation.by_frame.covariance_search import _normal_samples, _samples, search_along_covariance
 from tracker.estimation.by_frame.frame_problem import FrameProblem, PersonPrior
 from tracker.estimation.by_frame.pose_score import PoseScorer
 from tracker.estimation.by_frame.settings import OWN_TRUST, RecoverSettings, prior_blocks
@@ -78,7 +78,7 @@ def test_samples_keep_locked_angles_and_are_the_same_each_time(model):
     samples = np.array(_samples(model, staged.here.pose, staged.scorer, OWN_TRUST * staged.sigma))
     assert np.abs(samples - staged.here.pose).max(axis=0)[active].min() > 0.001
     np.testing.assert_array_equal(samples[:, ~active], np.repeat(staged.here.pose[None, ~active], len(samples), axis=0))
-    _normal.cache_clear()
+    _normal_samples.cache_clear()
     np.testing.assert_array_equal(_samples(model, staged.here.pose, staged.scorer, OWN_TRUST * staged.sigma), samples)
     another = np.array(_samples(model, staged.here.pose, staged.scorer, OWN_TRUST * staged.sigma, draw=1))
     assert np.abs(another - samples).max() > 0.01

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tracker.simulate.experiments.contour_experiment import ContourExperiment, make_scene
-from tracker.simulate.experiments.convergence import BACK, MAX_ITERATIONS, MODES, fit_rough_guess, measure_convergence
+from tracker.simulate.experiments.convergence import BACK, MAX_ITERATIONS, MODES, fit_from_guess, measure_convergence
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def test_all_kinds_of_fits_begin_at_the_same_poses(scene):
 
 
 def test_a_rough_guess_is_fitted_chain_by_chain(scene):
-    steps, (start, at_once) = fit_rough_guess(scene)
+    steps, (start, at_once) = fit_from_guess(scene)
     assert [s.name for s in steps][:3] == ["start", "root", "trunk"]
     assert steps[-1].name == "whole body"
     assert steps[0] == start

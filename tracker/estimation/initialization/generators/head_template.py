@@ -138,7 +138,7 @@ def _head(figure: Voxels, graph: VoxelGraph, place: _Place) -> Head | None:
     # A person cut off by an image has short paths, yet the volume of more than a child.
     scale = min(1.0, max(path_m / DEFAULT_HEIGHT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
     is_head = place.distances <= typical_person(scale).head_radius_m + figure.grid.size_m / 2
-    neck = _neck(figure, is_head)
+    neck = _neck_position(figure, is_head)
     if neck is None:
         return None
     center = points[is_head].mean(axis=0)
@@ -154,7 +154,7 @@ def _is_end(figure: Voxels, is_head: NDArray[np.bool_]) -> bool:
     return bool(largest) and cut_off <= STRAY * len(is_head)
 
 
-def _neck(figure: Voxels, is_head: NDArray[np.bool_]) -> Array | None:
+def _neck_position(figure: Voxels, is_head: NDArray[np.bool_]) -> Array | None:
     from scipy.ndimage import binary_dilation
 
     beside = binary_dilation(figure.without(is_head).occupied, np.ones((3, 3, 3), dtype=bool))[tuple(figure.indices.T)]

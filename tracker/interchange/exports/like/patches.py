@@ -116,7 +116,7 @@ def _not_sent_back(difference: str) -> FormatError:
 def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Array:
     """Return x, y, confidence of a person's points in a view, (n_points, 3); confidence 0 outside of the picture."""
     source = session.cameras[view]
-    body, ahead = person.bodies[frame], source.clock.ahead(frame)
+    body, ahead = person.bodies[frame], source.clock.offset_frames(frame)
     if ahead:
         near = {f: b.values for f, b in person.all_bodies.items() if abs(f - frame) <= 2 and b.model is body.model}
         body = PosedBody(body.model, body.values, velocity(body.model, near, frame)).ahead(ahead)
