@@ -160,7 +160,7 @@ class BodySizeEditing:
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             message = f"Applied{outcome}{off}." + ("" if same or not refit else self._rest(person))
             self._runs.clear()
-            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=message)
+            session_state.show_frame(draft=None, sizes_message=message)
             session_state.refresh_saving()
 
     def change_body(self, person: int, to: str) -> None:
@@ -186,7 +186,7 @@ class BodySizeEditing:
                 message += f" {n_kept} tracked pose{' keeps' if n_kept == 1 else 's keep'} the former body and "
                 message += f"{'is' if n_kept == 1 else 'are'} not shown until tracked again."
             self._runs.clear()
-            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=message)
+            session_state.show_frame(draft=None, sizes_message=message)
             session_state.refresh_saving()
 
     def _note_edit(self, person: int, edit: int | None, before: int) -> None:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from app.control.posing.depth_check import note_unseen_depth
 from app.control.session.activities import Activities
 from app.control.session.comparing import note_comparison
-from app.control.session.session_state import Pins, SessionState
+from app.control.session.frame_poses import Pins
+from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
 from tracker.body.limbs import display_name, limb_display_name
 from tracker.body.model import PosedBody
@@ -280,7 +281,7 @@ class Pinning:
             source = "pinned" if pins[person] else "fitted"
             people[person] = ShownPose(found.poses[person], source, *doubt, sources=sources)
         costs = session_state.costs(tuple(p.values for p in people))
-        session_state.set(people=tuple(people), pins=pins, **costs)
+        session_state.set(people=tuple(people), pins=pins, **vars(costs))
 
     def _timed(self, pins: Pins) -> list[list[PointObservation]]:
         """Return the pins of all people with the times of their pictures."""

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from typing import Any
 
 from app.control.session.session_state import SessionState
-from app.state.state import State, StateChanges
+from app.state.state import State
 
 
 class TakingOver:
@@ -63,10 +64,10 @@ class FollowingHost:
         own = session_state.state
         if own.compiled != host.compiled:
             session_state.note_compiled(host.compiled)
-        changes: StateChanges = {}
+        changes = dict[str, Any]()
         if own.footage != host.footage:
             changes["footage"] = host.footage
-            changes = {**changes, **session_state.costs(own.poses)}
+            changes |= vars(session_state.costs(own.poses))
         if own.inconsistent_frames is not host.inconsistent_frames:
             changes["inconsistent_frames"] = host.inconsistent_frames
         if own.keyframe_doubts is not host.keyframe_doubts:
