@@ -248,7 +248,7 @@ class PageConnection:
                 # Otherwise the vectors go first: the eye follows them. No page may show what is not on disk as saved.
                 if with_figures or (self._sent_text is not None and self._sent_text.saved and not state.saved):
                     await self._send_state(state)
-                if self._inspector.is_behind(state):
+                if with_figures and self._inspector.is_behind(state):
                     for news in await asyncio.to_thread(self._inspector.updates, self._controller, state):
                         await self._send(news)
                 if sent is None or sent.timeline_version != state.timeline_version:  # after the text, which names cells
@@ -257,7 +257,8 @@ class PageConnection:
                     await self._send_drawn(state, self._view)
                 await self._send_epipolar(state)
                 await self._send_checks(sent, state)
-                await self._send_details(state)
+                if with_figures:
+                    await self._send_details(state)
                 await self._send_history()
                 for update in await asyncio.to_thread(self._searches.updates, self._controller, with_figures):
                     await self._send(update)
