@@ -207,7 +207,8 @@ class Participants:
         participant.controller.close()
 
     def _follow(self, participant: _Participant) -> None:
-        participant.unsubscribe = participant.controller.subscribe(lambda _: self._note(participant))
+        fields = ("frame", "person", "drag", "is_pin_held", "search", "track", "ranges", "finding")
+        participant.unsubscribe = participant.controller.subscribe(lambda _: self._note(participant), *fields)
 
     def _note(self, participant: _Participant) -> None:
         """Tell the pages where a participant is, if that has changed; called under the session's lock or not."""

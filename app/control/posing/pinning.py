@@ -76,9 +76,8 @@ class Pinning:
         session = self._session_state.session
         if not (0 <= frame < session.n_frames and 0 <= camera < len(session.cameras)):
             return
-        if not (
-            0 <= person < len(self._session_state.models) and point in self._session_state.models[person].point_names
-        ):
+        models = self._session_state.models
+        if not (0 <= person < len(models) and point in models[person].point_names):
             return
         source = session.cameras[camera].camera
         if not _is_shown(source, position_px):
@@ -106,10 +105,9 @@ class Pinning:
             position_px = _clipped(position_px, source.pinhole.size)
             if not _is_shown(source, position_px):
                 return
-            pins = _with_pin(
-                self._session_state.state.pins, drag.person, PointObservation(drag.point, drag.camera, position_px)
-            )
-            if pins == self._session_state.state.pins:
+            before = self._session_state.state.pins
+            pins = _with_pin(before, drag.person, PointObservation(drag.point, drag.camera, position_px))
+            if pins == before:
                 return  # a click only sets it
             if drag.live:
                 self._show_fit([drag.person], [drag.person], drag.people, pins)
@@ -256,18 +254,9 @@ class Pinning:
         if dofs is not None:
             constraints = [replace(c, active_dofs=session_state.active_dofs(i) & dofs) if i in fitted else c
                            for i, c in enumerate(constraints)]  # fmt: skip
-        found = fit_frame(
-            [
-                PosedBody(m, p.values, session_state.state.velocity(i))
-                for i, (m, p) in enumerate(zip(session_state.models, start, strict=True))
-            ],
-            self._timed(pins),
-            cameras,
-            views,
-            session_state.state.settings,
-            fitted,
-            constraints,
-        )
+        state, moving = session_state.state, map(session_state.state.velocity, range(len(start)))
+        bodies = [*map(PosedBody, session_state.models, (p.values for p in start), moving)]
+        found = fit_frame(bodies, self._timed(pins), cameras, views, state.settings, fitted, constraints)
         people = list(start)
         for person in fitted:
             free = session_state.free_sources(person, "fitted")

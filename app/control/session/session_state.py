@@ -160,12 +160,16 @@ class SessionState:
         self.session = session
         self.saver.follow_session(session)
         self.frame_poses.place(session)
-        names = [p.model.point_names for p in session.people]
-        point = self.state.point if self.state.point in names[self.state.person] else None
-        held = frozenset(h for h in self.state.held if h.point in names[h.person])
         floor = replace(self.state.floor, up=session.up, plane=session.floor, picking=None)
-        locked = load_locks(session.people, self.saver.setting)
-        self.show_frame(point=point, held=held, floor=floor, locked=locked, draft=None)
+        self.follow_joints()
+        self.show_frame(floor=floor, draft=None)
+
+    def follow_joints(self) -> None:
+        """Select, hold and lock nothing that the present bodies lack."""
+        people, state = self.session.people, self.state
+        point = state.point if state.point in people[state.person].model.point_names else None
+        held = frozenset(h for h in state.held if h.point in people[h.person].model.point_names)
+        self.set(point=point, held=held, locked=load_locks(people, self.saver.setting))
 
     def subscribe(self, view: Callable[[State], None], *fields: str) -> Callable[[], None]:
         """Call a view with each state in which one of these fields is new; returns the function that ends this.
