@@ -22,7 +22,7 @@ const ALIGNED_PX = 6;
  */
 export function makePaneBorders(grid, move) {
   /** @type {Map<string, {bar: HTMLElement, border: Border}>} */
-  const shownLayout = new Map();
+  const bars = new Map();
   /** @type {{element: HTMLElement, borders: Border[]}[]} */
   const cornerList = [];
 
@@ -33,10 +33,10 @@ export function makePaneBorders(grid, move) {
    */
   function show(borders, isColumns, names) {
     const keys = new Set(borders.map(keyOf));
-    for (const [key, { bar }] of shownLayout) {
+    for (const [key, { bar }] of bars) {
       if (keys.has(key)) continue;
       bar.remove();
-      shownLayout.delete(key);
+      bars.delete(key);
     }
     for (const border of borders) {
       const bar = barOf(border);
@@ -53,7 +53,7 @@ export function makePaneBorders(grid, move) {
 
   /** @param {Border} border */
   function barOf(border) {
-    const known = shownLayout.get(keyOf(border));
+    const known = bars.get(keyOf(border));
     if (known) {
       known.border = border;
       grid.append(...(known.bar.isConnected ? [] : [known.bar]));
@@ -62,7 +62,7 @@ export function makePaneBorders(grid, move) {
     const orientation = border.isVertical ? "vertical" : "horizontal";
     const bar = make("div", { className: "pane-border", role: "separator", tabIndex: 0, title: HOW, "aria-orientation": orientation });
     const shown = { bar, border };
-    shownLayout.set(keyOf(border), shown);
+    bars.set(keyOf(border), shown);
     makeSeparator(bar, {
       position: () => shown.border.sizes[shown.border.index],
       moveTo: (size) => move(shown.border, size),

@@ -35,7 +35,7 @@ export function makeGestures(store, send, latency) {
    * @type {{pane: import("./pane.js").Pane, pointer: number, x: number, y: number, start: {x: number, y: number},
    *   person: number | null} | null} person: the dimmed person to select if the gesture is a click
    */
-  let panView = null;
+  let panning = null;
   const hint = new DragHint();
   const picking = new JointPicking();
   /** @type {{pane: import("./pane.js").Pane, camera: number, at: {x: number, y: number}} | null} the pointer over a pane */
@@ -78,7 +78,7 @@ export function makeGestures(store, send, latency) {
 
   /** Cancel the current gesture and revert its drag. Returns whether there was one. */
   function cancel() {
-    const held = drag !== null || panView !== null;
+    const held = drag !== null || panning !== null;
     if (drag?.begun) message("cancel", drag.grabbed);
     release();
     return held;
@@ -140,13 +140,13 @@ export function makeGestures(store, send, latency) {
    * @param {number} camera
    */
   function down(event, pane, camera) {
-    if (drag || panView || event.button > 1) return;
+    if (drag || panning || event.button > 1) return;
     const at = pane.locate(event);
     const hit = event.button === 0 ? (hitAt(pane, at)?.meant ?? hitPart(pane, camera, at)) : null;
     pane.surface.setPointerCapture(event.pointerId);
     if (!hit) {
       const start = { x: event.clientX, y: event.clientY };
-      panView = { pane, pointer: event.pointerId, ...start, start, person: dimmedAt(pane, camera, at, event.button) };
+      panning = { pane, pointer: event.pointerId, ...start, start, person: dimmedAt(pane, camera, at, event.button) };
       pane.surface.classList.add("is-panning");
       return;
     }
@@ -180,14 +180,14 @@ export function makeGestures(store, send, latency) {
    * @param {number} camera
    */
   function move(event, pane, camera) {
-    if (panView?.pointer === event.pointerId) {
-      panView.pane.panBy(event.clientX - panView.x, event.clientY - panView.y);
-      [panView.x, panView.y] = [event.clientX, event.clientY];
+    if (panning?.pointer === event.pointerId) {
+      panning.pane.panBy(event.clientX - panning.x, event.clientY - panning.y);
+      [panning.x, panning.y] = [event.clientX, event.clientY];
     } else if (drag?.pointer === event.pointerId) {
       drag.mode = modeOf(event);
       dragTo(drag, event);
       if (drag.begun) hint.show(drag.mode, pane.element);
-    } else if (!drag && !panView) {
+    } else if (!drag && !panning) {
       hoverAt(pane, camera, pane.locate(event));
     }
   }
@@ -216,7 +216,7 @@ export function makeGestures(store, send, latency) {
 
   /** @param {PointerEvent} event */
   function up(event) {
-    const pointer = drag?.pointer ?? panView?.pointer;
+    const pointer = drag?.pointer ?? panning?.pointer;
     if (event.pointerId !== pointer) return;
     if (drag?.begun) message("end", drag.at);
     // A click selects; the next press at the same place takes the other of an overlapping pair.
@@ -224,7 +224,7 @@ export function makeGestures(store, send, latency) {
       if (event.shiftKey) toggleHold(drag);
       else picking.next();
     }
-    const pan = panView;
+    const pan = panning;
     if (pan?.person != null && Math.hypot(event.clientX - pan.start.x, event.clientY - pan.start.y) < DRAG_THRESHOLD) {
       send({ type: "select", person: pan.person, point: null });
     }
@@ -280,11 +280,11 @@ export function makeGestures(store, send, latency) {
   }
 
   function release() {
-    const surface = (drag ?? panView)?.pane.surface;
+    const surface = (drag ?? panning)?.pane.surface;
     surface?.classList.remove("is-dragging", "is-panning");
     hint.hide();
     drag = null;
-    panView = null;
+    panning = null;
     if (store.facts.dragging) store.set({ dragging: false });
   }
 

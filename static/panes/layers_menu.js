@@ -25,12 +25,12 @@ export function mountLayersMenu(store, layers) {
   const panel = byId("layers-menu", HTMLElement);
   const button = byId("show-layers", HTMLButtonElement);
   /** @type {(() => void)[]} */
-  const refresh = [];
+  const refreshers = [];
   opensPopover(panel, button, () => toggle());
   buildQuick();
   for (const group of GROUPS) buildGroup(group);
   buildFoot();
-  const show = () => refresh.forEach((one) => one());
+  const show = () => refreshers.forEach((one) => one());
   store.on(["layers"], () => show());
   show();
 
@@ -43,7 +43,7 @@ export function mountLayersMenu(store, layers) {
     for (const { label, title, ids } of QUICK) {
       const { element, input } = checkbox(label, title);
       onChange(input, () => layers.toggle(ids, input.checked));
-      refresh.push(() => {
+      refreshers.push(() => {
         const { shown } = store.facts.layers;
         input.checked = ids.some((id) => shown[id]);
         input.indeterminate = input.checked && !ids.every((id) => shown[id]);
@@ -78,7 +78,7 @@ export function mountLayersMenu(store, layers) {
       onInput: (value) => layers.setOpacity(id, value / 100),
     });
     opacity.input.dataset.opacity = id;
-    refresh.push(() => {
+    refreshers.push(() => {
       const { layers } = store.facts;
       input.checked = layers.shown[id];
       opacity.show(Math.round(100 * layers.opacity[id]));
@@ -96,7 +96,7 @@ export function mountLayersMenu(store, layers) {
     ])) {
       const { element, input } = checkbox(label, title, { type: "radio", name: "contour-colors", value });
       input.addEventListener("change", () => layers.setColors(value));
-      refresh.push(() => (input.checked = store.facts.layers.colors === value));
+      refreshers.push(() => (input.checked = store.facts.layers.colors === value));
       choice.append(element);
     }
     return choice;

@@ -18,7 +18,6 @@ export function mountHere(context, join) {
   const panel = byId("participants-panel", HTMLElement);
   const chipRow = byId("participant-chips", HTMLElement);
   const list = byId("participants-list", HTMLElement);
-  const form = join;
   panel.append(join.form);
   opensPopover(panel, button, () => toggle());
   panel.addEventListener("toggle", () => showButton());
@@ -27,7 +26,7 @@ export function mountHere(context, join) {
   function toggle() {
     button.hidden = false; // the list opens below it
     togglePopover(panel, button);
-    if (panel.matches(":popover-open")) form.input.focus();
+    if (panel.matches(":popover-open")) join.input.focus();
   }
 
   function show() {
