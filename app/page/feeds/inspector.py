@@ -19,6 +19,7 @@ from app.state.annotation import AnnotationState, ProposedClick
 from app.state.floor_picking import FloorState
 from app.state.identity import are_same
 from app.state.observations import ObservationsState
+from app.state.page_view import View
 from app.state.people import AcquisitionState
 from app.state.progress import FindState
 from app.state.run_choices import RunChoices
@@ -47,7 +48,7 @@ class InspectorFeed:
         self._sent: list[Message] = []
         self._drawn: tuple[CalibrationCheck | None, MisfitField] = None, NO_MISFITS
 
-    def is_behind(self, state: State) -> bool:
+    def is_due(self, state: State, _: View | None = None) -> bool:
         """Return whether there may be updates; quick, because during drags a state follows every few milliseconds."""
         return not are_same(_ingredients(state), self._made_from)
 
