@@ -1,6 +1,6 @@
 """Messages about what the inspector edits: settings, the 3-D view and body sizes, as `base` explains."""
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias, Union
 
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
@@ -137,6 +137,12 @@ class FindPeople(Command, frozen=True, tag="find_people"):
     """
 
     action: Literal["start", "stop", "take"]
+
+
+InspectorCommand: TypeAlias = Union[  # noqa: UP007
+    SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
+    DraftSizes, AcquireSizes, FindPeople,
+]  # fmt: skip
 
 
 # --- to the page ----------------------------------------------------------------------------------------------------
