@@ -90,7 +90,7 @@ class Controller:
         """State of the session, and its stores: all parts share it."""
         runs, turns = SearchRuns(), saver.shared.turns
         turns.add(saver.moves, lambda: saver.author or "the host", lambda: session_state.state)
-        self.activities = activities = Activities(session_state.lock, session_state.show_again, turns, saver.moves)
+        self.activities = activities = Activities(session_state.lock, session_state.show_frame, turns, saver.moves)
         """Stops what is at work."""
         self.search = SearchRunner(session_state, runs, activities)
         """Searches the shown frame."""

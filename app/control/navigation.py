@@ -35,7 +35,7 @@ class Navigation:
             self._search.forget()
             self._tracking.flush()
             state = session_state.state
-            session_state.show_frame(frame, follow=state.follow and not state.track.running)
+            session_state.show_frame(frame=frame, follow=state.follow and not state.track.running)
 
     def select(self, person: int, point: str | None) -> None:
         """Select a person, and one of the body's points; an unknown person or point is ignored."""

@@ -1,12 +1,12 @@
 """Draw into pictures, and encode them for the page: footage and evidence as JPEG, masks as PNG with transparency."""
 
-import struct
-import zlib
 from collections.abc import Sequence
+from io import BytesIO
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image as Pillow
 
 from app.drawing import overlay_colors
 from tracker.body.model import PosedBody
@@ -57,12 +57,15 @@ def silhouette(view: ViewEvidence) -> bytes:
 
 def mask(inside: Mask, color: str) -> bytes:
     """Encode a mask, (H, W), in one colour as PNG of one bit per pixel."""
-    return _png(np.packbits(inside, axis=1), inside.shape[1], 1, [color])
+    return labels(inside.view(np.uint8), [color], bits=1)
 
 
-def labels(parts: NDArray[np.uint8], colors: Sequence[str]) -> bytes:
-    """Encode labels, (H, W), as PNG: 0 is transparent, k has the k-th colour, counted from 1."""
-    return _png(parts, parts.shape[1], 8, colors)
+def labels(parts: NDArray[np.uint8], colors: Sequence[str], bits: int = 8) -> bytes:
+    """Encode labels, (H, W), as PNG of some bits per pixel: 0 is transparent, k has the k-th colour, counted from 1."""
+    picture, data = Pillow.fromarray(parts, "P"), BytesIO()
+    picture.putpalette(bytes(3) + b"".join(bytes.fromhex(color[1:]) for color in colors))
+    picture.save(data, "PNG", transparency=0, bits=bits, compress_level=_FAST)
+    return data.getvalue()
 
 
 def parts(bodies: Sequence[PosedBody], camera: Camera, colors: Sequence[str], reduction: float) -> bytes:
@@ -75,36 +78,6 @@ def parts(bodies: Sequence[PosedBody], camera: Camera, colors: Sequence[str], re
         reduction: image pixels per picture pixel along either side.
     """
     return labels(part_labels(bodies, camera.scaled(1 / reduction)), colors)
-
-
-def _png(rows: NDArray[np.uint8], width: int, depth: int, colors: Sequence[str]) -> bytes:
-    """Encode a PNG with a palette whose first entry is transparent.
-
-    Args:
-        rows: bytes of the rows, (H, bytes).
-        width: of the picture, px.
-        depth: bits per pixel.
-        colors: `#rrggbb` of the entries from the second on.
-    """
-    height = rows.shape[0]
-    unfiltered = np.zeros((height, rows.shape[1] + 1), np.uint8)  # each row starts with the number of its filter
-    unfiltered[:, 1:] = rows
-    palette = bytes(3) + b"".join(bytes.fromhex(color[1:]) for color in colors)
-    indexed = 3
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        _chunk(name, data)
-        for name, data in (
-            (b"IHDR", struct.pack(">IIBBBBB", width, height, depth, indexed, 0, 0, 0)),
-            (b"PLTE", palette),
-            (b"tRNS", b"\0"),
-            (b"IDAT", zlib.compress(unfiltered.data, _FAST)),
-            (b"IEND", b""),
-        )
-    )
-
-
-def _chunk(name: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
 
 def placeholder(size: tuple[int, int], text: str) -> Image:

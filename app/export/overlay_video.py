@@ -89,7 +89,7 @@ def drawn_paths(motion: ExportedMotion, frame: int, shown: Sequence[int]) -> lis
         return []
     session = replace(motion.session, people=tuple(replace(p.person, model=body.model) for p, body in people))
     velocities = tuple(body.velocity for _, body in people)
-    state = State(frame, tuple(ShownPose(body.values, "") for _, body in people), velocities=velocities)
+    state = State(frame=frame, people=tuple(ShownPose(body.values, "") for _, body in people), velocities=velocities)
     view = View(_LAYERS, tuple(float(i in shown) for i in range(len(session.cameras))))
     exported = [motion.is_exported(p, frame) for p, _ in people]
     return [path for path in overlays.paths(session, state, view, None) if exported[path.person]]

@@ -13,36 +13,10 @@ from app.drawing.curves import CurveGroup
 from app.messages.annotation import AskNextClick, DecideTask, PlanTasks, ResolveComment, WriteComment
 from app.messages.base import Command, Dofs, Frame, Index, Name, Number
 from app.messages.cameras import CheckCalibration, UseClocks
-from app.messages.inspector import (
-    AcquireSizes,
-    ApplySizes,
-    ChangeBody,
-    CoupleSides,
-    DraftSizes,
-    FindPeople,
-    SetGirdleWidth,
-    SetHeight,
-    SetPartSizes,
-    SetTrackSettings,
-    SetView3d,
-)
+from app.messages.inspector import InspectorCommand
 from app.messages.observation import SetCopyTolerance, UseCopy, UseObservations, WatchProvenance
 from app.messages.pose import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
-from app.messages.search import (
-    AskReason,
-    CompareRun,
-    PreviewCandidate,
-    RepeatSearch,
-    ReplayStep,
-    RunSearch,
-    SetCostMapPlace,
-    SetLandscapeDof,
-    SetSearchSettings,
-    SetSearchSpeed,
-    ShowCostMap,
-    ShowLandscape,
-    TakeCandidate,
-)
+from app.messages.search import SearchCommand
 from app.state.page_view import Layer
 
 RangeAction: TypeAlias = Literal[
@@ -267,13 +241,9 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     Seek, Select, SetView, CheckEpipolar, ShowPerson, Solo, ShowBefore, ShowCurves, WatchTab, ShowHistory,
     LookThrough, Pause3d,
     Drag, PoseEdit, DragPin, RemovePins, FitPose, TakeLimbBack,
-    RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
-    TakeCandidate, ShowLandscape, SetLandscapeDof, ShowCostMap, SetCostMapPlace, AskReason,
-    StartTracking, ControlTracking, EditRange, EditCurves, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
-    FollowTracking,
-    SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
-    DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseClocks, UseObservations, WatchProvenance, UseCopy,
-    SetCopyTolerance, PlanTasks, DecideTask, WriteComment, ResolveComment, AskNextClick,
+    SearchCommand, StartTracking, ControlTracking, EditRange, EditCurves, CompareRange, StopRange, ToggleMark,
+    ConfirmKeyframe, FollowTracking, InspectorCommand, CheckCalibration, UseClocks, UseObservations, WatchProvenance,
+    UseCopy, SetCopyTolerance, PlanTasks, DecideTask, WriteComment, ResolveComment, AskNextClick,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

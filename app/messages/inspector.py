@@ -1,13 +1,14 @@
 """Messages about what the inspector edits: settings, the 3-D view and body sizes, as `base` explains."""
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias, Union
 
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
 from app.messages.base import Command, Index, Message, Name, Part, WorkMessage
 from app.messages.search import OutlierMode
-from app.state.run_choices import MAX_STRIDE
+from app.state.people import AcquiredSize, SideOutlines
+from app.state.run_choices import MAX_STRIDE, RunChoices
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
 from tracker.estimation.acquisition.from_contours import SizeMethod
 from tracker.estimation.tracking.method import OptionKind
@@ -138,20 +139,13 @@ class FindPeople(Command, frozen=True, tag="find_people"):
     action: Literal["start", "stop", "take"]
 
 
+InspectorCommand: TypeAlias = Union[  # noqa: UP007
+    SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
+    DraftSizes, AcquireSizes, FindPeople,
+]  # fmt: skip
+
+
 # --- to the page ----------------------------------------------------------------------------------------------------
-
-
-class TrackValues(Part, frozen=True):
-    """Settings of the tracker."""
-
-    method: str
-    """Name of the tracking method."""
-    stride: int
-    """Every so many frames are tracked; the frames between get no pose."""
-    cameras: tuple[str, ...]
-    """Names of the cameras to track with; all if empty."""
-    options: dict[str, bool | float | str]
-    """Options that differ from the default, by name."""
 
 
 class OptionInfo(Part, frozen=True):
@@ -200,9 +194,9 @@ class SearchValues(Part, frozen=True):
 class SettingsMessage(Message, frozen=True, tag="settings"):
     """Settings of tracker and search, and their defaults."""
 
-    track: TrackValues
+    track: RunChoices
     search: SearchValues
-    track_default: TrackValues
+    track_default: RunChoices
     search_default: SearchValues
     methods: tuple[MethodInfo, ...]
     """The tracking methods, the default first."""
@@ -278,23 +272,6 @@ class BodySizesMessage(Message, frozen=True, tag="body_sizes"):
     """Least and largest length, distance, half depth or half width."""
 
 
-class AcquiredSizeRow(Part, frozen=True):
-    """One size of a body before and after an acquisition."""
-
-    name: str
-    before_m: float
-    after_m: float
-    sigma_m: float
-    """Standard deviation after the acquisition."""
-
-
-class OutlinePair(Part, frozen=True):
-    """Outlines of two bodies from one side, as short lines x0, y0, x1, y1 in pixels of a picture."""
-
-    before: tuple[tuple[float, float, float, float], ...]
-    after: tuple[tuple[float, float, float, float], ...]
-
-
 class AcquisitionResult(Part, frozen=True):
     """An acquired body; its sizes are those being edited."""
 
@@ -302,12 +279,12 @@ class AcquisitionResult(Part, frozen=True):
     """Frames that the sizes were fitted to."""
     cost_before_px: float
     cost_after_px: float
-    sizes: tuple[AcquiredSizeRow, ...]
+    sizes: tuple[AcquiredSize, ...]
     """All sizes, those that changed most first."""
     size_px: tuple[int, int]
     """Width and height of the pictures."""
-    front: OutlinePair
-    side: OutlinePair
+    front: SideOutlines
+    side: SideOutlines
 
 
 class AcquisitionMessage(Message, frozen=True, tag="acquisition"):

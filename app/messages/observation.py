@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from app.messages.base import Command, Frame, Index, Message, Name, Part, WorkMessage
+from app.state.observations import ObservedSet
 
 # --- from the page --------------------------------------------------------------------------------------------------
 
@@ -54,20 +55,6 @@ class SetCopyTolerance(Command, frozen=True, tag="other_copy"):
 # --- to the page ----------------------------------------------------------------------------------------------------
 
 
-class ObservedSetInfo(Part, frozen=True):
-    """A set of imported observations."""
-
-    name: str
-    format: str
-    people: tuple[str, ...]
-    is_in_space: bool
-    """Whether it has joints in space, not key points in pictures."""
-    frames: int
-    """Number of frames with points."""
-    problem: str
-    """Why it cannot be read, or empty."""
-
-
 class JudgedPerson(Part, frozen=True):
     """Judgement of one person."""
 
@@ -98,7 +85,7 @@ class JudgedLimb(Part, frozen=True):
 class ObservationsMessage(WorkMessage, frozen=True, tag="imported"):
     """Imported observations, the work on them, and their judgement."""
 
-    sets: tuple[ObservedSetInfo, ...]
+    sets: tuple[ObservedSet, ...]
     shown: str
     """Name of the set that the views show, or empty."""
     is_previewed: bool

@@ -7,6 +7,7 @@ import msgspec
 
 from app.messages import annotation as plan_wire
 from app.messages import client as wire
+from app.messages import inspector
 from app.messages.base import Command
 from app.messages.client import CLIENT_MESSAGES, ClientMessage
 from app.messages.observation import UseObservations
@@ -23,9 +24,9 @@ _SEEN: tuple[type[Command], ...] = (
 _MOVED: tuple[type[Command], ...] = (wire.Seek, wire.Select)
 """Change the frame and person that one participant sees, and nothing that is stored."""
 _OF_HOST: tuple[type[Command], ...] = (
-    wire.SetHeight, wire.SetPartSizes, wire.SetGirdleWidth, wire.ApplySizes, wire.ChangeBody, wire.DraftSizes,
-    wire.AcquireSizes, wire.FindPeople, wire.CheckCalibration, wire.UseClocks, wire.EditFloor, wire.MarkFloor,
-    wire.SetView3d, wire.LookThrough, UseObservations,
+    inspector.SetHeight, inspector.SetPartSizes, inspector.SetGirdleWidth, inspector.ApplySizes, inspector.ChangeBody,
+    inspector.DraftSizes, inspector.AcquireSizes, inspector.FindPeople, inspector.SetView3d, wire.CheckCalibration,
+    wire.UseClocks, wire.EditFloor, wire.MarkFloor, wire.LookThrough, UseObservations,
 )  # fmt: skip
 """Change what belongs to the session, not to a pose, or the 3-D view, which shows what the host shows."""
 _DECIDED = ("verify", "reject")

@@ -1,6 +1,6 @@
 """Messages about searches, and about poses that deserve a look, as `base` explains."""
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias, Union
 
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
@@ -147,6 +147,12 @@ class AskReason(Command, frozen=True, tag="reason"):
     """Subscribe to the reason for the shown pose, or no longer; or stop the work on it until somebody asks again."""
 
     action: Literal["ask", "leave", "stop"]
+
+
+SearchCommand: TypeAlias = Union[  # noqa: UP007
+    RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
+    TakeCandidate, ShowLandscape, SetLandscapeDof, ShowCostMap, SetCostMapPlace, AskReason,
+]  # fmt: skip
 
 
 # --- to the page ----------------------------------------------------------------------------------------------------

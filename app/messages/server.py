@@ -7,26 +7,12 @@ the feeds make them. `tests/recipes/protocol_docs.py` writes the page's types an
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.epipolar_check import EpipolarDistance, EpipolarLine
+from app.messages import inspector, search
 from app.messages.advice import AdviceMessage
 from app.messages.annotation import AnnotationMessage, PresenceMessage
 from app.messages.base import Message, Part, Status
 from app.messages.cameras import CalibrationMessage, ClocksMessage
-from app.messages.inspector import (
-    AcquisitionMessage,
-    BodySizesMessage,
-    FindingMessage,
-    SettingsMessage,
-    View3dMessage,
-)
 from app.messages.observation import AnnotatorsMessage, ObservationsMessage, OtherCopyMessage, ProvenanceMessage
-from app.messages.search import (
-    CostMapMessage,
-    InconsistentMessage,
-    RangeComparisonMessage,
-    ReasonMessage,
-    SearchRunsMessage,
-    SearchSetupMessage,
-)
 from app.state.comparison import ComparedWork
 from app.state.progress import TrackStage
 from app.state.role import Role
@@ -383,12 +369,12 @@ class EpipolarMessage(Message, frozen=True, tag="epipolar"):
 
 
 TextMessage: TypeAlias = Union[  # noqa: UP007
-    SessionMessage, StateMessage, AdviceMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
-    RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
-    SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
-    AcquisitionMessage, FindingMessage, CalibrationMessage, ClocksMessage, ObservationsMessage, ReasonMessage,
-    CostMapMessage, AnnotationMessage, PresenceMessage,
-    ProvenanceMessage, AnnotatorsMessage, OtherCopyMessage,
+    SessionMessage, StateMessage, AdviceMessage, HistoryMessage, NoticeMessage, TimelineMessage,
+    search.InconsistentMessage, search.RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
+    search.SearchSetupMessage, search.SearchRunsMessage, inspector.SettingsMessage, inspector.View3dMessage,
+    inspector.BodySizesMessage, inspector.AcquisitionMessage, inspector.FindingMessage, CalibrationMessage,
+    ClocksMessage, ObservationsMessage, search.ReasonMessage, search.CostMapMessage, AnnotationMessage,
+    PresenceMessage, ProvenanceMessage, AnnotatorsMessage, OtherCopyMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -4,11 +4,12 @@ import asyncio
 import itertools
 import logging
 from collections.abc import Coroutine, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import aiohttp
 from aiohttp import web
 
+from app.control.controller import Controller
 from app.messages import client as wire
 from app.messages import encoding
 from app.messages.base import Message, encode_text
@@ -42,6 +43,16 @@ _WATCHABLE_S = 1 / 60
 """Time between two updates of a running search: faster ones are invisible and take time from the search."""
 _MAX_HISTORY = 2000
 """Largest number of history entries, in each direction, that a page may request."""
+
+
+class Feed(Protocol):
+    """News of one kind for one page."""
+
+    def is_due(self, state: State, view: View | None, /) -> bool:
+        """Return whether there may be news for what the page shows; quick."""
+
+    def updates(self, controller: Controller, state: State, /) -> Sequence[Message | bytes]:
+        """Return the messages that the page lacks; binary ones are encoded."""
 
 
 class PaneSocket:
@@ -248,21 +259,21 @@ class PageConnection:
                 # Otherwise the vectors go first: the eye follows them. No page may show what is not on disk as saved.
                 if with_figures or (self._sent_text is not None and self._sent_text.saved and not state.saved):
                     await self._send_state(state)
-                if self._inspector.is_behind(state):
-                    for news in await asyncio.to_thread(self._inspector.updates, self._controller, state):
-                        await self._send(news)
+                if with_figures:
+                    await self._send_news(state, self._inspector)
                 if sent is None or sent.timeline_version != state.timeline_version:  # after the text, which names cells
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if self._view is not None and self._view.cameras:
                     await self._send_drawn(state, self._view)
                 await self._send_epipolar(state)
                 await self._send_checks(sent, state)
-                await self._send_details(state)
+                if with_figures:
+                    await self._send_news(state, self._curves, self._provenance, self._observability)
                 await self._send_history()
                 for update in await asyncio.to_thread(self._searches.updates, self._controller, with_figures):
                     await self._send(update)
                 if with_figures and self._visit.role in ("host", "annotate"):  # others take no next step
-                    await self._send_advice(state)
+                    await self._send_news(state, self._advice)
             except TrackerError as error:
                 await self._notice(page_text(error))
             if state.search.running:
@@ -320,12 +331,6 @@ class PageConnection:
         if sent is None or sent.range_comparison is not state.range_comparison:
             await self._send(encoding.range_comparison(state.range_comparison))
 
-    async def _send_advice(self, state: State) -> None:
-        """Send what the line over the views says, if that changed."""
-        advice = await asyncio.to_thread(self._advice.update, self._controller, state)
-        if advice is not None:
-            await self._send(advice)
-
     async def _send_epipolar(self, state: State) -> None:
         """Send the lines of the pixel that the page asks about, if they changed."""
         made_from: tuple[object, ...] = (self._epipolar,)
@@ -337,17 +342,12 @@ class PageConnection:
             self._sent_epipolar = made_from
             await self._send(encoding.epipolar(self._controller.session_of(state), state, self._epipolar))
 
-    async def _send_details(self, state: State) -> None:
-        """Send curves, how well the views constrain the shown pose and where it comes from, if the page shows that."""
-        if self._curves.is_due(state):
-            curves = await asyncio.to_thread(self._curves.update, self._controller, state)
-            if curves is not None:
-                await self._send(curves)
-        if self._provenance.is_due(state):
-            for news in await asyncio.to_thread(self._provenance.updates, self._controller, state):
-                await self._send(news)
-        if self._observability.is_due(state, self._view):
-            await self._send(await asyncio.to_thread(self._observability.update, self._controller, state))
+    async def _send_news(self, state: State, *feeds: Feed) -> None:
+        """Send what some feeds have that the page lacks."""
+        for feed in feeds:
+            if feed.is_due(state, self._view):
+                for news in await asyncio.to_thread(feed.updates, self._controller, state):
+                    await self._send(news)
 
     async def _send_history(self) -> None:
         """Send the history to a subscribed page if it changed."""

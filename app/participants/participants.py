@@ -10,7 +10,6 @@ from app.control.controller import Controller
 from app.participants.names import is_same, joined_name, looks_alike
 from app.state.role import Role
 from app.state.state import State
-from app.storage.turns import work_of
 from tracker.errors import TrackerError
 
 _MAX_PEOPLE = 12
@@ -208,7 +207,8 @@ class Participants:
         participant.controller.close()
 
     def _follow(self, participant: _Participant) -> None:
-        participant.unsubscribe = participant.controller.subscribe(lambda _: self._note(participant))
+        fields = ("frame", "person", "drag", "is_pin_held", "search", "track", "ranges", "finding")
+        participant.unsubscribe = participant.controller.subscribe(lambda _: self._note(participant), *fields)
 
     def _note(self, participant: _Participant) -> None:
         """Tell the pages where a participant is, if that has changed; called under the session's lock or not."""
@@ -220,9 +220,9 @@ class Participants:
 
 
 def _is_idle(participant: _Participant) -> bool:
-    return not participant.n_pages and work_of(participant.controller.state) is None
+    return not participant.n_pages and participant.controller.state.pose_work is None
 
 
 def _presence(participant: _Participant, state: State) -> Presence:
-    work = work_of(state)
+    work = state.pose_work
     return Presence(participant.name, participant.role, state.frame, state.person, "" if work is None else work.what)

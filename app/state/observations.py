@@ -17,7 +17,7 @@ class ObservedSet:
     people: tuple[str, ...] = ()
     is_in_space: bool = False
     """Whether it has joints in space, not key points in pictures."""
-    n_frames: int = 0
+    frames: int = 0
     """Number of frames with points."""
     problem: str = ""
     """Why it cannot be read; empty if it can."""

@@ -155,7 +155,8 @@ class BodyOutlines:
     side: SideOutlines
 
 
-class AcquiredSize(NamedTuple):
+@dataclass(frozen=True)
+class AcquiredSize:
     """One size of a body before and after an acquisition, metres."""
 
     name: str

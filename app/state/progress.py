@@ -1,8 +1,8 @@
 """Progress of long work: tracking, work on ranges of frames, indexing of footage."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from tracker.body.model import PosedBody
 
@@ -30,6 +30,16 @@ class WorkState:
     """How the last one ended; else empty."""
     failed: bool = False
     """Whether it ended with an error."""
+
+
+class PoseWork(NamedTuple):
+    """Something that is being done to poses of a session."""
+
+    what: str
+    """As text for others: `drags`, `tracks frames 10 to 50`."""
+    people: frozenset[int] | None
+    """Indices of the people whose poses change; None for all."""
+    frames: Container[int]
 
 
 @dataclass(frozen=True)

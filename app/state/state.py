@@ -1,7 +1,8 @@
 """The state of an open session, as one frozen value. Only the controller makes a new one; the views read it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypedDict
+from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from app.state.people import (
     SizeDraft,
     Visibility,
 )
-from app.state.progress import FindState, FootageState, RangeState, TrackState
+from app.state.progress import FindState, FootageState, PoseWork, RangeState, TrackState
 from app.state.reason import Reason, ReasonState
 from app.state.run_choices import RunChoices
 from app.state.search import CostLandscape, CostMap, SearchState, SearchView
@@ -31,103 +32,145 @@ from tracker.compute.kernel_cache import STAGES
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.session.store.records import ALL_FRAMES
+
+P = ParamSpec("P")
 
 
-@dataclass(frozen=True, eq=False)
-class State:
-    """Everything that the views need and cannot derive."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ShownFrame:
+    """The people of the shown frame, as they are stored or changed."""
 
-    frame: int
-    people: tuple[ShownPose, ...]
+    frame: int = 0
+    people: tuple[ShownPose, ...] = ()
     models: tuple[BodyModel, ...] = ()
     """The body in which each person is shown: that of the stored pose, else the present one."""
     revisions: tuple[int, ...] = ()
     """Model revision of each of these bodies."""
     present: tuple[int, ...] = ()
     """Revision of each person's present body, which new poses are made with."""
-    draft: SizeDraft | None = None
-    """Sizes being edited."""
-    sides_alike: bool = True
-    """Whether sizes are edited on both sides at once."""
-    sizes_message: str = ""
-    """Result of the last change of sizes."""
-    acquisition: AcquisitionState = field(default_factory=AcquisitionState)
-    """Acquisition of sizes from the footage."""
     velocities: tuple[Array | None, ...] = ()
     """Change of each person's pose from one frame to the next, (n_dofs,), by the stored poses around the frame; None
     without any, and empty where all cameras share one clock."""
+    pins: tuple[tuple[PointObservation, ...], ...] = ()
+    """The pins of each person on the frame, by point and camera."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Costs:
+    """The costs of the shown poses."""
+
+    cost_px: float | None = None
+    """Mean over the views, px; None until the frame's evidence is computed."""
+    view_costs_px: tuple[float | None, ...] = ()
+    """Cost of each view, px; None for a view without edges."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ViewPart:
+    """Selection, and how the people are looked at."""
+
     person: int = 0
     """Index of the selected person."""
     point: str | None = None
     """The selected point."""
     visibility: Visibility = field(default_factory=Visibility)
-    cost_px: float | None = None
-    """Mean over the views, px; None until the frame's evidence is computed."""
-    view_costs_px: tuple[float | None, ...] = ()
-    """Cost of each view, px; None for a view without edges."""
-    comparison: PoseComparison | None = None
-    """The last fit or search of any frame; see `compared`."""
-    range_comparison: RangeComparison | None = None
-    """The poses of a range against those that they replaced; None while nothing is compared."""
-    search: SearchState = field(default_factory=SearchState)
-    search_view: SearchView = field(default_factory=SearchView)
-    checked: frozenset[tuple[int, int]] = frozenset()
-    """Index of the person and frame of the poses that are being assessed."""
-    cost_map: CostMap | None = None
-    """Of the shown pose or one shortly before; None until a page displays it."""
-    reasons: ReasonState = field(default_factory=ReasonState)
-    """Why the shown pose is in doubt, as far as a page asks."""
-    landscape: CostLandscape | None = None
-    """Of the shown pose or one shortly before; None until a page displays it."""
-    track: TrackState = field(default_factory=TrackState)
-    finding: FindState = field(default_factory=FindState)
-    """Search for people whom nobody has placed."""
-    calibration: CalibrationState = field(default_factory=CalibrationState)
-    """Check of the cameras."""
-    clocks: ClocksState = field(default_factory=ClocksState)
-    observations: ObservationsState = field(default_factory=ObservationsState)
-    """Imported observations."""
-    annotation: AnnotationState = field(default_factory=AnnotationState)
-    """The plan of annotation, comments, and the next best click."""
-    other_copy: OtherCopy | None = None
-    """The copy of the session that is compared with it."""
     follow: bool = True
     """Whether each frame is shown as it is tracked."""
-    locked: tuple[frozenset[int], ...] = ()
-    """Indices of the locked degrees of freedom of each person."""
-    ranges: RangeState = field(default_factory=RangeState)
-    inconsistent_frames: tuple[int, ...] = ()
-    """Frames whose poses disagree with their neighbours, ascending (see `tracker.body.motion.consistency`)."""
-    keyframe_doubts: tuple[KeyframeDoubt, ...] = ()
-    """Keyframes that their neighbours or views contradict, by person and frame."""
-    pins: tuple[tuple[PointObservation, ...], ...] = ()
-    """The pins of each person on the frame, by point and camera."""
+    snapped: int | None = None
+    """Index of the camera through which the 3-D view looks; None for a free view."""
+    view_3d: View3d = field(default_factory=View3d)
+    prediction_note: str = ""
+    """Origin of the predicted pose in the 3-D view, or why there is none; empty while it is not shown."""
+    pages_pausing_3d: frozenset[int] = frozenset()
+    """Numbers of the pages that render the 3-D view in software and pause it during a drag."""
+    pages_blurring_faces: frozenset[int] = frozenset()
+    """Numbers of the pages that blur faces: pictures in the 3-D view, which is one for all, are blurred if one does."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EditPart:
+    """Work by hand: drags, pins, locks, body sizes, the floor."""
+
+    drag: DragState | None = None
+    drag_seqs: tuple[tuple[int, int], ...] = ()
+    """For each page that drags: its number, and the sequence number of its last applied drag message."""
     is_pin_held: bool = False
     """Whether a pin is being dragged."""
     held: frozenset[HeldPoint] = frozenset()
     """Points that stay in place during drags, on all frames; until the program ends or they are released."""
     depth_note: DepthNote | None = None
     """The last placement whose depth no view has shown; see `unseen_depth`."""
-    drag: DragState | None = None
-    drag_seqs: tuple[tuple[int, int], ...] = ()
-    """For each page that drags: its number, and the sequence number of its last applied drag message."""
-    pages_pausing_3d: frozenset[int] = frozenset()
-    """Numbers of the pages that render the 3-D view in software and pause it during a drag."""
-    pages_blurring_faces: frozenset[int] = frozenset()
-    """Numbers of the pages that blur faces: pictures in the 3-D view, which is one for all, are blurred if one does."""
-    view_3d: View3d = field(default_factory=View3d)
-    prediction_note: str = ""
-    """Origin of the predicted pose in the 3-D view, or why there is none; empty while it is not shown."""
+    locked: tuple[frozenset[int], ...] = ()
+    """Indices of the locked degrees of freedom of each person."""
+    draft: SizeDraft | None = None
+    """Sizes being edited."""
+    sides_alike: bool = True
+    """Whether sizes are edited on both sides at once."""
+    sizes_message: str = ""
+    """Result of the last change of sizes."""
     floor: FloorState = field(default_factory=FloorState)
-    footage: FootageState = field(default_factory=FootageState)
-    compiled: frozenset[str] = frozenset(STAGES)
-    """Groups of kernels that can be called without delay; see `tracker.compute.kernel_cache`."""
-    snapped: int | None = None
-    """Index of the camera through which the 3-D view looks; None for a free view."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SearchPart:
+    """Searches of the shown frame, the costs around its pose, and what they changed."""
+
     settings: TrackSettings = field(default_factory=TrackSettings)
     """Settings of searches and trackers."""
+    search: SearchState = field(default_factory=SearchState)
+    search_view: SearchView = field(default_factory=SearchView)
+    comparison: PoseComparison | None = None
+    """The last fit or search of any frame; see `compared`."""
+    landscape: CostLandscape | None = None
+    """Of the shown pose or one shortly before; None until a page displays it."""
+    cost_map: CostMap | None = None
+    """Of the shown pose or one shortly before; None until a page displays it."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunPart:
+    """Work on many frames and on the cameras."""
+
     run_choices: RunChoices = field(default_factory=RunChoices)
     """Method, frames and cameras of the next tracking run."""
+    track: TrackState = field(default_factory=TrackState)
+    finding: FindState = field(default_factory=FindState)
+    """Search for people whom nobody has placed."""
+    acquisition: AcquisitionState = field(default_factory=AcquisitionState)
+    """Acquisition of sizes from the footage."""
+    ranges: RangeState = field(default_factory=RangeState)
+    range_comparison: RangeComparison | None = None
+    """The poses of a range against those that they replaced; None while nothing is compared."""
+    calibration: CalibrationState = field(default_factory=CalibrationState)
+    """Check of the cameras."""
+    clocks: ClocksState = field(default_factory=ClocksState)
+    observations: ObservationsState = field(default_factory=ObservationsState)
+    """Imported observations."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReviewPart:
+    """The plan of annotation, other copies, and doubts about poses."""
+
+    annotation: AnnotationState = field(default_factory=AnnotationState)
+    """The plan of annotation, comments, and the next best click."""
+    other_copy: OtherCopy | None = None
+    """The copy of the session that is compared with it."""
+    checked: frozenset[tuple[int, int]] = frozenset()
+    """Index of the person and frame of the poses that are being assessed."""
+    reasons: ReasonState = field(default_factory=ReasonState)
+    """Why the shown pose is in doubt, as far as a page asks."""
+    inconsistent_frames: tuple[int, ...] = ()
+    """Frames whose poses disagree with their neighbours, ascending (see `tracker.body.motion.consistency`)."""
+    keyframe_doubts: tuple[KeyframeDoubt, ...] = ()
+    """Keyframes that their neighbours or views contradict, by person and frame."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StoragePart:
+    """Disk, history, footage and kernels."""
+
     undo: str | None = None
     """Label of the edit that undo would revert."""
     redo: str | None = None
@@ -137,6 +180,14 @@ class State:
     """Why the last edit is not on disk; None if none has failed."""
     timeline_version: int = 0
     """Increases with every change of the stored poses."""
+    footage: FootageState = field(default_factory=FootageState)
+    compiled: frozenset[str] = frozenset(STAGES)
+    """Groups of kernels that can be called without delay; see `tracker.compute.kernel_cache`."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class State(ShownFrame, Costs, ViewPart, EditPart, SearchPart, RunPart, ReviewPart, StoragePart):
+    """Everything that the views need and cannot derive."""
 
     @property
     def is_3d_paused(self) -> bool:
@@ -147,6 +198,26 @@ class State:
     def is_3d_throttled(self) -> bool:
         """Whether the 3-D view is drawn rarely, to leave the processor to a running job."""
         return (self.track.running or self.search.running) and bool(self.pages_pausing_3d)
+
+    @property
+    def pose_work(self) -> PoseWork | None:
+        """The work on poses that changes them now; None for none."""
+        track = self.track
+        if self.drag is not None:
+            return PoseWork(f"drags on frame {self.frame}", frozenset({self.drag.person}), {self.frame})
+        if self.is_pin_held:
+            return PoseWork(f"sets a pin on frame {self.frame}", frozenset({self.person}), {self.frame})
+        if self.search.running:
+            return PoseWork(f"searches frame {self.frame}", None, {self.frame})
+        if track.running and track.first is not None and track.last is not None:
+            first, last = sorted((track.first, track.last))
+            return PoseWork(f"tracks frames {first} to {last}", None, range(first, last + 1))
+        if self.ranges.frames:
+            what, people, frames = self.ranges.what, self.ranges.people, self.ranges.frames
+            return PoseWork(f"is {what} frames {frames[0]} to {frames[-1]}", people, frames)
+        if self.finding.running:
+            return PoseWork("finds people", None, ALL_FRAMES)
+        return None
 
     @property
     def compiling(self) -> str | None:
@@ -190,12 +261,16 @@ class State:
         if replayed is not None:
             people = tuple(ShownPose(best, "searched") for best in replayed.best)
             search = replace(self.search, candidate=replayed.candidate)
-            costs = Costs(cost_px=replayed.cost_px, view_costs_px=replayed.view_costs_px)
-            return replace(self, people=people, search=search, drag=None, **costs)
+            return replace(
+                self, people=people, search=search, drag=None,
+                cost_px=replayed.cost_px, view_costs_px=replayed.view_costs_px,
+            )  # fmt: skip
         compared = self.compared
         if compared is not None and compared.is_before_shown:
-            costs = Costs(cost_px=compared.before_px, view_costs_px=compared.before_view_costs_px)
-            return replace(self, people=compared.before, drag=None, **costs)
+            return replace(
+                self, people=compared.before, drag=None,
+                cost_px=compared.before_px, view_costs_px=compared.before_view_costs_px,
+            )  # fmt: skip
         return self
 
     @property
@@ -224,81 +299,11 @@ class State:
         return tuple(p.values for p in self.people)
 
 
-class Costs(TypedDict):
-    """The fields of a state that hold the costs of its poses."""
-
-    cost_px: float | None
-    view_costs_px: tuple[float | None, ...]
-
-
-class ShownFrame(TypedDict):
-    """The fields of a state that hold the people of a frame."""
-
-    people: tuple[ShownPose, ...]
-    models: tuple[BodyModel, ...]
-    revisions: tuple[int, ...]
-    present: tuple[int, ...]
-
-
-class StateChanges(TypedDict, total=False):
-    """Changes of a state, by field: the fields of `State` with their types, which a test compares."""
-
-    frame: int
-    people: tuple[ShownPose, ...]
-    models: tuple[BodyModel, ...]
-    revisions: tuple[int, ...]
-    present: tuple[int, ...]
-    velocities: tuple[Array | None, ...]
-    draft: SizeDraft | None
-    sides_alike: bool
-    sizes_message: str
-    acquisition: AcquisitionState
-    person: int
-    point: str | None
-    visibility: Visibility
-    cost_px: float | None
-    view_costs_px: tuple[float | None, ...]
-    comparison: PoseComparison | None
-    range_comparison: RangeComparison | None
-    search: SearchState
-    search_view: SearchView
-    checked: frozenset[tuple[int, int]]
-    cost_map: CostMap | None
-    reasons: ReasonState
-    landscape: CostLandscape | None
-    track: TrackState
-    finding: FindState
-    calibration: CalibrationState
-    clocks: ClocksState
-    observations: ObservationsState
-    annotation: AnnotationState
-    other_copy: OtherCopy | None
-    follow: bool
-    locked: tuple[frozenset[int], ...]
-    ranges: RangeState
-    inconsistent_frames: tuple[int, ...]
-    keyframe_doubts: tuple[KeyframeDoubt, ...]
-    pins: tuple[tuple[PointObservation, ...], ...]
-    is_pin_held: bool
-    held: frozenset[HeldPoint]
-    depth_note: DepthNote | None
-    drag: DragState | None
-    drag_seqs: tuple[tuple[int, int], ...]
-    pages_pausing_3d: frozenset[int]
-    pages_blurring_faces: frozenset[int]
-    view_3d: View3d
-    prediction_note: str
-    floor: FloorState
-    footage: FootageState
-    compiled: frozenset[str]
-    snapped: int | None
-    settings: TrackSettings
-    run_choices: RunChoices
-    undo: str | None
-    redo: str | None
-    saved: bool
-    save_error: str | None
-    timeline_version: int
+def takes_changes_of(
+    value: Callable[P, object],
+) -> Callable[[Callable[..., None]], Callable[Concatenate[Any, P], None]]:
+    """Declare that the keywords of a method are fields of a value, with their types."""
+    return lambda method: method
 
 
 def finite_or_none(value: float) -> float | None:

@@ -7,7 +7,7 @@
 import { annotationBindings } from "./annotation_keys.js";
 import { Review } from "./review.js";
 import { annotationSection } from "./section.js";
-import { Visits } from "./visits.js";
+import { makeVisits } from "./visits.js";
 
 /** @typedef {ReturnType<typeof mount>} AnnotationRoom */
 
@@ -18,7 +18,7 @@ import { Visits } from "./visits.js";
  * @param {{panes: import("../panes/index.js").Panes, inspector: import("../inspector/index.js").InspectorRoom}} rooms
  */
 export function mount(context, { panes, inspector: { inspector } }) {
-  const visits = new Visits(context, panes);
+  const visits = makeVisits(context, panes);
   const review = new Review(context, visits);
   const section = annotationSection(context, review, visits);
   inspector.add(section, "calibration");

@@ -7,22 +7,18 @@ import { zoomOnArrival } from "../panes/arrival_zoom.js";
 /** Limb of shoulders and hips in proposals. */
 const TRUNK = "trunk";
 
-export class Visits {
-  #context;
-  #zoomTo;
+/** @typedef {ReturnType<typeof makeVisits>} Visits */
 
-  /**
-   * @param {import("../model/index.js").Context} context
-   * @param {import("../panes/index.js").Panes} panes
-   */
-  constructor(context, panes) {
-    this.#context = context;
-    this.#zoomTo = zoomOnArrival(context.store, panes.grid);
-  }
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../panes/index.js").Panes} panes
+ */
+export function makeVisits(context, panes) {
+  const zoomTo = zoomOnArrival(context.store, panes.grid);
 
   /** @param {Goal} goal */
-  go({ person, frame, limb = "" }) {
-    const { store, navigation, actions } = this.#context;
+  function go({ person, frame, limb = "" }) {
+    const { store, navigation, actions } = context;
     const info = store.facts.session?.people[person];
     if (!info) return;
     navigation.pause();
@@ -31,6 +27,8 @@ export class Visits {
     const point = points.filter((one) => !info.minor.includes(one)).at(-1) ?? points.at(-1) ?? null;
     const { state } = store.facts;
     if (state?.person !== person || (point && state.point !== point)) actions.selectPerson(person, point);
-    this.#zoomTo(points.length ? { person, frame, points } : null);
+    zoomTo(points.length ? { person, frame, points } : null);
   }
+
+  return { go };
 }

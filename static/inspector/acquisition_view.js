@@ -8,7 +8,7 @@ import { choiceRow } from "./rows.js";
 /**
  * @typedef {import("../model/protocol.js").AcquisitionMessage} Acquisition
  * @typedef {import("../model/protocol.js").AcquisitionResult} Result
- * @typedef {import("../model/protocol.js").OutlinePair} OutlinePair
+ * @typedef {import("../model/protocol.js").SideOutlines} SideOutlines
  * @typedef {NonNullable<import("../model/protocol.js").AcquireSizes["method"]>} Method
  */
 
@@ -75,7 +75,7 @@ function describe(result) {
 
 /**
  * @param {Result} result
- * @param {OutlinePair} outlines
+ * @param {SideOutlines} outlines
  * @param {string} name
  */
 function picture({ size_px: [width, height] }, { before, after }, name) {

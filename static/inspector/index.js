@@ -10,7 +10,7 @@ import { calibrationSection } from "./calibration_section.js";
 import { clocksSection } from "./clocks_section.js";
 import { copySection } from "./copy_section.js";
 import { findSection } from "./find_section.js";
-import { BodySection } from "./body_section.js";
+import { bodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
 import { jointSection } from "./joint_section.js";
 import { command } from "./parts.js";
@@ -49,7 +49,7 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
     joint,
     reasonSection(context, panes, posing),
     finding,
-    new BodySection(context),
+    bodySection(context),
     trackSection(context),
     searchSection(context),
     calibration,

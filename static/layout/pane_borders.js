@@ -15,38 +15,31 @@ const CORNER_PX = 14;
 /** Borders of neighbouring tracks that are this close move together at their corner. */
 const ALIGNED_PX = 6;
 
-export class PaneBorders {
-  #grid;
-  #move;
+/**
+ * @param {HTMLElement} grid
+ * @param {(border: Border, size: number | null) => void} move gives the neighbour before a border a size; null for the
+ *   automatic sizes of all neighbours in line
+ */
+export function makePaneBorders(grid, move) {
   /** @type {Map<string, {bar: HTMLElement, border: Border}>} */
-  #shown = new Map();
+  const bars = new Map();
   /** @type {{element: HTMLElement, borders: Border[]}[]} */
-  #corners = [];
-
-  /**
-   * @param {HTMLElement} grid
-   * @param {(border: Border, size: number | null) => void} move gives the neighbour before a border a size; null for the
-   *   automatic sizes of all neighbours in line
-   */
-  constructor(grid, move) {
-    this.#grid = grid;
-    this.#move = move;
-  }
+  const cornerList = [];
 
   /**
    * @param {Border[]} borders
    * @param {boolean} isColumns whether the tracks are columns
    * @param {string[][]} names of the cameras in each track
    */
-  show(borders, isColumns, names) {
+  function show(borders, isColumns, names) {
     const keys = new Set(borders.map(keyOf));
-    for (const [key, { bar }] of this.#shown) {
+    for (const [key, { bar }] of bars) {
       if (keys.has(key)) continue;
       bar.remove();
-      this.#shown.delete(key);
+      bars.delete(key);
     }
     for (const border of borders) {
-      const bar = this.#barOf(border);
+      const bar = barOf(border);
       place(bar, grown(border.box, border.isVertical));
       const { of, index, sizes, min } = border;
       const track = isColumns ? "column" : "row";
@@ -55,53 +48,55 @@ export class PaneBorders {
       const both = (sizes[index] + sizes[index + 1]) / 100;
       showPosition(bar, { now: sizes[index] / both, min: min / both, max: 100 - min / both });
     }
-    this.#showCorners(cornersOf(borders));
+    showCorners(cornersOf(borders));
   }
 
   /** @param {Border} border */
-  #barOf(border) {
-    const known = this.#shown.get(keyOf(border));
+  function barOf(border) {
+    const known = bars.get(keyOf(border));
     if (known) {
       known.border = border;
-      this.#grid.append(...(known.bar.isConnected ? [] : [known.bar]));
+      grid.append(...(known.bar.isConnected ? [] : [known.bar]));
       return known.bar;
     }
     const orientation = border.isVertical ? "vertical" : "horizontal";
     const bar = make("div", { className: "pane-border", role: "separator", tabIndex: 0, title: HOW, "aria-orientation": orientation });
     const shown = { bar, border };
-    this.#shown.set(keyOf(border), shown);
+    bars.set(keyOf(border), shown);
     makeSeparator(bar, {
       position: () => shown.border.sizes[shown.border.index],
-      moveTo: (size) => this.#move(shown.border, size),
-      reset: () => this.#move(shown.border, null),
+      moveTo: (size) => move(shown.border, size),
+      reset: () => move(shown.border, null),
     });
-    this.#grid.append(bar);
+    grid.append(bar);
     return bar;
   }
 
   /** @param {{x: number, y: number, borders: Border[]}[]} corners */
-  #showCorners(corners) {
-    while (this.#corners.length > corners.length) this.#corners.pop()?.element.remove();
-    while (this.#corners.length < corners.length) this.#corners.push(this.#newCorner());
+  function showCorners(corners) {
+    while (cornerList.length > corners.length) cornerList.pop()?.element.remove();
+    while (cornerList.length < corners.length) cornerList.push(newCorner());
     corners.forEach(({ x, y, borders }, index) => {
-      const corner = this.#corners[index];
+      const corner = cornerList[index];
       corner.borders = borders;
-      if (!corner.element.isConnected) this.#grid.append(corner.element);
+      if (!corner.element.isConnected) grid.append(corner.element);
       place(corner.element, { x: x - CORNER_PX / 2, y: y - CORNER_PX / 2, width: CORNER_PX, height: CORNER_PX });
     });
   }
 
   /** By keys, each border is moved by itself. */
-  #newCorner() {
+  function newCorner() {
     const element = make("div", { className: "pane-corner", title: HOW, "aria-hidden": "true" });
     const corner = { element, borders: /** @type {Border[]} */ ([]) };
     onDrag(element, () => {
       const moved = corner.borders;
-      return (dx, dy) => moved.forEach((border) => this.#move(border, border.sizes[border.index] + (border.isVertical ? dx : dy)));
+      return (dx, dy) => moved.forEach((border) => move(border, border.sizes[border.index] + (border.isVertical ? dx : dy)));
     });
-    element.addEventListener("dblclick", () => corner.borders.forEach((border) => this.#move(border, null)));
+    element.addEventListener("dblclick", () => corner.borders.forEach((border) => move(border, null)));
     return corner;
   }
+
+  return { show };
 }
 
 /** @param {Border} border */

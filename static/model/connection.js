@@ -22,38 +22,28 @@ export function forgetName() {
   sessionStorage.removeItem(NAME_KEY);
 }
 
-export class Connection {
+/** @typedef {ReturnType<typeof makeConnection>} Connection */
+
+/**
+ * @param {Listener} listener
+ * @param {import("./protocol.js").ClientMessage | null} greeting sent first on every connection
+ * @param {() => boolean} isWanted whether to connect again; asked before each attempt
+ */
+export function makeConnection(listener, greeting = null, isWanted = () => true) {
   /** @type {WebSocket | null} */
-  #socket = null;
-  #delayMs = FIRST_DELAY_MS;
-  /** @type {Listener} */
-  #listener;
-
-  /** @type {import("./protocol.js").ClientMessage | null} */
-  #greeting;
-  #isWanted;
-
-  /**
-   * @param {Listener} listener
-   * @param {import("./protocol.js").ClientMessage | null} greeting sent first on every connection
-   * @param {() => boolean} isWanted whether to connect again; asked before each attempt
-   */
-  constructor(listener, greeting = null, isWanted = () => true) {
-    this.#listener = listener;
-    this.#greeting = greeting;
-    this.#isWanted = isWanted;
-    this.#connect();
-    // Reconnect immediately when the network is back.
-    addEventListener("online", () => this.#connect());
-  }
+  let current = null;
+  let delayMs = FIRST_DELAY_MS;
+  connect();
+  // Reconnect immediately when the network is back.
+  addEventListener("online", () => connect());
 
   /**
    * Send a message, or drop it without a connection: the program sends its whole state on each new connection.
    *
    * @param {import("./protocol.js").ClientMessage} message
    */
-  send(message) {
-    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(message));
+  function send(message) {
+    if (current?.readyState === WebSocket.OPEN) current.send(JSON.stringify(message));
   }
 
   /**
@@ -61,43 +51,45 @@ export class Connection {
    *
    * @param {string} name empty for none
    */
-  joinAs(name) {
+  function joinAs(name) {
     sessionStorage.setItem(NAME_KEY, name);
-    this.#delayMs = 0;
-    this.#socket?.close();
+    delayMs = 0;
+    current?.close();
   }
 
-  #connect() {
-    if (this.#socket && this.#socket.readyState !== WebSocket.CLOSED) return;
+  function connect() {
+    if (current && current.readyState !== WebSocket.CLOSED) return;
     const url = new URL("ws", document.baseURI);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
     url.search = new URLSearchParams(joinedName() ? { name: joinedName() } : {}).toString();
     const socket = new WebSocket(url);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
-      this.#delayMs = FIRST_DELAY_MS;
-      if (this.#greeting) this.send(this.#greeting);
-      this.#listener.onOpen(true);
+      delayMs = FIRST_DELAY_MS;
+      if (greeting) send(greeting);
+      listener.onOpen(true);
     };
     socket.onmessage = ({ data }) => {
       if (typeof data === "string") {
-        this.#listener.onText(JSON.parse(data));
+        listener.onText(JSON.parse(data));
       } else {
         const { header, payload } = decodeBinary(data);
-        this.#listener.onBinary(header, payload);
+        listener.onBinary(header, payload);
       }
     };
     socket.onclose = () => {
-      this.#listener.onOpen(false);
-      this.#connectLater();
+      listener.onOpen(false);
+      connectLater();
     };
-    this.#socket = socket;
+    current = socket;
   }
 
-  #connectLater() {
-    setTimeout(() => (this.#isWanted() ? this.#connect() : this.#connectLater()), this.#delayMs * (0.75 + 0.5 * Math.random()));
-    this.#delayMs = Math.min(2 * this.#delayMs, MAX_DELAY_MS);
+  function connectLater() {
+    setTimeout(() => (isWanted() ? connect() : connectLater()), delayMs * (0.75 + 0.5 * Math.random()));
+    delayMs = Math.min(2 * delayMs, MAX_DELAY_MS);
   }
+
+  return { send, joinAs };
 }
 
 /**

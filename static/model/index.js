@@ -5,15 +5,15 @@
  */
 
 import { Actions } from "./actions.js";
-import { Connection } from "./connection.js";
+import { makeConnection } from "./connection.js";
 import { ImageTones } from "./image_tone.js";
 import { Latency } from "../widgets/latency.js";
-import { Layers } from "./layers.js";
+import { makeLayers } from "./layers.js";
 import { Navigation } from "./navigation.js";
-import { Receiver } from "./receiver.js";
+import { makeReceiver } from "./receiver.js";
 import { RecentImages } from "./recent_images.js";
 import { Store } from "./store.js";
-import { Themes } from "./theme.js";
+import { makeThemes } from "./theme.js";
 import { isAllowed, isAsked, refusalOf, unavailableReasons } from "./unavailable_reasons.js";
 
 /**
@@ -34,7 +34,7 @@ export function mount() {
   const noticeListeners = [];
   const notify = (/** @type {NoticeMessage} */ notice) => noticeListeners.forEach((listener) => listener(notice));
   const say = (/** @type {string} */ text, /** @type {NoticeMessage["level"]} */ level = "info") => notify({ type: "notice", level, text });
-  /** @type {Connection | null} */
+  /** @type {import("./connection.js").Connection | null} */
   let connection = null;
   const send = (/** @type {ClientMessage} */ message) => {
     const { session } = store.facts;
@@ -46,7 +46,7 @@ export function mount() {
     connection?.send(message);
   };
   const navigation = new Navigation(store, send);
-  const receiver = new Receiver(store, notify, send, recentImages);
+  const receiver = makeReceiver(store, notify, send, recentImages);
   return {
     store,
     send,
@@ -56,9 +56,9 @@ export function mount() {
     recentImages,
     actions: new Actions(store, send),
     navigation,
-    layers: new Layers(store),
+    layers: makeLayers(store),
     imageTones: new ImageTones(store),
-    themes: new Themes(store),
+    themes: makeThemes(store),
     reasons: unavailableReasons(store),
 
     /** @param {string} name by which this page joins from now on; empty for none */
@@ -73,7 +73,7 @@ export function mount() {
 
     /** @param {ClientMessage | null} greeting sent first on every connection */
     connect(greeting) {
-      connection = new Connection(receiver, greeting, () => store.facts.opening === null);
+      connection = makeConnection(receiver, greeting, () => store.facts.opening === null);
     },
   };
 }

@@ -89,17 +89,14 @@ export function defaultLayers(people = 1) {
   return usual;
 }
 
-export class Layers {
-  #store;
-  /** Whether hidden contours were shown when all contours were hidden, to be shown with them again. */
-  #hadHidden = false;
-  #session = "";
+/** @typedef {ReturnType<typeof makeLayers>} Layers */
 
-  /** @param {import("./store.js").Store} store */
-  constructor(store) {
-    this.#store = store;
-    store.on(["session"], () => this.#restore());
-  }
+/** @param {import("./store.js").Store} store */
+export function makeLayers(store) {
+  /** Whether hidden contours were shown when all contours were hidden, to be shown with them again. */
+  let hadHidden = false;
+  let session = "";
+  store.on(["session"], () => restore());
 
   /**
    * Show or hide layers.
@@ -107,49 +104,51 @@ export class Layers {
    * @param {Layer[]} ids
    * @param {boolean} [isShown] default: show all, or hide all if all are shown
    */
-  toggle(ids, isShown) {
-    const { layers } = this.#store.facts;
+  function toggle(ids, isShown) {
+    const { layers } = store.facts;
     const show = isShown ?? !ids.every((id) => layers.shown[id]);
     const shown = { ...layers.shown };
     for (const id of ids) shown[id] = show;
     if (ids.includes("contours") && !ids.includes("hidden") && show !== layers.shown.contours) {
       // Dashed contours are contours, too: alone they would stay where the user wants to see the picture.
-      if (!show) this.#hadHidden = layers.shown.hidden;
-      shown.hidden = show && (layers.shown.hidden || this.#hadHidden);
+      if (!show) hadHidden = layers.shown.hidden;
+      shown.hidden = show && (layers.shown.hidden || hadHidden);
     }
-    this.#save({ ...layers, shown });
+    save({ ...layers, shown });
   }
 
   /**
    * @param {Layer} id
    * @param {number} opacity 0 to 1
    */
-  setOpacity(id, opacity) {
-    const { layers } = this.#store.facts;
-    this.#save({ ...layers, opacity: { ...layers.opacity, [id]: opacity } });
+  function setOpacity(id, opacity) {
+    const { layers } = store.facts;
+    save({ ...layers, opacity: { ...layers.opacity, [id]: opacity } });
   }
 
   /** @param {ContourColors} colors */
-  setColors(colors) {
-    this.#save({ ...this.#store.facts.layers, colors });
+  function setColors(colors) {
+    save({ ...store.facts.layers, colors });
   }
 
-  reset() {
-    this.#save(defaultLayers(this.#store.facts.session?.people.length));
+  function reset() {
+    save(defaultLayers(store.facts.session?.people.length));
   }
 
   /** @param {LayerChoice} layers */
-  #save(layers) {
-    this.#store.set({ layers });
-    localStorage.setItem(STORED + this.#session, JSON.stringify(layers));
+  function save(layers) {
+    store.set({ layers });
+    localStorage.setItem(STORED + session, JSON.stringify(layers));
   }
 
-  #restore() {
-    const { name = "", people = [] } = this.#store.facts.session ?? {};
-    if (name === this.#session) return;
-    this.#session = name;
-    this.#store.set({ layers: restored(stored(STORED + name) ?? {}, people.length) });
+  function restore() {
+    const { name = "", people = [] } = store.facts.session ?? {};
+    if (name === session) return;
+    session = name;
+    store.set({ layers: restored(stored(STORED + name) ?? {}, people.length) });
   }
+
+  return { toggle, setOpacity, setColors, reset };
 }
 
 /**

@@ -15,21 +15,16 @@ export function keyOf(layer, camera) {
   return `${layer} ${camera}`;
 }
 
-export class PictureAssembler {
-  #onShow;
-  /** @type {Arrived[]} of the incomplete set */
-  #arriving = [];
-  /** @type {{frame: number, pictures: Map<string, Arrived>} | null} complete sets of the newest frame that wait for decoding */
-  #waiting = null;
-  #decoding = false;
-  #closed = false;
+/** @typedef {ReturnType<typeof makePictureAssembler>} PictureAssembler */
 
-  /**
-   * @param {(frame: number, pictures: Pictures) => void} onShow takes ownership of the bitmaps
-   */
-  constructor(onShow) {
-    this.#onShow = onShow;
-  }
+/** @param {(frame: number, pictures: Pictures) => void} onShow takes ownership of the bitmaps */
+export function makePictureAssembler(onShow) {
+  /** @type {Arrived[]} of the incomplete set */
+  let arriving = [];
+  /** @type {{frame: number, pictures: Map<string, Arrived>} | null} complete sets of the newest frame that wait for decoding */
+  let waiting = null;
+  let decoding = false;
+  let closed = false;
 
   /**
    * Add a picture. An incomplete set is dropped when another set begins.
@@ -37,27 +32,27 @@ export class PictureAssembler {
    * @param {ImageHeader} header
    * @param {ArrayBuffer} payload
    */
-  receive(header, payload) {
-    if (this.#arriving[0]?.header.set !== header.set) this.#arriving = [];
-    this.#arriving.push({ header, blob: new Blob([payload]) });
-    if (this.#arriving.length < header.of) return;
-    if (this.#waiting?.frame !== header.frame) this.#waiting = { frame: header.frame, pictures: new Map() };
-    for (const one of this.#arriving) this.#waiting.pictures.set(keyOf(one.header.layer, one.header.camera), one);
-    this.#arriving = [];
-    void this.#decode();
+  function receive(header, payload) {
+    if (arriving[0]?.header.set !== header.set) arriving = [];
+    arriving.push({ header, blob: new Blob([payload]) });
+    if (arriving.length < header.of) return;
+    if (waiting?.frame !== header.frame) waiting = { frame: header.frame, pictures: new Map() };
+    for (const one of arriving) waiting.pictures.set(keyOf(one.header.layer, one.header.camera), one);
+    arriving = [];
+    void decode();
   }
 
   /** Discard everything that is pending. */
-  close() {
-    this.#closed = true;
+  function close() {
+    closed = true;
   }
 
-  async #decode() {
-    if (this.#decoding) return;
-    this.#decoding = true;
-    while (this.#waiting) {
-      const { frame, pictures } = this.#waiting;
-      this.#waiting = null;
+  async function decode() {
+    if (decoding) return;
+    decoding = true;
+    while (waiting) {
+      const { frame, pictures } = waiting;
+      waiting = null;
       try {
         const decoded = await Promise.all(
           [...pictures].map(async ([key, { header, blob }]) => {
@@ -65,12 +60,14 @@ export class PictureAssembler {
             return /** @type {[string, Picture]} */ ([key, picture]);
           }),
         );
-        if (this.#closed) decoded.forEach(([, { bitmap }]) => bitmap.close());
-        else this.#onShow(frame, new Map(decoded));
+        if (closed) decoded.forEach(([, { bitmap }]) => bitmap.close());
+        else onShow(frame, new Map(decoded));
       } catch (error) {
         console.error(`frame ${frame}: a picture could not be decoded`, error);
       }
     }
-    this.#decoding = false;
+    decoding = false;
   }
+
+  return { receive, close };
 }

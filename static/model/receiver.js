@@ -3,7 +3,7 @@
 import { forgetName } from "./connection.js";
 import { Cells } from "./cells.js";
 import { PICTURE_LAYERS } from "./layers.js";
-import { PictureAssembler, keyOf } from "./pictures.js";
+import { makePictureAssembler, keyOf } from "./pictures.js";
 import { mergeCandidates, mergeSteps, takeLandscape, takeRuns } from "./search_runs.js";
 import { mergeCurves } from "./series.js";
 
@@ -46,59 +46,48 @@ function factOf(type) {
   return type.replace(/_(.)/g, (_, letter) => letter.toUpperCase());
 }
 
-export class Receiver {
-  #store;
-  #notify;
-  #send;
-  #recent;
-  /** @type {PictureAssembler | null} */
-  #pictures = null;
+/**
+ * @param {import("./store.js").Store} store
+ * @param {(notice: import("./protocol.js").NoticeMessage) => void} notify
+ * @param {(message: import("./protocol.js").ClientMessage) => void} send
+ * @param {import("./recent_images.js").RecentImages} recent caches the images of recent frames
+ */
+export function makeReceiver(store, notify, send, recent) {
+  /** @type {import("./pictures.js").PictureAssembler | null} */
+  let pictures = null;
   /** @type {Map<number, import("./protocol.js").Overlay>} overlays that arrived before the images of their frame */
-  #early = new Map();
+  const early = new Map();
   /** @type {{frame: number, person: number} | null} what was shown before the program was started again */
-  #before = null;
-
-  /**
-   * @param {import("./store.js").Store} store
-   * @param {(notice: import("./protocol.js").NoticeMessage) => void} notify
-   * @param {(message: import("./protocol.js").ClientMessage) => void} send
-   * @param {import("./recent_images.js").RecentImages} recent caches the images of recent frames
-   */
-  constructor(store, notify, send, recent) {
-    this.#store = store;
-    this.#send = send;
-    this.#recent = recent;
-    this.#notify = notify;
-    store.on(["layers"], () => this.#forgetHidden());
-  }
+  let shownBefore = null;
+  store.on(["layers"], () => forgetHidden());
 
   /** @param {boolean} open */
-  onOpen(open) {
-    if (open !== this.#store.facts.connected) this.#store.set({ connected: open });
+  function onOpen(open) {
+    if (open !== store.facts.connected) store.set({ connected: open });
   }
 
   /** @param {TextMessage} message */
-  onText(message) {
-    if (message.type === "session") return this.#begin(message);
-    if (message.type === "timeline") return this.#mergeTimeline(message);
-    if (message.type === "notice") return this.#notify(message);
-    if (message.type === "clocks" && this.#areSetAnew(message)) this.#recent.clear();
-    if (message.type === "presence" && message.refusal) this.#refuse(message.refusal);
+  function onText(message) {
+    if (message.type === "session") return begin(message);
+    if (message.type === "timeline") return mergeTimeline(message);
+    if (message.type === "notice") return notify(message);
+    if (message.type === "clocks" && areSetAnew(message)) recent.clear();
+    if (message.type === "presence" && message.refusal) refuse(message.refusal);
     const change = /** @type {((message: TextMessage, facts: Facts) => Partial<Facts>) | undefined} */ (CHANGES[message.type]);
-    this.#store.set(change?.(message, this.#store.facts) ?? { [factOf(message.type)]: message });
-    if (message.type === "state") this.#goBack(message);
+    store.set(change?.(message, store.facts) ?? { [factOf(message.type)]: message });
+    if (message.type === "state") goBack(message);
   }
 
   /**
    * @param {BinaryHeader} header
    * @param {ArrayBuffer} payload
    */
-  onBinary(header, payload) {
-    if (header.type === "image") return this.#pictures?.receive(header, payload);
-    if (header.type === "overlay") return this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
-    if (header.type === "cells") return this.#cells(header).take(header, payload);
+  function onBinary(header, payload) {
+    if (header.type === "image") return pictures?.receive(header, payload);
+    if (header.type === "overlay") return takeOverlay({ ...header, segments: new Float32Array(payload) });
+    if (header.type === "cells") return cellsOf(header).take(header, payload);
     const change = /** @type {(header: BinaryHeader, payload: ArrayBuffer, facts: Facts) => Partial<Facts>} */ (BINARY_CHANGES[header.type]);
-    this.#store.set(change(header, payload, this.#store.facts));
+    store.set(change(header, payload, store.facts));
   }
 
   /**
@@ -106,43 +95,43 @@ export class Receiver {
    *
    * @param {import("./protocol.js").Overlay} overlay
    */
-  #takeOverlay(overlay) {
-    const { layers, shown } = this.#store.facts;
+  function takeOverlay(overlay) {
+    const { layers, shown } = store.facts;
     const isBare = !PICTURE_LAYERS.some((layer) => layers.shown[layer]);
-    if (isBare && shown?.frame !== overlay.frame) this.#show(overlay.frame, new Map());
-    if (this.#store.facts.shown?.frame === overlay.frame) {
-      this.#store.set({ overlay });
+    if (isBare && shown?.frame !== overlay.frame) show(overlay.frame, new Map());
+    if (store.facts.shown?.frame === overlay.frame) {
+      store.set({ overlay });
       return;
     }
-    this.#early.delete(overlay.frame);
-    this.#early.set(overlay.frame, overlay);
+    early.delete(overlay.frame);
+    early.set(overlay.frame, overlay);
     // A tracker can be some frames ahead of decoding. Older overlays belong to skipped frames.
-    for (const frame of this.#early.keys()) if (this.#early.size > MAX_EARLY) this.#early.delete(frame);
+    for (const frame of early.keys()) if (early.size > MAX_EARLY) early.delete(frame);
   }
 
   /** @param {import("./protocol.js").ClocksMessage} clocks whether a camera shows pictures of another time by them */
-  #areSetAnew({ cameras }) {
-    const before = this.#store.facts.clocks?.cameras ?? [];
+  function areSetAnew({ cameras }) {
+    const before = store.facts.clocks?.cameras ?? [];
     return cameras.some((c, i) => c.offset_frames !== before[i]?.offset_frames || c.drift_ms_per_s !== before[i].drift_ms_per_s);
   }
 
   /** @param {string} refusal why the name of this tab could not be had */
-  #refuse(refusal) {
+  function refuse(refusal) {
     forgetName();
-    this.#notify({ type: "notice", level: "error", text: refusal });
+    notify({ type: "notice", level: "error", text: refusal });
   }
 
   /** @param {import("./protocol.js").SessionMessage} session */
-  #begin(session) {
-    this.#pictures?.close();
-    this.#pictures = new PictureAssembler((frame, pictures) => this.#show(frame, pictures));
-    this.#early.clear();
-    this.#recent.clear(); // the footage may have changed while disconnected
-    const { session: previous, state } = this.#store.facts;
+  function begin(session) {
+    pictures?.close();
+    pictures = makePictureAssembler((frame, pictures) => show(frame, pictures));
+    early.clear();
+    recent.clear(); // the footage may have changed while disconnected
+    const { session: previous, state } = store.facts;
     const isStartedAgain = previous?.name === session.name && previous.start !== session.start;
-    this.#before = isStartedAgain && state ? { frame: state.frame, person: state.person } : null;
-    this.#store.set({ session, lanes: [] });
-    if (JSON.stringify(previous?.cameras) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
+    shownBefore = isStartedAgain && state ? { frame: state.frame, person: state.person } : null;
+    store.set({ session, lanes: [] });
+    if (JSON.stringify(previous?.cameras) !== JSON.stringify(session.cameras)) store.set({ shown: null, overlay: null });
   }
 
   /**
@@ -150,12 +139,12 @@ export class Receiver {
    *
    * @param {import("./protocol.js").StateMessage} state of the new start
    */
-  #goBack({ frame, person, point }) {
-    const before = this.#before;
-    this.#before = null;
+  function goBack({ frame, person, point }) {
+    const before = shownBefore;
+    shownBefore = null;
     if (!before || frame !== 0) return;
-    if (before.person !== person) this.#send({ type: "select", person: before.person, point });
-    if (before.frame !== 0) this.#send({ type: "seek", frame: before.frame });
+    if (before.person !== person) send({ type: "select", person: before.person, point });
+    if (before.frame !== 0) send({ type: "seek", frame: before.frame });
   }
 
   /**
@@ -164,26 +153,26 @@ export class Receiver {
    * @param {number} frame
    * @param {import("./pictures.js").Pictures} pictures
    */
-  #show(frame, pictures) {
-    const { shown } = this.#store.facts;
+  function show(frame, pictures) {
+    const { shown } = store.facts;
     const merged = new Map(shown?.frame === frame ? shown.pictures : []);
     for (const [key, { bitmap }] of shown?.pictures ?? []) {
       if (merged.has(key) && !pictures.has(key)) continue;
       bitmap.close();
     }
     for (const [key, picture] of pictures) merged.set(key, picture);
-    this.#store.set({ shown: { frame, pictures: merged } });
-    this.#recent.keep(frame, pictures);
-    const overlay = this.#early.get(frame);
+    store.set({ shown: { frame, pictures: merged } });
+    recent.keep(frame, pictures);
+    const overlay = early.get(frame);
     if (overlay) {
-      this.#store.set({ overlay });
-      this.#early.delete(frame);
+      store.set({ overlay });
+      early.delete(frame);
     }
   }
 
   /** Discard pictures of hidden layers, which may become outdated. The program sends a layer when it is shown again. */
-  #forgetHidden() {
-    const { shown, layers, session } = this.#store.facts;
+  function forgetHidden() {
+    const { shown, layers, session } = store.facts;
     for (const layer of PICTURE_LAYERS) {
       if (layers.shown[layer]) continue;
       for (const camera of session?.cameras.keys() ?? []) {
@@ -194,8 +183,8 @@ export class Receiver {
   }
 
   /** @param {import("./protocol.js").TimelineMessage} message */
-  #mergeTimeline(message) {
-    const cells = this.#cells(message);
+  function mergeTimeline(message) {
+    const cells = cellsOf(message);
     for (const [frame, cell] of Object.entries(message.cells)) cells.set(Number(frame), cell);
   }
 
@@ -205,12 +194,14 @@ export class Receiver {
    * @param {{replace: boolean, person: number | null}} message `replace` to start empty; `person` null for
    *   the cells of all people
    */
-  #cells({ replace, person }) {
-    const { facts } = this.#store;
+  function cellsOf({ replace, person }) {
+    const { facts } = store;
     const known = person === null ? facts.timeline : facts.lanes[person];
     const cells = replace || !known ? new Cells(facts.session?.n_frames ?? 0) : known;
-    if (person === null) this.#store.set({ timeline: cells });
-    else this.#store.set({ lanes: Object.assign([...facts.lanes], { [person]: cells }) });
+    if (person === null) store.set({ timeline: cells });
+    else store.set({ lanes: Object.assign([...facts.lanes], { [person]: cells }) });
     return cells;
   }
+
+  return { onOpen, onText, onBinary };
 }

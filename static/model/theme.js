@@ -2,30 +2,28 @@
 
 const STORED = "quadrille.theme";
 
-/** @typedef {"system" | "dark" | "light"} ThemeChoice */
-
-export class Themes {
-  #store;
-  #dark = matchMedia("(prefers-color-scheme: dark)");
-
-  /** @param {import("./store.js").Store} store */
-  constructor(store) {
-    this.#store = store;
-    this.#dark.addEventListener("change", () => this.#apply(store.facts.theme.choice));
-    const stored = localStorage.getItem(STORED);
-    this.#apply(stored === "dark" || stored === "light" ? stored : "system");
-  }
+/**
+ * @typedef {"system" | "dark" | "light"} ThemeChoice
+ * @param {import("./store.js").Store} store
+ */
+export function makeThemes(store) {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  dark.addEventListener("change", () => apply(store.facts.theme.choice));
+  const stored = localStorage.getItem(STORED);
+  apply(stored === "dark" || stored === "light" ? stored : "system");
 
   /** @param {ThemeChoice} choice */
-  choose(choice) {
+  function choose(choice) {
     localStorage.setItem(STORED, choice);
-    this.#apply(choice);
+    apply(choice);
   }
 
   /** @param {ThemeChoice} choice */
-  #apply(choice) {
-    const isDark = choice === "system" ? this.#dark.matches : choice === "dark";
+  function apply(choice) {
+    const isDark = choice === "system" ? dark.matches : choice === "dark";
     document.documentElement.dataset.theme = isDark ? "dark" : "light"; // tokens.css; before the views draw
-    this.#store.set({ theme: { choice, isDark } });
+    store.set({ theme: { choice, isDark } });
   }
+
+  return { choose };
 }

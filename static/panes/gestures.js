@@ -21,38 +21,31 @@ import { partAt } from "./part_hit.js";
  *   grabbed: {u: number, v: number}, at: {u: number, v: number}, offset: {u: number, v: number}, begun: boolean}} Drag
  */
 
-export class Gestures {
-  #store;
-  #send;
-  #latency;
+/** @typedef {ReturnType<typeof makeGestures>} Gestures */
+
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ * @param {import("../widgets/latency.js").Latency} latency
+ */
+export function makeGestures(store, send, latency) {
   /** @type {Drag | null} */
-  #drag = null;
+  let drag = null;
   /**
    * @type {{pane: import("./pane.js").Pane, pointer: number, x: number, y: number, start: {x: number, y: number},
    *   person: number | null} | null} person: the dimmed person to select if the gesture is a click
    */
-  #pan = null;
-  #hint = new DragHint();
-  #picking = new JointPicking();
+  let panning = null;
+  const hint = new DragHint();
+  const picking = new JointPicking();
   /** @type {{pane: import("./pane.js").Pane, camera: number, at: {x: number, y: number}} | null} the pointer over a pane */
-  #pointer = null;
-  #seq = 0;
-  #movesSent = -Infinity;
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   * @param {import("../widgets/latency.js").Latency} latency
-   */
-  constructor(store, send, latency) {
-    this.#store = store;
-    this.#send = send;
-    this.#latency = latency;
-    store.on(["connected"], () => {
-      this.#release();
-      this.#latency.forget();
-    });
-  }
+  let pointer = null;
+  let seq = 0;
+  let movesSent = -Infinity;
+  store.on(["connected"], () => {
+    release();
+    latency.forget();
+  });
 
   /**
    * Handle the pointer in a pane.
@@ -60,34 +53,34 @@ export class Gestures {
    * @param {import("./pane.js").Pane} pane
    * @param {number} camera
    */
-  watch(pane, camera) {
+  function watch(pane, camera) {
     const surface = pane.surface;
-    surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
-    surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
+    surface.addEventListener("pointerdown", (event) => down(event, pane, camera));
+    surface.addEventListener("pointermove", (event) => move(event, pane, camera));
     // Not all browsers have raw updates. The others merge the moves of an animation frame.
     surface.addEventListener("pointerrawupdate", (event) => {
-      if (this.#drag?.pointer === /** @type {PointerEvent} */ (event).pointerId && this.#drag.begun) {
-        this.#dragTo(this.#drag, /** @type {PointerEvent} */ (event), MIN_INTERVAL_MS);
+      if (drag?.pointer === /** @type {PointerEvent} */ (event).pointerId && drag.begun) {
+        dragTo(drag, /** @type {PointerEvent} */ (event), MIN_INTERVAL_MS);
       }
     });
     for (const kind of ["pointerenter", "pointerdown"]) {
-      surface.addEventListener(kind, () => this.#store.facts.active !== camera && this.#store.set({ active: camera }));
+      surface.addEventListener(kind, () => store.facts.active !== camera && store.set({ active: camera }));
     }
-    surface.addEventListener("pointerup", (event) => this.#up(event));
-    surface.addEventListener("pointercancel", () => this.cancel());
+    surface.addEventListener("pointerup", (event) => up(event));
+    surface.addEventListener("pointercancel", () => cancel());
     surface.addEventListener("pointerleave", () => {
-      this.#pointer = null;
-      if (!this.#drag && (this.#store.facts.hover || this.#store.facts.hoverPart)) this.#store.set({ hover: null, hoverPart: null });
+      pointer = null;
+      if (!drag && (store.facts.hover || store.facts.hoverPart)) store.set({ hover: null, hoverPart: null });
     });
     // Prevent scrolling, and pasting on some systems.
     surface.addEventListener("mousedown", (event) => event.button === 1 && event.preventDefault());
   }
 
   /** Cancel the current gesture and revert its drag. Returns whether there was one. */
-  cancel() {
-    const held = this.#drag !== null || this.#pan !== null;
-    if (this.#drag?.begun) this.#message("cancel", this.#drag.grabbed);
-    this.#release();
+  function cancel() {
+    const held = drag !== null || panning !== null;
+    if (drag?.begun) message("cancel", drag.grabbed);
+    release();
     return held;
   }
 
@@ -97,16 +90,16 @@ export class Gestures {
    * @param {import("./pane.js").Pane} pane
    * @param {{x: number, y: number}} at
    */
-  #hit(pane, at) {
-    const { layers, state } = this.#store.facts;
-    if (!this.#store.isSettled || !layers.shown.joints || state?.floor) return null;
-    return this.#picking.pick(pane.graspableHandles(), at, state?.person ?? 0);
+  function hitAt(pane, at) {
+    const { layers, state } = store.facts;
+    if (!store.isSettled || !layers.shown.joints || state?.floor) return null;
+    return picking.pick(pane.graspableHandles(), at, state?.person ?? 0);
   }
 
   /** Offer the next of the joints that overlap under the pointer. */
-  offerNext() {
-    if (!this.#pointer || this.#drag || !this.#picking.next()) return;
-    this.#hoverAt(this.#pointer.pane, this.#pointer.camera, this.#pointer.at);
+  function offerNext() {
+    if (!pointer || drag || !picking.next()) return;
+    hoverAt(pointer.pane, pointer.camera, pointer.at);
   }
 
   /**
@@ -116,14 +109,14 @@ export class Gestures {
    * @param {number} camera
    * @param {{x: number, y: number}} at
    */
-  #hitPart(pane, camera, at) {
-    const { layers, overlay, state, bare } = this.#store.facts;
-    if (!this.#store.isSettled || !overlay || !layers.shown.joints || state?.floor || bare) return null;
+  function hitPart(pane, camera, at) {
+    const { layers, overlay, state, bare } = store.facts;
+    if (!store.isSettled || !overlay || !layers.shown.joints || state?.floor || bare) return null;
     const place = pane.view.toImage(at.x, at.y);
     const found = partAt(overlay, camera, place, (person) => !isDimmed(state, person));
     if (!found) return null;
     // Joint i moves part i; touching the part selects the joint.
-    const point = this.#store.facts.session?.people[found.person]?.points[found.part] ?? "";
+    const point = store.facts.session?.people[found.person]?.points[found.part] ?? "";
     return { camera, person: found.person, part: found.part, point, ...place };
   }
 
@@ -135,8 +128,8 @@ export class Gestures {
    * @param {{x: number, y: number}} at
    * @param {number} mouseButton
    */
-  #dimmedAt(pane, camera, at, mouseButton) {
-    const { overlay, state } = this.#store.facts;
+  function dimmedAt(pane, camera, at, mouseButton) {
+    const { overlay, state } = store.facts;
     if (!overlay || !state?.solo || state.floor || mouseButton !== 0) return null;
     return partAt(overlay, camera, pane.view.toImage(at.x, at.y), (person) => isDimmed(state, person))?.person ?? null;
   }
@@ -146,22 +139,22 @@ export class Gestures {
    * @param {import("./pane.js").Pane} pane
    * @param {number} camera
    */
-  #down(event, pane, camera) {
-    if (this.#drag || this.#pan || event.button > 1) return;
+  function down(event, pane, camera) {
+    if (drag || panning || event.button > 1) return;
     const at = pane.locate(event);
-    const hit = event.button === 0 ? (this.#hit(pane, at)?.meant ?? this.#hitPart(pane, camera, at)) : null;
+    const hit = event.button === 0 ? (hitAt(pane, at)?.meant ?? hitPart(pane, camera, at)) : null;
     pane.surface.setPointerCapture(event.pointerId);
     if (!hit) {
       const start = { x: event.clientX, y: event.clientY };
-      this.#pan = { pane, pointer: event.pointerId, ...start, start, person: this.#dimmedAt(pane, camera, at, event.button) };
+      panning = { pane, pointer: event.pointerId, ...start, start, person: dimmedAt(pane, camera, at, event.button) };
       pane.surface.classList.add("is-panning");
       return;
     }
     const { person, point, u, v, part } = "handle" in hit ? { ...hit.handle, part: null } : hit;
     const pointer = pane.view.toImage(at.x, at.y);
-    this.#drag = {
+    drag = {
       pane,
-      frame: this.#store.facts.shown?.frame ?? 0,
+      frame: store.facts.shown?.frame ?? 0,
       camera,
       pointer: event.pointerId,
       person,
@@ -175,10 +168,10 @@ export class Gestures {
       begun: false,
     };
     pane.surface.classList.add("is-dragging");
-    const pressed = { person, point, state: this.#store.facts.state };
+    const pressed = { person, point, state: store.facts.state };
     const held = part === null ? { hover: { camera, person, point } } : { hoverPart: { camera, person, part } };
-    this.#store.set({ dragging: true, hover: null, hoverPart: null, pressed, ...held });
-    this.#send({ type: "select", person, point });
+    store.set({ dragging: true, hover: null, hoverPart: null, pressed, ...held });
+    send({ type: "select", person, point });
   }
 
   /**
@@ -186,16 +179,16 @@ export class Gestures {
    * @param {import("./pane.js").Pane} pane
    * @param {number} camera
    */
-  #move(event, pane, camera) {
-    if (this.#pan?.pointer === event.pointerId) {
-      this.#pan.pane.panBy(event.clientX - this.#pan.x, event.clientY - this.#pan.y);
-      [this.#pan.x, this.#pan.y] = [event.clientX, event.clientY];
-    } else if (this.#drag?.pointer === event.pointerId) {
-      this.#drag.mode = modeOf(event);
-      this.#dragTo(this.#drag, event);
-      if (this.#drag.begun) this.#hint.show(this.#drag.mode, pane.element);
-    } else if (!this.#drag && !this.#pan) {
-      this.#hoverAt(pane, camera, pane.locate(event));
+  function move(event, pane, camera) {
+    if (panning?.pointer === event.pointerId) {
+      panning.pane.panBy(event.clientX - panning.x, event.clientY - panning.y);
+      [panning.x, panning.y] = [event.clientX, event.clientY];
+    } else if (drag?.pointer === event.pointerId) {
+      drag.mode = modeOf(event);
+      dragTo(drag, event);
+      if (drag.begun) hint.show(drag.mode, pane.element);
+    } else if (!drag && !panning) {
+      hoverAt(pane, camera, pane.locate(event));
     }
   }
 
@@ -206,36 +199,36 @@ export class Gestures {
    * @param {PointerEvent} event
    * @param {number} intervalMs minimum time since the last message; an earlier move is skipped
    */
-  #dragTo(drag, event, intervalMs = 0) {
+  function dragTo(drag, event, intervalMs = 0) {
     const at = drag.pane.locate(event);
     if (!drag.begun) {
       if (Math.hypot(at.x - drag.start.x, at.y - drag.start.y) < DRAG_THRESHOLD) return;
       drag.begun = true;
-      this.#message("start", drag.grabbed);
+      message("start", drag.grabbed);
     }
     const pointer = drag.pane.view.toImage(at.x, at.y);
     const { u, v } = { u: pointer.u + drag.offset.u, v: pointer.v + drag.offset.v };
-    if ((u === drag.at.u && v === drag.at.v) || performance.now() < this.#movesSent + intervalMs) return;
+    if ((u === drag.at.u && v === drag.at.v) || performance.now() < movesSent + intervalMs) return;
     drag.at = { u, v };
-    this.#movesSent = performance.now();
-    this.#latency.sent(this.#message("move", drag.at), event.timeStamp);
+    movesSent = performance.now();
+    latency.sent(message("move", drag.at), event.timeStamp);
   }
 
   /** @param {PointerEvent} event */
-  #up(event) {
-    const pointer = this.#drag?.pointer ?? this.#pan?.pointer;
+  function up(event) {
+    const pointer = drag?.pointer ?? panning?.pointer;
     if (event.pointerId !== pointer) return;
-    if (this.#drag?.begun) this.#message("end", this.#drag.at);
+    if (drag?.begun) message("end", drag.at);
     // A click selects; the next press at the same place takes the other of an overlapping pair.
-    else if (this.#drag && this.#drag.part === null) {
-      if (event.shiftKey) this.#toggleHold(this.#drag);
-      else this.#picking.next();
+    else if (drag && drag.part === null) {
+      if (event.shiftKey) toggleHold(drag);
+      else picking.next();
     }
-    const pan = this.#pan;
+    const pan = panning;
     if (pan?.person != null && Math.hypot(event.clientX - pan.start.x, event.clientY - pan.start.y) < DRAG_THRESHOLD) {
-      this.#send({ type: "select", person: pan.person, point: null });
+      send({ type: "select", person: pan.person, point: null });
     }
-    this.#release();
+    release();
   }
 
   /**
@@ -243,25 +236,25 @@ export class Gestures {
    * @param {number} camera
    * @param {{x: number, y: number}} at
    */
-  #hoverAt(pane, camera, at) {
-    this.#pointer = { pane, camera, at };
-    const found = this.#hit(pane, at);
+  function hoverAt(pane, camera, at) {
+    pointer = { pane, camera, at };
+    const found = hitAt(pane, at);
     const hit = found?.meant ?? null;
-    const { hover, hoverPart } = this.#store.facts;
-    const part = hit ? null : this.#hitPart(pane, camera, at);
+    const { hover, hoverPart } = store.facts;
+    const part = hit ? null : hitPart(pane, camera, at);
     pane.surface.classList.toggle("is-over-joint", hit !== null);
     pane.surface.classList.toggle("is-over-part", part !== null);
     if (hoverPart?.camera !== part?.camera || hoverPart?.person !== part?.person || hoverPart?.part !== part?.part) {
-      this.#store.set({ hoverPart: part && { camera, person: part.person, part: part.part } });
+      store.set({ hoverPart: part && { camera, person: part.person, part: part.part } });
     }
     if (!hit) {
-      if (hover) this.#store.set({ hover: null });
+      if (hover) store.set({ hover: null });
     } else {
       const { person, point } = hit.handle;
       const overlapping = found?.overlapping.map(({ handle }) => ({ person: handle.person, point: handle.point })) ?? [];
       const isSame = hover?.camera === camera && hover.person === person && hover.point === point;
       if (!isSame || hover.overlapping?.length !== overlapping.length) {
-        this.#store.set({ hover: { camera, person, point, overlapping } });
+        store.set({ hover: { camera, person, point, overlapping } });
       }
     }
   }
@@ -271,27 +264,29 @@ export class Gestures {
    * @param {{u: number, v: number}} at
    * @returns  the number of the message
    */
-  #message(phase, { u, v }) {
-    const { frame, camera, person, point, part, mode } = /** @type {Drag} */ (this.#drag);
-    this.#seq += 1;
-    this.#send({ type: "drag", phase, frame, camera, person, point, part, mode, u, v, seq: this.#seq });
-    return this.#seq;
+  function message(phase, { u, v }) {
+    const { frame, camera, person, point, part, mode } = /** @type {Drag} */ (drag);
+    seq += 1;
+    send({ type: "drag", phase, frame, camera, person, point, part, mode, u, v, seq });
+    return seq;
   }
 
   /** @param {Drag} drag */
-  #toggleHold({ frame, camera, person, point }) {
-    const handle = this.#store.facts.overlay?.handles.find(
+  function toggleHold({ frame, camera, person, point }) {
+    const handle = store.facts.overlay?.handles.find(
       (one) => one.camera === camera && one.person === person && one.point === point,
     );
-    this.#send({ type: "pose", action: "hold", frame, person, point, held: !handle?.held });
+    send({ type: "pose", action: "hold", frame, person, point, held: !handle?.held });
   }
 
-  #release() {
-    const surface = (this.#drag ?? this.#pan)?.pane.surface;
+  function release() {
+    const surface = (drag ?? panning)?.pane.surface;
     surface?.classList.remove("is-dragging", "is-panning");
-    this.#hint.hide();
-    this.#drag = null;
-    this.#pan = null;
-    if (this.#store.facts.dragging) this.#store.set({ dragging: false });
+    hint.hide();
+    drag = null;
+    panning = null;
+    if (store.facts.dragging) store.set({ dragging: false });
   }
+
+  return { watch, cancel, offerNext };
 }

@@ -9,33 +9,26 @@ const signed = (/** @type {number} */ value) => (value > 0 ? `+${value}` : Strin
 const GAMMA_STEPS = 100;
 const MAX_GAMMA = 5;
 
-export class ImageToneMenu {
-  #store;
-  #imageTones;
-  #panel = byId("image-tone-menu", HTMLElement);
-  #title = make("h3");
-  #camera = 0;
-  #closedAt = -Infinity;
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../model/image_tone.js").ImageTones} imageTones
+ */
+export function mountImageToneMenu(store, imageTones) {
+  const panel = byId("image-tone-menu", HTMLElement);
+  const title = make("h3");
+  let shownCamera = 0;
+  let closedAt = -Infinity;
   /** @type {(() => void)[]} */
-  #show = [];
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("../model/image_tone.js").ImageTones} imageTones
-   */
-  constructor(store, imageTones) {
-    this.#store = store;
-    this.#imageTones = imageTones;
-    this.#panel.append(this.#title);
-    this.#row("Brightness", "Offset of all gray levels", "brightness");
-    this.#row("Contrast", "Spread of the gray levels around the middle", "contrast");
-    this.#row("Gamma", "Above 1 brightens shadows, below 1 darkens them", "gamma");
-    this.#buildFoot();
-    this.#panel.addEventListener("toggle", () => {
-      if (!this.#panel.matches(":popover-open")) this.#closedAt = performance.now();
-    });
-    store.on(["imageTones"], () => this.#show.forEach((one) => one()));
-  }
+  const show = [];
+  panel.append(title);
+  row("Brightness", "Offset of all gray levels", "brightness");
+  row("Contrast", "Spread of the gray levels around the middle", "contrast");
+  row("Gamma", "Above 1 brightens shadows, below 1 darkens them", "gamma");
+  buildFoot();
+  panel.addEventListener("toggle", () => {
+    if (!panel.matches(":popover-open")) closedAt = performance.now();
+  });
+  store.on(["imageTones"], () => show.forEach((one) => one()));
 
   /**
    * Open the popover for a camera at a button, or close it if it is open for that camera.
@@ -43,18 +36,18 @@ export class ImageToneMenu {
    * @param {number} camera
    * @param {HTMLElement} button
    */
-  toggle(camera, button) {
+  function toggle(camera, button) {
     // The press on the button has already closed the popover: this click must not open it again.
-    if (camera === this.#camera && performance.now() - this.#closedAt < 250) return;
-    if (this.#panel.matches(":popover-open") && camera !== this.#camera) this.#panel.hidePopover();
-    this.#camera = camera;
-    this.#title.textContent = this.#store.facts.session?.cameras[camera].name ?? "";
-    this.#show.forEach((one) => one());
-    togglePopover(this.#panel, button);
+    if (camera === shownCamera && performance.now() - closedAt < 250) return;
+    if (panel.matches(":popover-open") && camera !== shownCamera) panel.hidePopover();
+    shownCamera = camera;
+    title.textContent = store.facts.session?.cameras[camera].name ?? "";
+    show.forEach((one) => one());
+    togglePopover(panel, button);
   }
 
-  get #tone() {
-    return this.#store.facts.imageTones[this.#camera] ?? PLAIN;
+  function getTone() {
+    return store.facts.imageTones[shownCamera] ?? PLAIN;
   }
 
   /**
@@ -62,7 +55,7 @@ export class ImageToneMenu {
    * @param {string} title
    * @param {keyof import("../model/image_tone.js").ImageTone} field
    */
-  #row(label, title, field) {
+  function row(label, title, field) {
     const isGamma = field === "gamma";
     const caption = make("span", { title }, label);
     const control = slider({
@@ -73,22 +66,24 @@ export class ImageToneMenu {
       step: 2,
       format: (value) => (isGamma ? gammaOf(value).toFixed(2) : signed(value)),
       onInput: (value) =>
-        this.#imageTones.set(this.#camera, { ...this.#tone, [field]: isGamma ? gammaOf(value) : value }),
+        imageTones.set(shownCamera, { ...getTone(), [field]: isGamma ? gammaOf(value) : value }),
     });
     control.input.dataset.tone = field;
-    this.#show.push(() => {
-      const value = this.#tone[field];
+    show.push(() => {
+      const value = getTone()[field];
       control.show(isGamma ? Math.round((GAMMA_STEPS * Math.log(value)) / Math.log(MAX_GAMMA)) : value);
     });
-    this.#panel.append(caption, control.input, control.value);
+    panel.append(caption, control.input, control.value);
   }
 
-  #buildFoot() {
-    const all = make("button", { type: "button", title: "Apply these settings to all cameras", onclick: () => this.#imageTones.setAll(this.#tone) }, "All cameras");
-    const reset = make("button", { type: "button", title: "Show the original image", onclick: () => this.#imageTones.set(this.#camera, PLAIN) }, "Reset");
-    this.#show.push(() => (reset.disabled = isPlain(this.#tone)));
-    this.#panel.append(make("div", "popover-foot", all, reset));
+  function buildFoot() {
+    const all = make("button", { type: "button", title: "Apply these settings to all cameras", onclick: () => imageTones.setAll(getTone()) }, "All cameras");
+    const reset = make("button", { type: "button", title: "Show the original image", onclick: () => imageTones.set(shownCamera, PLAIN) }, "Reset");
+    show.push(() => (reset.disabled = isPlain(getTone())));
+    panel.append(make("div", "popover-foot", all, reset));
   }
+
+  return { toggle };
 }
 
 /** @param {number} step -100 to 100 */

@@ -6,9 +6,9 @@
 
 import { byId } from "../widgets/elements.js";
 import { requestViews } from "../model/view_request.js";
-import { Gestures } from "./gestures.js";
-import { ImageToneMenu } from "./image_tone_menu.js";
-import { LayersMenu } from "./layers_menu.js";
+import { makeGestures } from "./gestures.js";
+import { mountImageToneMenu } from "./image_tone_menu.js";
+import { mountLayersMenu } from "./layers_menu.js";
 import { paneBindings } from "./pane_keys.js";
 import { PaneGrid } from "./pane_grid.js";
 import { showPlaceholders } from "./placeholder_frames.js";
@@ -22,9 +22,9 @@ import { mountPoseLegend } from "./pose_legend.js";
  * @param {import("../model/index.js").Context} context
  */
 export function mount({ store, send, say, latency, layers, imageTones, recentImages }) {
-  const gestures = new Gestures(store, send, latency);
-  const layersMenu = new LayersMenu(store, layers);
-  const toneMenu = new ImageToneMenu(store, imageTones);
+  const gestures = makeGestures(store, send, latency);
+  const layersMenu = mountLayersMenu(store, layers);
+  const toneMenu = mountImageToneMenu(store, imageTones);
   const grid = new PaneGrid(byId("panes", HTMLElement), store, latency, toneMenu.toggle.bind(toneMenu));
   grid.addPointerTarget(gestures);
   showPlaceholders(store, recentImages);

@@ -15,41 +15,36 @@ const QUICK = [
 ];
 const GROUPS = ["Model", "Evidence", "Picture"];
 
-export class LayersMenu {
-  #store;
-  #layers;
-  #panel = byId("layers-menu", HTMLElement);
-  #button = byId("show-layers", HTMLButtonElement);
+/** @typedef {ReturnType<typeof mountLayersMenu>} LayersMenu */
+
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../model/layers.js").Layers} layers
+ */
+export function mountLayersMenu(store, layers) {
+  const panel = byId("layers-menu", HTMLElement);
+  const button = byId("show-layers", HTMLButtonElement);
   /** @type {(() => void)[]} */
-  #show = [];
+  const refreshers = [];
+  opensPopover(panel, button, () => toggle());
+  buildQuick();
+  for (const group of GROUPS) buildGroup(group);
+  buildFoot();
+  const show = () => refreshers.forEach((one) => one());
+  store.on(["layers"], () => show());
+  show();
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("../model/layers.js").Layers} layers
-   */
-  constructor(store, layers) {
-    this.#store = store;
-    this.#layers = layers;
-    opensPopover(this.#panel, this.#button, () => this.toggle());
-    this.#buildQuick();
-    for (const group of GROUPS) this.#buildGroup(group);
-    this.#buildFoot();
-    const show = () => this.#show.forEach((one) => one());
-    store.on(["layers"], () => show());
-    show();
+  function toggle() {
+    togglePopover(panel, button);
   }
 
-  toggle() {
-    togglePopover(this.#panel, this.#button);
-  }
-
-  #buildQuick() {
+  function buildQuick() {
     const bar = byId("quick-layers", HTMLElement);
     for (const { label, title, ids } of QUICK) {
       const { element, input } = checkbox(label, title);
-      onChange(input, () => this.#layers.toggle(ids, input.checked));
-      this.#show.push(() => {
-        const { shown } = this.#store.facts.layers;
+      onChange(input, () => layers.toggle(ids, input.checked));
+      refreshers.push(() => {
+        const { shown } = store.facts.layers;
         input.checked = ids.some((id) => shown[id]);
         input.indeterminate = input.checked && !ids.every((id) => shown[id]);
       });
@@ -58,21 +53,21 @@ export class LayersMenu {
   }
 
   /** @param {string} group */
-  #buildGroup(group) {
-    this.#panel.append(make("h3", {}, group));
+  function buildGroup(group) {
+    panel.append(make("h3", {}, group));
     // In painting order, topmost first.
     for (const info of LAYERS.filter((layer) => layer.group === group).reverse()) {
-      this.#panel.append(...this.#row(info));
-      if (info.id === "contours") this.#panel.append(this.#colors());
+      panel.append(...row(info));
+      if (info.id === "contours") panel.append(colors());
     }
   }
 
   /** @param {import("../model/layers.js").LayerInfo} info */
-  #row({ id, label, title }) {
+  function row({ id, label, title }) {
     const { element, input } = checkbox(label, title);
     element.className = "popover-check";
     input.dataset.layer = id;
-    input.addEventListener("change", () => this.#layers.toggle([id], input.checked));
+    input.addEventListener("change", () => layers.toggle([id], input.checked));
     const opacity = slider({
       label: `Opacity of ${label.toLowerCase()}`,
       title: `Opacity of ${label.toLowerCase()}`,
@@ -80,11 +75,11 @@ export class LayersMenu {
       max: 100,
       step: 5,
       format: (value) => `${value}%`,
-      onInput: (value) => this.#layers.setOpacity(id, value / 100),
+      onInput: (value) => layers.setOpacity(id, value / 100),
     });
     opacity.input.dataset.opacity = id;
-    this.#show.push(() => {
-      const { layers } = this.#store.facts;
+    refreshers.push(() => {
+      const { layers } = store.facts;
       input.checked = layers.shown[id];
       opacity.show(Math.round(100 * layers.opacity[id]));
       opacity.input.disabled = !layers.shown[id];
@@ -93,22 +88,24 @@ export class LayersMenu {
     return [element, opacity.input, opacity.value];
   }
 
-  #colors() {
+  function colors() {
     const choice = make("fieldset", { className: "segmented popover-choice", "aria-label": "Colours of the contours" });
     for (const [value, label, title] of /** @type {const} */ ([
       ["person", "by person", "Colour contours by person"],
       ["part", "by part", "Colour contours by body part"],
     ])) {
       const { element, input } = checkbox(label, title, { type: "radio", name: "contour-colors", value });
-      input.addEventListener("change", () => this.#layers.setColors(value));
-      this.#show.push(() => (input.checked = this.#store.facts.layers.colors === value));
+      input.addEventListener("change", () => layers.setColors(value));
+      refreshers.push(() => (input.checked = store.facts.layers.colors === value));
       choice.append(element);
     }
     return choice;
   }
 
-  #buildFoot() {
-    const reset = make("button", { type: "button", id: "reset-layers", title: "Restore the default layers and opacities", onclick: () => this.#layers.reset() }, "Reset layers");
-    this.#panel.append(make("div", "popover-foot", make("span", {}, "Saved in this browser for this session"), reset));
+  function buildFoot() {
+    const reset = make("button", { type: "button", id: "reset-layers", title: "Restore the default layers and opacities", onclick: () => layers.reset() }, "Reset layers");
+    panel.append(make("div", "popover-foot", make("span", {}, "Saved in this browser for this session"), reset));
   }
+
+  return { toggle };
 }

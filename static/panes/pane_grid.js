@@ -4,7 +4,7 @@ import { arrange, fit, layOut, movedShares } from "../layout/grid_layout.js";
 import { keep, kept, keptByName } from "../layout/kept_views.js";
 import { PeopleFollower, boxOf, followView, keepLink, keptLink, seen } from "./linked_views.js";
 import { Pane } from "./pane.js";
-import { PaneBorders } from "../layout/pane_borders.js";
+import { makePaneBorders } from "../layout/pane_borders.js";
 import { isInSight } from "../model/selectors.js";
 import { cornersOf } from "./part_hit.js";
 import { PaneShares } from "../layout/pane_shares.js";
@@ -60,7 +60,7 @@ export class PaneGrid {
     this.#element = element;
     this.#store = store;
     this.#latency = latency;
-    this.#borders = new PaneBorders(element, (border, size) => {
+    this.#borders = makePaneBorders(element, (border, size) => {
       this.#shares.choose(this.#arrangement, border.of, size === null ? null : movedShares(border, size));
       this.#layOut();
     });

@@ -9,63 +9,58 @@ const ROLES = { host: "host", annotate: "annotates", review: "reviews", look: "l
 /** Number of people whose initials are shown; the others are counted. */
 const SHOWN = 4;
 
-export class Here {
-  #context;
-  #form;
-  #button = byId("show-participants", HTMLButtonElement);
-  #panel = byId("participants-panel", HTMLElement);
-  #chips = byId("participant-chips", HTMLElement);
-  #list = byId("participants-list", HTMLElement);
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {ReturnType<typeof import("./join_form.js").joinForm>} join
+ */
+export function mountHere(context, join) {
+  const button = byId("show-participants", HTMLButtonElement);
+  const panel = byId("participants-panel", HTMLElement);
+  const chipRow = byId("participant-chips", HTMLElement);
+  const list = byId("participants-list", HTMLElement);
+  panel.append(join.form);
+  opensPopover(panel, button, () => toggle());
+  panel.addEventListener("toggle", () => showButton());
+  context.store.on(["presence"], () => show());
 
-  /**
-   * @param {import("../model/index.js").Context} context
-   * @param {ReturnType<typeof import("./join_form.js").joinForm>} join
-   */
-  constructor(context, join) {
-    this.#context = context;
-    this.#form = join;
-    this.#panel.append(join.form);
-    opensPopover(this.#panel, this.#button, () => this.toggle());
-    this.#panel.addEventListener("toggle", () => this.#showButton());
-    context.store.on(["presence"], () => this.#show());
+  function toggle() {
+    button.hidden = false; // the list opens below it
+    togglePopover(panel, button);
+    if (panel.matches(":popover-open")) join.input.focus();
   }
 
-  toggle() {
-    this.#button.hidden = false; // the list opens below it
-    togglePopover(this.#panel, this.#button);
-    if (this.#panel.matches(":popover-open")) this.#form.input.focus();
-  }
-
-  #show() {
-    const people = this.#context.store.facts.presence?.people ?? [];
+  function show() {
+    const people = context.store.facts.presence?.people ?? [];
     const others = people.filter(({ is_self }) => !is_self);
     const chips = others.slice(0, SHOWN).map((person) => chipOf(person, people.indexOf(person)));
     if (others.length > SHOWN) chips.push(make("span", {}, `+${others.length - SHOWN}`));
-    this.#chips.replaceChildren(...chips);
-    this.#showButton();
+    chipRow.replaceChildren(...chips);
+    showButton();
     const names = others.map((person) => `${nameOf(person)} on frame ${person.frame}`);
-    this.#button.title = names.length ? `Here: ${names.join(", ")}` : "Nobody else is here";
-    this.#button.setAttribute("aria-label", names.length ? `Who is here: ${names.length} others` : "Who is here: nobody else");
-    this.#list.replaceChildren(...people.map((person, index) => this.#row(person, index)));
+    button.title = names.length ? `Here: ${names.join(", ")}` : "Nobody else is here";
+    button.setAttribute("aria-label", names.length ? `Who is here: ${names.length} others` : "Who is here: nobody else");
+    list.replaceChildren(...people.map((person, index) => row(person, index)));
   }
 
   /** A host who is alone needs the button only while the list is open. */
-  #showButton() {
-    const { people, link } = this.#context.store.facts.presence ?? { people: [], link: "host" };
-    this.#button.hidden = people.length < 2 && link === "host" && !this.#panel.matches(":popover-open");
+  function showButton() {
+    const { people, link } = context.store.facts.presence ?? { people: [], link: "host" };
+    button.hidden = people.length < 2 && link === "host" && !panel.matches(":popover-open");
   }
 
   /**
    * @param {import("../model/protocol.js").PresentPerson} person
    * @param {number} index
    */
-  #row(person, index) {
+  function row(person, index) {
     const name = make("span", "participant-name is-clipped", nameOf(person) + (person.is_self ? " (you)" : ""));
     const role = make("span", "quiet", ROLES[person.role]);
     const at = make("button", { type: "button", title: `Go to frame ${person.frame}`, disabled: person.is_self }, `Frame ${person.frame}`); // prettier-ignore
-    at.addEventListener("click", () => this.#context.navigation.goTo(person.frame));
+    at.addEventListener("click", () => context.navigation.goTo(person.frame));
     return make("li", {}, chipOf(person, index), name, role, at, make("span", "participant-work", capital(person.doing)));
   }
+
+  return { toggle };
 }
 
 /**

@@ -6,7 +6,7 @@
 
 import { byId } from "../widgets/elements.js";
 import { inArea } from "../widgets/key_matching.js";
-import { Here } from "./here.js";
+import { mountHere } from "./here.js";
 import { joinForm } from "./join_form.js";
 import { mountPlaceMarks } from "./place_marks.js";
 import { showRole } from "./role_badge.js";
@@ -20,7 +20,7 @@ import { showRole } from "./role_badge.js";
  */
 export function mount(context) {
   showRole(context.store);
-  const here = new Here(context, joinForm(context, "panel"));
+  const here = mountHere(context, joinForm(context, "panel"));
   mountPlaceMarks(byId("timeline", HTMLElement), context.store);
   const bar = byId("join-bar", HTMLElement);
   bar.append(joinForm(context, "bar").form);

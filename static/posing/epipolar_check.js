@@ -9,35 +9,30 @@ import { px } from "../widgets/text.js";
 /** @typedef {import("../model/store.js").ViewPoint} ViewPoint */
 /** @typedef {import("../panes/pane.js").Pane} Pane */
 
-export class EpipolarCheck {
-  #store;
-  #send;
-  #hint = byId("epipolar-hint", HTMLElement);
-  #panes = byId("panes", HTMLElement);
-  #asked = "";
+/** @typedef {ReturnType<typeof makeEpipolarCheck>} EpipolarCheck */
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   */
-  constructor(store, send) {
-    this.#store = store;
-    this.#send = send;
-    store.on(["connected"], () => (this.#asked = ""));
-    store.on(["pinning"], () => store.facts.pinning && this.cancel());
-    store.on(["epipolar", "epipolarLines"], () => this.#show());
-    store.on(["epipolar", "connected"], () => this.#ask());
-  }
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ */
+export function makeEpipolarCheck(store, send) {
+  const hint = byId("epipolar-hint", HTMLElement);
+  const panes = byId("panes", HTMLElement);
+  let askedFor = "";
+  store.on(["connected"], () => (askedFor = ""));
+  store.on(["pinning"], () => store.facts.pinning && cancel());
+  store.on(["epipolar", "epipolarLines"], () => show());
+  store.on(["epipolar", "connected"], () => ask());
 
-  toggle() {
-    const isOn = this.#store.facts.epipolar !== null;
-    this.#store.set({ epipolar: isOn ? null : { kept: [], pointer: null }, pinning: false, hover: null, hoverPart: null });
+  function toggle() {
+    const isOn = store.facts.epipolar !== null;
+    store.set({ epipolar: isOn ? null : { kept: [], pointer: null }, pinning: false, hover: null, hoverPart: null });
   }
 
   /** End the check. Returns whether it was going on. */
-  cancel() {
-    const wasOn = this.#store.facts.epipolar !== null;
-    if (wasOn) this.#store.set({ epipolar: null });
+  function cancel() {
+    const wasOn = store.facts.epipolar !== null;
+    if (wasOn) store.set({ epipolar: null });
     return wasOn;
   }
 
@@ -47,12 +42,12 @@ export class EpipolarCheck {
    * @param {Pane} pane
    * @param {number} camera
    */
-  watch(pane, camera) {
+  function watch(pane, camera) {
     const { surface } = pane;
-    surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
-    surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
-    surface.addEventListener("pointerleave", () => this.#point(null));
-    surface.addEventListener("dblclick", (event) => this.#store.facts.epipolar && event.stopImmediatePropagation());
+    surface.addEventListener("pointerdown", (event) => down(event, pane, camera));
+    surface.addEventListener("pointermove", (event) => move(event, pane, camera));
+    surface.addEventListener("pointerleave", () => point(null));
+    surface.addEventListener("dblclick", (event) => store.facts.epipolar && event.stopImmediatePropagation());
   }
 
   /**
@@ -60,14 +55,14 @@ export class EpipolarCheck {
    * @param {Pane} pane
    * @param {number} camera
    */
-  #down(event, pane, camera) {
-    const { epipolar } = this.#store.facts;
+  function down(event, pane, camera) {
+    const { epipolar } = store.facts;
     if (!epipolar || event.button !== 0) return;
     event.stopImmediatePropagation();
     const point = place(event, pane, camera);
     const [first, second] = epipolar.kept;
     const kept = first && !second && first.camera !== camera ? [first, point] : [point];
-    this.#store.set({ epipolar: { kept, pointer: null } });
+    store.set({ epipolar: { kept, pointer: null } });
   }
 
   /**
@@ -75,39 +70,39 @@ export class EpipolarCheck {
    * @param {Pane} pane
    * @param {number} camera
    */
-  #move(event, pane, camera) {
-    if (!this.#store.facts.epipolar || event.buttons !== 0) return;
+  function move(event, pane, camera) {
+    if (!store.facts.epipolar || event.buttons !== 0) return;
     event.stopImmediatePropagation();
-    this.#point(place(event, pane, camera));
+    point(place(event, pane, camera));
   }
 
   /** @param {ViewPoint | null} pointer */
-  #point(pointer) {
-    const { epipolar } = this.#store.facts;
-    if (epipolar) this.#store.set({ epipolar: { ...epipolar, pointer } });
+  function point(pointer) {
+    const { epipolar } = store.facts;
+    if (epipolar) store.set({ epipolar: { ...epipolar, pointer } });
   }
 
   /** Ask the program for the lines of what is shown. */
-  #ask() {
-    if (!this.#store.facts.connected) return;
-    const points = shownPoints(this.#store.facts).map(({ camera, u, v }) => /** @type {[number, number, number]} */ ([camera, u, v]));
+  function ask() {
+    if (!store.facts.connected) return;
+    const points = shownPoints(store.facts).map(({ camera, u, v }) => /** @type {[number, number, number]} */ ([camera, u, v]));
     const asked = JSON.stringify(points);
-    if (asked === (this.#asked || "[]")) return;
-    this.#asked = asked;
-    this.#send({ type: "epipolar", points });
+    if (asked === (askedFor || "[]")) return;
+    askedFor = asked;
+    send({ type: "epipolar", points });
   }
 
-  #show() {
-    const { epipolar } = this.#store.facts;
-    this.#panes.classList.toggle("is-checking", epipolar !== null);
-    this.#hint.hidden = epipolar === null;
+  function show() {
+    const { epipolar } = store.facts;
+    panes.classList.toggle("is-checking", epipolar !== null);
+    hint.hidden = epipolar === null;
     if (!epipolar) return;
-    const text = this.#text();
-    if (this.#hint.textContent !== text) this.#hint.textContent = text;
+    const text = textOf();
+    if (hint.textContent !== text) hint.textContent = text;
   }
 
-  #text() {
-    const { session, epipolar, epipolarLines } = this.#store.facts;
+  function textOf() {
+    const { session, epipolar, epipolarLines } = store.facts;
     const [first] = epipolar?.kept ?? [];
     if (!first) return "Epipolar lines: point at a place in a view; a click keeps its lines. Esc to finish.";
     const name = (/** @type {number} */ camera) => session?.cameras[camera].name ?? "";
@@ -116,6 +111,8 @@ export class EpipolarCheck {
     const mm = found.mm === null ? "" : `, ${found.mm.toFixed(0)} mm at the body`;
     return `${name(found.camera)}: ${px(found.px)} from the line of ${name(first.camera)}${mm}. Esc to finish.`;
   }
+
+  return { toggle, cancel, watch };
 }
 
 /**

@@ -6,9 +6,9 @@
 
 import { byId } from "../widgets/elements.js";
 import { CurveEdits } from "./curve_edits.js";
-import { EpipolarCheck } from "./epipolar_check.js";
+import { makeEpipolarCheck } from "./epipolar_check.js";
 import { mountFrameCard } from "./frame_card.js";
-import { JointBar } from "./joint_bar.js";
+import { mountJointBar } from "./joint_bar.js";
 import { mountPinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
@@ -25,10 +25,10 @@ import { depthBindings, epipolarBindings, pinBindings, posingBindings } from "./
 export function mount({ store, send, say, reasons }, { grid }) {
   const pinning = new Pinning(store, send, say);
   grid.addPointerTarget(pinning);
-  const epipolar = new EpipolarCheck(store, send);
+  const epipolar = makeEpipolarCheck(store, send);
   grid.addPointerTarget(epipolar); // before pins and joints
   const posing = new Posing(store, send);
-  const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, say);
+  const jointBar = mountJointBar(byId("joint-bar", HTMLElement), store, posing, say);
   mountFrameCard(store, posing);
   mountPinBar(store, pinning);
   const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...epipolarBindings(epipolar, reasons.away), ...depthBindings(store, grid, reasons.away)];

@@ -14,57 +14,50 @@ const UNITS = { deg: "°", cm: "cm" };
 const PER_PIXEL = { deg: 0.5, cm: 0.2 };
 /** @typedef {{dof: number, row: HTMLElement, entry: import("../widgets/number_field.js").NumberField, lock: HTMLButtonElement}} Field */
 
-export class JointBar {
-  #store;
-  #posing;
-  #say;
-  #joint = byId("joint-name", HTMLSelectElement);
-  #list = byId("joint-dofs", HTMLElement);
-  #lock = byId("lock-joint", HTMLButtonElement);
-  #reset = byId("reset-limb", HTMLButtonElement);
-  /** @type {Field[]} */
-  #fields = [];
-  #built = "";
+/** @typedef {ReturnType<typeof mountJointBar>} JointBar */
 
-  /**
-   * @param {HTMLElement} element
-   * @param {import("../model/store.js").Store} store
-   * @param {import("./posing.js").Posing} posing
-   * @param {(text: string) => void} say
-   */
-  constructor(element, store, posing, say) {
-    this.#store = store;
-    this.#posing = posing;
-    this.#say = say;
-    button("previous-joint", () => posing.toJoint(-1));
-    button("next-joint", () => posing.toJoint(1));
-    button("lock-joint", () => posing.toggleLock(posing.dofs));
-    button("mirror-pose", () => posing.mirror());
-    button("reset-limb", () => posing.resetLimb());
-    onChange(this.#joint, () => posing.selectPoint(this.#joint.value));
-    mountCopyMenu(store, posing);
-    this.#addStep("step-cm", "cm", "Step of the arrow keys in centimetres (Shift: ×10, Ctrl: ×0.1)");
-    this.#addStep("step-deg", "deg", "Step of + and - in degrees");
-    // The wheel scrolls a long row of fields sideways.
-    this.#list.addEventListener("wheel", (event) => {
-      this.#list.scrollLeft += event.deltaY + event.deltaX;
-    });
-    store.on(["connected"], () => this.#enable(element));
-    store.on(["state", "session", "dof"], () => this.#show());
-    new ResizeObserver(() => this.#fitNames()).observe(this.#list);
-    this.#enable(element);
-  }
+/**
+ * @param {HTMLElement} element
+ * @param {import("../model/store.js").Store} store
+ * @param {import("./posing.js").Posing} posing
+ * @param {(text: string) => void} say
+ */
+export function mountJointBar(element, store, posing, say) {
+  const joint = byId("joint-name", HTMLSelectElement);
+  const list = byId("joint-dofs", HTMLElement);
+  const lock = byId("lock-joint", HTMLButtonElement);
+  const reset = byId("reset-limb", HTMLButtonElement);
+  /** @type {Field[]} */
+  let fields = [];
+  let builtFor = "";
+  button("previous-joint", () => posing.toJoint(-1));
+  button("next-joint", () => posing.toJoint(1));
+  button("lock-joint", () => posing.toggleLock(posing.dofs));
+  button("mirror-pose", () => posing.mirror());
+  button("reset-limb", () => posing.resetLimb());
+  onChange(joint, () => posing.selectPoint(joint.value));
+  mountCopyMenu(store, posing);
+  addStep("step-cm", "cm", "Step of the arrow keys in centimetres (Shift: ×10, Ctrl: ×0.1)");
+  addStep("step-deg", "deg", "Step of + and - in degrees");
+  // The wheel scrolls a long row of fields sideways.
+  list.addEventListener("wheel", (event) => {
+    list.scrollLeft += event.deltaY + event.deltaX;
+  });
+  store.on(["connected"], () => enable(element));
+  store.on(["state", "session", "dof"], () => show());
+  new ResizeObserver(() => fitNames()).observe(list);
+  enable(element);
 
   /** Focus the number field of the selected degree of freedom. */
-  type() {
-    const selected = this.#fields.find(({ dof }) => dof === this.#store.facts.dof);
+  function type() {
+    const selected = fields.find(({ dof }) => dof === store.facts.dof);
     selected?.row.scrollIntoView({ block: "nearest", inline: "nearest" });
     selected?.entry.element.focus();
   }
 
   /** @param {HTMLElement} element */
-  #enable(element) {
-    element.inert = !this.#store.facts.connected;
+  function enable(element) {
+    element.inert = !store.facts.connected;
   }
 
   /**
@@ -72,49 +65,49 @@ export class JointBar {
    * @param {"cm" | "deg"} unit
    * @param {string} name
    */
-  #addStep(id, unit, name) {
+  function addStep(id, unit, name) {
     const entry = numberField({
       name,
       take: (text) => {
         const step = Number(text);
         if (text === "" || !(step > 0 && step <= 100)) return `Step: expected a number above 0 and up to 100, found “${text}”.`;
-        this.#posing.setSteps({ [unit]: step });
+        posing.setSteps({ [unit]: step });
         return null;
       },
-      refuse: this.#say,
+      refuse: say,
       step: null,
     });
     entry.element.title = name;
-    entry.show(String(this.#posing.steps[unit]));
+    entry.show(String(posing.steps[unit]));
     byId(id, HTMLElement).replaceWith(entry.element);
     entry.element.id = id;
   }
 
-  #show() {
-    const { person, point, dofs, limb } = this.#posing;
-    const { state, dof: selected } = this.#store.facts;
+  function show() {
+    const { person, point, dofs, limb } = posing;
+    const { state, dof: selected } = store.facts;
     if (!person || !state || !point) return;
     const built = JSON.stringify([state.person, person.points, dofs]);
-    if (built !== this.#built) {
-      this.#built = built;
-      this.#joint.replaceChildren(...person.points.map((name) => new Option(displayName(name), name)));
-      this.#fields = dofs.map((dof) => this.#field(person.dofs[dof], dof, point));
-      this.#list.replaceChildren(...this.#fields.map(({ row }) => row));
-      this.#fitNames();
+    if (built !== builtFor) {
+      builtFor = built;
+      joint.replaceChildren(...person.points.map((name) => new Option(displayName(name), name)));
+      fields = dofs.map((dof) => field(person.dofs[dof], dof, point));
+      list.replaceChildren(...fields.map(({ row }) => row));
+      fitNames();
     }
-    this.#joint.value = point;
-    this.#joint.classList.toggle("is-nothing", state.point === null);
-    for (const field of this.#fields) this.#fill(field, person.dofs[field.dof], state, field.dof === selected);
-    showLock(this.#lock, this.#posing.isLocked(dofs), displayName(point), " (O)");
-    this.#lock.disabled = dofs.length === 0;
-    this.#reset.title = `Reset ${limb.name} to the neutral pose`;
-    this.#reset.setAttribute("aria-label", `Reset ${limb.name}`);
+    joint.value = point;
+    joint.classList.toggle("is-nothing", state.point === null);
+    for (const field of fields) fill(field, person.dofs[field.dof], state, field.dof === selected);
+    showLock(lock, posing.isLocked(dofs), displayName(point), " (O)");
+    lock.disabled = dofs.length === 0;
+    reset.title = `Reset ${limb.name} to the neutral pose`;
+    reset.setAttribute("aria-label", `Reset ${limb.name}`);
   }
 
   /** Use whole names where the row has room for them, else short ones. */
-  #fitNames() {
-    this.#list.classList.remove("is-short");
-    this.#list.classList.toggle("is-short", this.#list.scrollWidth > this.#list.clientWidth);
+  function fitNames() {
+    list.classList.remove("is-short");
+    list.classList.toggle("is-short", list.scrollWidth > list.clientWidth);
   }
 
   /**
@@ -123,28 +116,28 @@ export class JointBar {
    * @param {string} point
    * @returns {Field}
    */
-  #field(info, dof, point) {
+  function field(info, dof, point) {
     const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
     const hint = "Drag the name sideways to change it (Shift: fine steps).";
     const effect = meaning(info);
     const title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}, ${range(info)}. ${hint}`;
     const label = make("span", "dof-name is-clipped", make("span", "is-whole", name), make("span", "is-brief", shortName(info.name)));
     makeScrubber(label, {
-      begin: () => (this.#posing.isLocked([dof]) ? null : (this.#store.facts.state?.dofs[dof] ?? null)),
+      begin: () => (posing.isLocked([dof]) ? null : (store.facts.state?.dofs[dof] ?? null)),
       perPixel: PER_PIXEL[info.unit],
-      change: (value) => this.#posing.slide(dof, within(value, info)),
+      change: (value) => posing.slide(dof, within(value, info)),
     });
     const entry = numberField({
       name: `${displayName(info.joint)} ${info.name}, ${UNITS[info.unit]}`,
-      take: (text) => this.#take(info, dof, text),
-      refuse: this.#say,
-      step: (factor) => this.#posing.turn(factor),
+      take: (text) => take(info, dof, text),
+      refuse: say,
+      step: (factor) => posing.turn(factor),
     });
-    entry.element.addEventListener("focus", () => this.#posing.selectDof(dof));
+    entry.element.addEventListener("focus", () => posing.selectDof(dof));
     const unit = make("span", "dof-unit", UNITS[info.unit]);
-    const lock = textButton("", "", () => this.#posing.toggleLock([dof]), { className: "is-lock" });
+    const lock = textButton("", "", () => posing.toggleLock([dof]), { className: "is-lock" });
     const row = make("div", { className: "dof", title }, label, entry.element, unit, lock);
-    row.addEventListener("pointerdown", () => this.#posing.selectDof(dof));
+    row.addEventListener("pointerdown", () => posing.selectDof(dof));
     return { dof, row, entry, lock };
   }
 
@@ -153,13 +146,13 @@ export class JointBar {
    * @param {number} dof
    * @param {string} text
    */
-  #take(info, dof, text) {
+  function take(info, dof, text) {
     const value = Number(text);
     const isWithin = (info.low === null || value >= info.low - 0.05) && (info.high === null || value <= info.high + 0.05);
     if (text === "" || !Number.isFinite(value) || !isWithin || Math.abs(value) > 1e5) {
       return `${displayName(info.joint)} ${info.name}: expected a number ${range(info)}, found “${text}”.`;
     }
-    this.#posing.set(dof, value);
+    posing.set(dof, value);
     return null;
   }
 
@@ -169,7 +162,7 @@ export class JointBar {
    * @param {import("../model/protocol.js").StateMessage} state
    * @param {boolean} isSelected
    */
-  #fill({ dof, row, entry, lock }, info, state, isSelected) {
+  function fill({ dof, row, entry, lock }, info, state, isSelected) {
     const value = state.dofs[dof] ?? 0;
     const isLocked = state.locked.includes(dof);
     entry.show((Math.abs(value) < 0.05 ? 0 : value).toFixed(1));
@@ -182,6 +175,8 @@ export class JointBar {
     }
     showLock(lock, isLocked, `${displayName(info.joint)} ${info.name}`);
   }
+
+  return { type };
 }
 
 /**

@@ -10,48 +10,41 @@ const HEIGHT = 58;
 /** Margin as a fraction of the figures' size. */
 const MARGIN = 0.08;
 
-export class CandidateStrip {
-  #store;
-  #send;
-  #element = byId("candidates", HTMLElement);
-  #list = make("div", "strip-list");
-  #label = make("span", "strip-label");
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ */
+export function mountCandidateStrip(store, send) {
+  const element = byId("candidates", HTMLElement);
+  const list = make("div", "strip-list");
+  const label = make("span", "strip-label");
   /** @type {unknown[]} the arguments of the last drawing; candidates change less often than steps */
-  #drawn = [];
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   */
-  constructor(store, send) {
-    this.#store = store;
-    this.#send = send;
-    this.#element.append(this.#label, this.#list);
-  }
+  let drawnFrom = [];
+  element.append(label, list);
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  update(changed) {
+  function update(changed) {
     const facts = ["drawer", "searchCandidates", "searchRun", "filled", "shown"];
-    if (facts.some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) this.#show();
+    if (facts.some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) show();
   }
 
-  #show() {
-    const { searchCandidates, session, filled, shown } = this.#store.facts;
-    const run = selectedRun(this.#store.facts);
+  function show() {
+    const { searchCandidates, session, filled, shown } = store.facts;
+    const run = selectedRun(store.facts);
     const found = searchCandidates.get(run?.number ?? -1);
     const n = run ? (found?.costs.length ?? 0) : 0;
-    while (this.#list.children.length > n) this.#list.lastElementChild?.remove();
-    while (this.#list.children.length < n) this.#list.append(this.#make(this.#list.children.length));
+    while (list.children.length > n) list.lastElementChild?.remove();
+    while (list.children.length < n) list.append(build(list.children.length));
     const camera = filled ?? found?.clearest_view ?? 0;
     const drawn = [found, camera, session, devicePixelRatio, shown?.pictures.get(keyOf("image", camera))?.bitmap];
-    if (drawn.every((one, index) => one === this.#drawn[index])) return;
-    this.#drawn = drawn;
-    this.#label.textContent = n ? `Best, ${session?.cameras[camera]?.name ?? ""}` : "";
-    this.#label.title =
+    if (drawn.every((one, index) => one === drawnFrom[index])) return;
+    drawnFrom = drawn;
+    label.textContent = n ? `Best, ${session?.cameras[camera]?.name ?? ""}` : "";
+    label.title =
       "The best candidates that differ by 3 cm or more, in the view that fills the grid or else the view where they differ most";
     if (!found || n === 0 || !session) return;
     const box = frameOf(found, camera);
-    [...this.#list.children].forEach((element, index) => {
+    [...list.children].forEach((element, index) => {
       const cost = found.costs[index];
       const text = cost === null ? "–" : cost.toFixed(2);
       const output = element.querySelector("output");
@@ -60,16 +53,16 @@ export class CandidateStrip {
       /** @type {HTMLElement} */ (element).title = `Candidate ${index + 1}, ${text} px. ${hint}`;
       element.setAttribute("aria-label", `Use candidate ${index + 1}, ${text} px`);
       const canvas = element.querySelector("canvas");
-      if (canvas) this.#draw(canvas, found, index, camera, box);
+      if (canvas) draw(canvas, found, index, camera, box);
     });
   }
 
   /** @param {number} index */
-  #make(index) {
+  function build(index) {
     const element = make("button", { type: "button", className: "candidate" }, make("canvas"), make("output"));
     const preview = (/** @type {number | null} */ candidate) => {
-      const run = selectedRun(this.#store.facts);
-      if (run) this.#send({ type: "preview", run: run.number, candidate });
+      const run = selectedRun(store.facts);
+      if (run) send({ type: "preview", run: run.number, candidate });
     };
     element.addEventListener("pointerenter", () => preview(index));
     element.addEventListener("pointerleave", () => preview(null));
@@ -77,8 +70,8 @@ export class CandidateStrip {
     element.addEventListener("blur", () => preview(null));
     element.addEventListener("click", (event) => {
       if (event.detail > 0) element.blur();
-      const run = selectedRun(this.#store.facts);
-      if (run) this.#send({ type: "take", run: run.number, candidate: index });
+      const run = selectedRun(store.facts);
+      if (run) send({ type: "take", run: run.number, candidate: index });
     });
     return element;
   }
@@ -90,8 +83,8 @@ export class CandidateStrip {
    * @param {number} camera
    * @param {{u: number, v: number, width: number, height: number}} box
    */
-  #draw(canvas, found, index, camera, box) {
-    const { session, shown } = this.#store.facts;
+  function draw(canvas, found, index, camera, box) {
+    const { session, shown } = store.facts;
     canvas.style.width = `${WIDTH}px`;
     canvas.style.height = `${HEIGHT}px`;
     const context = prepare(canvas, WIDTH, HEIGHT, true);
@@ -123,6 +116,8 @@ export class CandidateStrip {
       first += 2 * found.people[p];
     });
   }
+
+  return { update };
 }
 
 /**

@@ -17,73 +17,66 @@ const SHOWN_SHARE = 0.95;
 const NAME_GAP = 70;
 const READOUT_HEIGHT = 18;
 
-export class CostCurve {
-  #store;
-  #send;
-  #element = byId("cost-curve", HTMLElement);
-  #lines = make("canvas", "is-layer");
-  #read = make("output", "curve-readout");
-  #hovered = /** @type {number | null} */ (null);
-  #plot = /** @type {Plot | null} */ (null);
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   */
-  constructor(store, send) {
-    this.#store = store;
-    this.#send = send;
-    this.#element.append(this.#lines, this.#read);
-    new ResizeObserver(() => this.#draw()).observe(this.#element);
-    store.on(["theme"], () => this.#draw());
-    this.#listen();
-  }
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ */
+export function mountCostCurve(store, send) {
+  const box = byId("cost-curve", HTMLElement);
+  const lines = make("canvas", "is-layer");
+  const read = make("output", "curve-readout");
+  let hovered = /** @type {number | null} */ (null);
+  let curvePlot = /** @type {Plot | null} */ (null);
+  box.append(lines, read);
+  new ResizeObserver(() => draw()).observe(box);
+  store.on(["theme"], () => draw());
+  listen();
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  update(changed) {
-    if (["drawer", "searchSteps", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"drawer"} */ (f)))) this.#draw();
+  function update(changed) {
+    if (["drawer", "searchSteps", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"drawer"} */ (f)))) draw();
   }
 
-  get #run() {
-    return selectedRun(this.#store.facts);
+  function getRun() {
+    return selectedRun(store.facts);
   }
 
-  get #steps() {
-    return this.#store.facts.searchSteps.get(this.#run?.number ?? -1) ?? null;
+  function getSteps() {
+    return store.facts.searchSteps.get(getRun()?.number ?? -1) ?? null;
   }
 
-  #listen() {
-    const element = this.#element;
+  function listen() {
+    const element = box;
     element.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       element.setPointerCapture(event.pointerId);
-      this.#goTo(event);
+      goTo(event);
     });
     element.addEventListener("pointermove", (event) => {
-      if (element.hasPointerCapture(event.pointerId)) this.#goTo(event);
-      this.#hovered = this.#stepUnder(event);
-      requestAnimationFrame(() => this.#draw());
+      if (element.hasPointerCapture(event.pointerId)) goTo(event);
+      hovered = stepUnder(event);
+      requestAnimationFrame(() => draw());
     });
     element.addEventListener("pointerleave", () => {
-      this.#hovered = null;
-      this.#draw();
+      hovered = null;
+      draw();
     });
   }
 
   /** @param {PointerEvent} event */
-  #goTo(event) {
-    const [run, step] = [this.#run, this.#stepUnder(event)];
-    if (run && step !== null && run.state !== "running") this.#send({ type: "replay", run: run.number, step });
+  function goTo(event) {
+    const [run, step] = [getRun(), stepUnder(event)];
+    if (run && step !== null && run.state !== "running") send({ type: "replay", run: run.number, step });
   }
 
   /**
    * @param {PointerEvent} event
    * @returns {number | null}
    */
-  #stepUnder(event) {
-    const steps = this.#steps;
-    if (!this.#plot || !steps || steps.count === 0) return null;
-    const value = this.#plot.valueAt(event.clientX - this.#element.getBoundingClientRect().left);
+  function stepUnder(event) {
+    const steps = getSteps();
+    if (!curvePlot || !steps || steps.count === 0) return null;
+    const value = curvePlot.valueAt(event.clientX - box.getBoundingClientRect().left);
     let [low, high] = [0, steps.count - 1];
     while (low < high) {
       const middle = (low + high) >> 1;
@@ -94,17 +87,17 @@ export class CostCurve {
     return isFormerNearer ? low - 1 : low;
   }
 
-  #draw() {
-    const { clientWidth, clientHeight } = this.#element;
-    if (clientWidth === 0 || this.#store.facts.drawer !== "search") return;
-    const context = prepare(this.#lines, clientWidth, clientHeight, true);
-    const { searchRuns, searchSteps } = this.#store.facts;
-    const style = getComputedStyle(this.#element);
+  function draw() {
+    const { clientWidth, clientHeight } = box;
+    if (clientWidth === 0 || store.facts.drawer !== "search") return;
+    const context = prepare(lines, clientWidth, clientHeight, true);
+    const { searchRuns, searchSteps } = store.facts;
+    const style = getComputedStyle(box);
     const runs = (searchRuns?.runs ?? []).filter(({ number }) => searchSteps.get(number)?.count);
-    const [run, steps] = [this.#run, this.#steps];
+    const [run, steps] = [getRun(), getSteps()];
     if (runs.length === 0) {
-      this.#plot = null;
-      this.#read.textContent = "";
+      curvePlot = null;
+      read.textContent = "";
       context.font = "12px system-ui, sans-serif";
       context.textAlign = "center";
       context.fillStyle = style.getPropertyValue("--muted");
@@ -114,7 +107,7 @@ export class CostCurve {
     const all = runs.map(({ number }) => /** @type {Steps} */ (searchSteps.get(number)));
     const evaluations = { min: 0, max: Math.max(...all.map((s) => s.evaluations[s.count - 1]), 1) };
     const plot = new Plot(clientWidth, clientHeight, evaluations, costs(all), READOUT_HEIGHT);
-    this.#plot = plot;
+    curvePlot = plot;
     plot.drawFrame(context, style, "");
     plot.within(context, () => {
       if (run && steps) drawStages(context, plot, run, steps, style);
@@ -131,7 +124,7 @@ export class CostCurve {
         context.globalAlpha = 1;
       });
     });
-    if (run && steps) this.#drawMarks(context, plot, run, steps, style);
+    if (run && steps) drawMarks(context, plot, run, steps, style);
   }
 
   /**
@@ -143,23 +136,25 @@ export class CostCurve {
    * @param {Steps} steps
    * @param {CSSStyleDeclaration} style
    */
-  #drawMarks(context, plot, run, steps, style) {
-    const replay = this.#store.facts.searchRuns?.replay ?? null;
+  function drawMarks(context, plot, run, steps, style) {
+    const replay = store.facts.searchRuns?.replay ?? null;
     const replayed = replay?.run === run.number ? Math.min(replay.step, steps.count - 1) : null;
-    for (const [step, alpha] of /** @type {[number | null, number][]} */ ([[replayed, 1], [this.#hovered, 0.5]])) {
+    for (const [step, alpha] of /** @type {[number | null, number][]} */ ([[replayed, 1], [hovered, 0.5]])) {
       if (step === null || step < 0 || step >= steps.count) continue;
       fillRect(context, style.getPropertyValue("--text"), plot.x(steps.evaluations[step]) - 0.5, plot.top, 1, plot.bottom - plot.top, alpha);
     }
-    const at = this.#hovered ?? replayed ?? steps.count - 1;
+    const at = hovered ?? replayed ?? steps.count - 1;
     if (at < 0 || at >= steps.count) {
-      this.#read.textContent = "";
+      read.textContent = "";
       return;
     }
     const stage = run.stages[steps.stages[at]];
     const where = stage ? `${stage.name} ×${stage.factor} · ` : "";
     const costs = `tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
-    this.#read.textContent = `${where}${count(steps.evaluations[at])} poses · ${costs}`;
+    read.textContent = `${where}${count(steps.evaluations[at])} poses · ${costs}`;
   }
+
+  return { update };
 }
 
 /**

@@ -5,68 +5,60 @@ import { byId, make, textButton } from "../widgets/elements.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count, px } from "../widgets/text.js";
 
-/** @typedef {{element: HTMLElement, figures: HTMLElement, differs: HTMLElement, compare: HTMLButtonElement, take: HTMLButtonElement}} Row */
-
-export class RunList {
-  #store;
-  #send;
-  #list = make("div", "run-rows");
+/**
+ * @typedef {{element: HTMLElement, figures: HTMLElement, differs: HTMLElement, compare: HTMLButtonElement, take: HTMLButtonElement}} Row
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ */
+export function mountRunList(store, send) {
+  const list = make("div", "run-rows");
   /** @type {Map<number, Row>} */
-  #rows = new Map();
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   */
-  constructor(store, send) {
-    this.#store = store;
-    this.#send = send;
-    const head = make("h3", { title: "Searches of this frame. Earlier runs are kept for comparison" }, "Runs");
-    byId("search-runs", HTMLElement).append(head, this.#list);
-  }
+  let rows = new Map();
+  const head = make("h3", { title: "Searches of this frame. Earlier runs are kept for comparison" }, "Runs");
+  byId("search-runs", HTMLElement).append(head, list);
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  update(changed) {
+  function update(changed) {
     if (!["drawer", "searchRuns", "searchRun"].some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) return;
-    const { searchRuns } = this.#store.facts;
+    const { searchRuns } = store.facts;
     const runs = [...(searchRuns?.runs ?? [])].reverse();
     const numbers = runs.map(({ number }) => number);
-    if (numbers.join() !== [...this.#rows.keys()].join()) {
-      const previous = this.#rows;
-      this.#rows = new Map(numbers.map((number) => [number, previous.get(number) ?? this.#makeRow(number)]));
-      this.#list.replaceChildren(...[...this.#rows.values()].map(({ element }) => element));
-      if (numbers.length === 0) this.#list.textContent = "No runs";
+    if (numbers.join() !== [...rows.keys()].join()) {
+      const previous = rows;
+      rows = new Map(numbers.map((number) => [number, previous.get(number) ?? makeRow(number)]));
+      list.replaceChildren(...[...rows.values()].map(({ element }) => element));
+      if (numbers.length === 0) list.textContent = "No runs";
     }
-    for (const run of runs) this.#show(run);
+    for (const run of runs) show(run);
   }
 
   /**
    * @param {number} number
    * @returns {Row}
    */
-  #makeRow(number) {
+  function makeRow(number) {
     const look = textButton(`Run ${number}`, `Show costs, stages and candidates of run ${number}`, () => {
-      this.#store.set({ searchRun: number });
+      store.set({ searchRun: number });
     }, { className: "run-name" }); // prettier-ignore
     look.prepend(lineSwatch(number - 1));
     const figures = make("div", "run-figures");
     const differs = make("div", "run-differs is-clipped");
     const compare = textButton("Compare", `Show the pose found by run ${number} in the views, dashed`, () => {
-      const isOn = this.#store.facts.searchRuns?.compared === number;
-      this.#send({ type: "compare", run: isOn ? null : number });
+      const isOn = store.facts.searchRuns?.compared === number;
+      send({ type: "compare", run: isOn ? null : number });
     });
     const take = textButton("Apply", `Use the pose found by run ${number}. Can be undone`, () =>
-      this.#send({ type: "take", run: number, candidate: null }),
+      send({ type: "take", run: number, candidate: null }),
     );
     return { element: make("div", "run-row", look, figures, compare, take, differs), figures, differs, compare, take };
   }
 
   /** @param {import("../model/protocol.js").SearchRun} run */
-  #show(run) {
-    const row = this.#rows.get(run.number);
+  function show(run) {
+    const row = rows.get(run.number);
     if (!row) return;
-    const { searchRuns } = this.#store.facts;
-    row.element.classList.toggle("is-selected", selectedRun(this.#store.facts)?.number === run.number);
+    const { searchRuns } = store.facts;
+    row.element.classList.toggle("is-selected", selectedRun(store.facts)?.number === run.number);
     const state = run.state === "over" ? "" : run.state === "running" ? "running · " : "paused · ";
     const thinned = run.thinned ? `. ${count(run.steps)} of its steps are kept` : "";
     set(row.figures, `${state}${px(run.best_px)} · ${count(run.evaluations)} · ${run.seconds.toFixed(2)} s`);
@@ -77,6 +69,8 @@ export class RunList {
     row.compare.setAttribute("aria-pressed", String(searchRuns?.compared === run.number));
     row.compare.disabled = row.take.disabled = run.steps === 0 || run.state === "running";
   }
+
+  return { update };
 }
 
 /**

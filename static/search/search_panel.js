@@ -1,12 +1,12 @@
 /** Search tab of the drawer: its controls, and the views below them. */
 
 import { hasSearch, hasTrack, stopTitle } from "../model/selectors.js";
-import { CandidateStrip } from "./candidate_strip.js";
-import { CostCurve } from "./cost_curve.js";
+import { mountCandidateStrip } from "./candidate_strip.js";
+import { mountCostCurve } from "./cost_curve.js";
 import { byId, make, onChange, textButton } from "../widgets/elements.js";
-import { ReplayBar } from "./replay_bar.js";
-import { RunList } from "./run_list.js";
-import { SearchTree } from "./search_tree.js";
+import { mountReplayBar } from "./replay_bar.js";
+import { mountRunList } from "./run_list.js";
+import { mountSearchTree } from "./search_tree.js";
 import { makeNumber } from "./search_widgets.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count, px } from "../widgets/text.js";
@@ -36,11 +36,11 @@ export function mountSearchPanel(store, actions, send) {
   });
   build();
   const views = [
-    new SearchTree(store, (changes) => set(changes)),
-    new CostCurve(store, send),
-    new RunList(store, send),
-    new ReplayBar(store, send),
-    new CandidateStrip(store, send),
+    mountSearchTree(store, (changes) => set(changes)),
+    mountCostCurve(store, send),
+    mountRunList(store, send),
+    mountReplayBar(store, send),
+    mountCandidateStrip(store, send),
   ];
   store.subscribe((changed) => {
     if (changed.has("drawer")) open();

@@ -23,63 +23,56 @@ const FIELDS = [
   { key: "step_m", has: "lengths", head: "step cm", unit: CENTIMETRES, title: "Step: spacing of the positions tried, cm" },
 ];
 
-export class SearchTree {
-  #store;
-  #change;
-  #element = byId("search-tree", HTMLElement);
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(changes: Record<string, unknown>) => void} change
+ */
+export function mountSearchTree(store, change) {
+  const element = byId("search-tree", HTMLElement);
   /** The shape that the tree was built for. */
-  #built = "";
+  let built = "";
   /** @type {Map<string, HTMLElement>} cells by person, stage and pass */
-  #cells = new Map();
+  const cells = new Map();
   /** @type {{field: ReturnType<typeof makeNumber>, read: (setup: Setup) => number | null}[]} */
-  #fields = [];
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(changes: Record<string, unknown>) => void} change
-   */
-  constructor(store, change) {
-    this.#store = store;
-    this.#change = change;
-  }
+  let rowFields = [];
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  update(changed) {
-    const { searchSetup, settings, session } = this.#store.facts;
+  function update(changed) {
+    const { searchSetup, settings, session } = store.facts;
     if (!searchSetup || !settings || !session) return;
     const isOther = ["searchSetup", "settings", "session", "drawer"].some((fact) => changed.has(/** @type {"session"} */ (fact)));
-    if (isOther) this.#build({ ...settings.search, ...searchSetup }, session);
-    this.#showRun();
+    if (isOther) build({ ...settings.search, ...searchSetup }, session);
+    showRun();
   }
 
   /**
    * @param {Setup} setup
    * @param {import("../model/protocol.js").SessionMessage} session
    */
-  #build(setup, session) {
+  function build(setup, session) {
     const shape = JSON.stringify([setup.leaves.map(({ person, name, dofs }) => [person, name, dofs]), setup.passes]);
-    if (shape !== this.#built) {
-      this.#built = shape;
-      this.#cells.clear();
-      this.#fields = [];
-      const table = make("div", { className: "tree-table", "--passes": String(setup.passes.length) }, ...this.#head(setup));
+    if (shape !== built) {
+      built = shape;
+      cells.clear();
+      rowFields = [];
+      const table = make("div", { className: "tree-table", "--passes": String(setup.passes.length) }, ...head(setup));
       session.people.forEach((person, index) => {
         const leaves = setup.leaves.filter((leaf) => leaf.person === index);
         const dofs = leaves.reduce((sum, leaf) => sum + leaf.dofs.length, 0);
-        table.append(...this.#root(setup, person.name, dofs, index));
-        leaves.forEach((leaf, i) => table.append(...this.#row(setup, leaf, i === leaves.length - 1)));
+        table.append(...root(setup, person.name, dofs, index));
+        leaves.forEach((leaf, i) => table.append(...row(setup, leaf, i === leaves.length - 1)));
       });
-      this.#element.replaceChildren(table, this.#rest(setup));
+      element.replaceChildren(table, rest(setup));
     }
-    for (const { field, read } of this.#fields) field.show(read(setup));
-    for (const mark of /** @type {NodeListOf<HTMLElement>} */ (this.#element.querySelectorAll("[data-leaf]"))) {
+    for (const { field, read } of rowFields) field.show(read(setup));
+    for (const mark of /** @type {NodeListOf<HTMLElement>} */ (element.querySelectorAll("[data-leaf]"))) {
       const leaf = setup.leaves.find(({ person, name }) => mark.dataset.leaf === `${person} ${name}`);
       mark.classList.toggle("is-own", !!leaf?.own);
     }
   }
 
   /** @param {Setup} setup */
-  #head(setup) {
+  function head(setup) {
     const passes = setup.passes.map((factor) => {
       const title = `Pass with steps ×${factor}: poses evaluated and reduction of the cost`;
       return cell("tree-head is-clipped", `steps ×${factor}`, title);
@@ -100,15 +93,15 @@ export class SearchTree {
    * @param {number} dofs
    * @param {number} person
    */
-  #root(setup, name, dofs, person) {
+  function root(setup, name, dofs, person) {
     const fields = FIELDS.map(({ key, unit, title }) => {
       if (person > 0) return cell("", "", "");
       const field = makeNumber({
         label: "",
         title: `${title}. Default for all stages`,
-        change: (value) => value !== null && this.#change({ [key]: value / unit }),
+        change: (value) => value !== null && change({ [key]: value / unit }),
       });
-      this.#fields.push({ field, read: (now) => now[key] * unit });
+      rowFields.push({ field, read: (now) => now[key] * unit });
       return field.element;
     });
     return [
@@ -124,7 +117,7 @@ export class SearchTree {
    * @param {SearchLeaf} leaf
    * @param {boolean} isLast
    */
-  #row(setup, leaf, isLast) {
+  function row(setup, leaf, isLast) {
     const { person, name, dofs } = leaf;
     const list = dofs.map((dof) => displayName(dof).replace(".", " ")).join(", ");
     const label = cell(`tree-name is-clipped is-leaf${isLast ? " is-last" : ""}`, name, `${name}: ${list}`);
@@ -135,14 +128,14 @@ export class SearchTree {
         label: "",
         title: `${title}, for ${name}. Empty: default`,
         placeholder: "mixed",
-        change: (value) => this.#change({ leaf: { person, name, [key]: value === null ? null : value / unit } }),
+        change: (value) => change({ leaf: { person, name, [key]: value === null ? null : value / unit } }),
       });
-      this.#fields.push({ field, read: (now) => valueOf(now, person, name, key, unit) });
+      rowFields.push({ field, read: (now) => valueOf(now, person, name, key, unit) });
       return field.element;
     });
     const passes = setup.passes.map((factor) => {
       const one = cell("tree-pass", "", "");
-      this.#cells.set(`${person} ${name} ${factor}`, one);
+      cells.set(`${person} ${name} ${factor}`, one);
       return one;
     });
     return [label, cell("tree-count", String(dofs.length), list), ...fields, ...passes];
@@ -153,40 +146,40 @@ export class SearchTree {
    *
    * @param {Setup} setup
    */
-  #rest(setup) {
+  function rest(setup) {
     const line = make("div", "tree-rest");
     const patience = makeNumber({
       label: "Patience",
       title: "A stage ends after this many expansions without improvement",
-      change: (value) => value !== null && this.#change({ patience: Math.round(value) }),
+      change: (value) => value !== null && change({ patience: Math.round(value) }),
     });
     const max = makeNumber({
       label: "Max.",
       title: "Maximum number of expansions per stage",
-      change: (value) => value !== null && this.#change({ max_expansions: Math.round(value) }),
+      change: (value) => value !== null && change({ max_expansions: Math.round(value) }),
     });
-    this.#fields.push({ field: patience, read: (now) => now.patience }, { field: max, read: (now) => now.max_expansions });
+    rowFields.push({ field: patience, read: (now) => now.patience }, { field: max, read: (now) => now.max_expansions });
     const passes = make("label", { className: "search-field", title: "Step factors: all stages are searched once per factor. The paper uses 1" });
     const text = make("input", { type: "text", value: setup.passes.join(" "), "aria-label": passes.title });
     text.addEventListener("change", () => {
       const factors = text.value.split(/[\s,;]+/).filter(Boolean).map(Number);
-      this.#change({ passes: factors.map((factor) => (Number.isFinite(factor) ? factor : 0)) });
-      text.value = this.#store.facts.settings?.search.passes.join(" ") ?? "";
+      change({ passes: factors.map((factor) => (Number.isFinite(factor) ? factor : 0)) });
+      text.value = store.facts.settings?.search.passes.join(" ") ?? "";
     });
     text.addEventListener("keydown", (event) => event.stopPropagation());
     passes.append("Passes", text);
     const apart = make("label", { className: "search-field", title: "Search the limbs of a group separately, not together as in the paper" });
     const box = make("input", { type: "checkbox", checked: setup.limbs_apart });
-    onChange(box, () => this.#change({ limbs_apart: box.checked }));
+    onChange(box, () => change({ limbs_apart: box.checked }));
     apart.append(box, "separate limbs");
     line.append(passes, patience.element, max.element, apart);
     return line;
   }
 
-  #showRun() {
-    const run = selectedRun(this.#store.facts);
+  function showRun() {
+    const run = selectedRun(store.facts);
     const stages = new Map(run?.stages.map((stage) => [`${stage.person} ${stage.name} ${stage.factor}`, stage]));
-    for (const [key, element] of this.#cells) {
+    for (const [key, element] of cells) {
       const stage = stages.get(key);
       const isBegun = !!stage && stage.evaluations > 0;
       const text = stage?.done || isBegun ? `${count(stage.evaluations)} · −${stage.gain_px.toFixed(2)}` : "";
@@ -196,6 +189,8 @@ export class SearchTree {
       element.title = stage && text ? describe(stage) : "Not searched";
     }
   }
+
+  return { update };
 }
 
 /** @param {import("../model/protocol.js").SearchStage} stage */

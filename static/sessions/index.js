@@ -5,7 +5,7 @@
  */
 
 import { inArea } from "../widgets/key_matching.js";
-import { Sessions } from "./sessions.js";
+import { mountSessions } from "./sessions.js";
 
 /** @typedef {ReturnType<typeof mount>} SessionsRoom */
 
@@ -15,7 +15,7 @@ import { Sessions } from "./sessions.js";
  * @param {import("../model/index.js").Context} context
  */
 export function mount({ store, notify }) {
-  const sessions = new Sessions(store, notify);
+  const sessions = mountSessions(store, notify);
   const showNew = () => void sessions.showNew();
   const bindings = inArea("History and help", [
     { label: "Open another session", words: "recent sessions folder recording file load switch", anywhere: true, run: () => sessions.toggle() },

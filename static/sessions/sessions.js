@@ -14,125 +14,112 @@ const POLL_MS = 300;
 /** A slow disk and an old processor need half of it. */
 const PATIENCE_MS = 60_000;
 
+/** @typedef {ReturnType<typeof mountSessions>} Sessions */
+
 /**
  * @typedef {{folder: string, name: string, opened: string}} Recent
  * @typedef {import("./batch_table.js").Batch} Batch
  * @typedef {{refusal: string | null, folder: string, recent: Recent[], batches: Batch[]}} Listed
+ * @param {import("../model/store.js").Store} store
+ * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
  */
-
-export class Sessions {
-  #panel = byId("sessions-panel", HTMLElement);
-  #open = byId("session-name", HTMLButtonElement);
-  #folder = byId("session-folder", HTMLInputElement);
-  #list = byId("recent-sessions", HTMLElement);
-  #note = byId("sessions-note", HTMLOutputElement);
-  #form = byId("open-session", HTMLFormElement);
-
-  #store;
-  #picker = new PathPicker();
-  #create;
-  #board;
+export function mountSessions(store, notify) {
+  const panel = byId("sessions-panel", HTMLElement);
+  const open = byId("session-name", HTMLButtonElement);
+  const folder = byId("session-folder", HTMLInputElement);
+  const list = byId("recent-sessions", HTMLElement);
+  const note = byId("sessions-note", HTMLOutputElement);
+  const form = byId("open-session", HTMLFormElement);
+  const picker = new PathPicker();
   /** Folder of the open session. */
-  #present = "";
-
-  #notify;
-
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
-   */
-  constructor(store, notify) {
-    this.#store = store;
-    this.#notify = notify;
-    opensPopover(this.#panel, this.#open, () => this.toggle());
-    this.#form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      void this.#choose(this.#folder.value);
-    });
-    this.#create = new NewSession(this.#picker, (folder) => {
-      this.toggle();
-      void this.#choose(folder);
-    });
-    this.#board = new BoardCalibration(this.#picker, (out, up) => this.#create.showWith(out, up));
-    byId("show-new-session", HTMLButtonElement).addEventListener("click", () => void this.showNew());
-    byId("show-board-calibration", HTMLButtonElement).addEventListener("click", () => void this.showBoard());
-    completePaths(this.#folder, byId("session-folders", HTMLDataListElement));
-    /** @type {string | undefined} */
-    let first;
-    store.on(["session"], () => {
-      first ??= store.facts.session?.name;
-      // Another page has opened another session: everything here belongs to the former one.
-      if (first !== store.facts.session?.name) location.reload();
-    });
-  }
-
+  let present = "";
   /**
    * Complete a field of another form that takes files or folders, and give it the path picker.
    *
    * @param {HTMLInputElement} input
    */
-  completes = (input) => makePathField(input, this.#picker);
+  const completes = (input) => makePathField(input, picker);
+  opensPopover(panel, open, () => toggle());
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    void choose(folder.value);
+  });
+  const create = new NewSession(picker, (folder) => {
+    toggle();
+    void choose(folder);
+  });
+  const board = new BoardCalibration(picker, (out, up) => create.showWith(out, up));
+  byId("show-new-session", HTMLButtonElement).addEventListener("click", () => void showNew());
+  byId("show-board-calibration", HTMLButtonElement).addEventListener("click", () => void showBoard());
+  completePaths(folder, byId("session-folders", HTMLDataListElement));
+  /** @type {string | undefined} */
+  let first;
+  store.on(["session"], () => {
+    first ??= store.facts.session?.name;
+    // Another page has opened another session: everything here belongs to the former one.
+    if (first !== store.facts.session?.name) location.reload();
+  });
 
-  toggle() {
-    togglePopover(this.#panel, this.#open);
-    if (!this.#panel.matches(":popover-open")) return;
-    this.#say("");
-    this.#folder.focus();
-    void this.#fill();
+  function toggle() {
+    togglePopover(panel, open);
+    if (!panel.matches(":popover-open")) return;
+    say("");
+    folder.focus();
+    void fill();
   }
 
   /** Show the form of a new session, or why there is none. */
-  showNew() {
-    return this.#showForm(this.#create, "session");
+  function showNew() {
+    return showForm(create, "session");
   }
 
   /** Show the form of a calibration by a board, or why there is none. */
-  showBoard() {
-    return this.#showForm(this.#board, "calibration");
+  function showBoard() {
+    return showForm(board, "calibration");
   }
 
   /**
    * @param {{show: () => void}} form
    * @param {string} result
    */
-  async #showForm(form, result) {
+  async function showForm(form, result) {
     const { refusal, folder } = await listed();
     if (refusal) {
-      this.#notify({ type: "notice", level: "error", text: `No ${result} can be made here: ${refusal}` });
+      notify({ type: "notice", level: "error", text: `No ${result} can be made here: ${refusal}` });
       return;
     }
-    this.#present = folder;
-    if (this.#panel.matches(":popover-open")) this.#panel.hidePopover();
+    present = folder;
+    if (panel.matches(":popover-open")) panel.hidePopover();
     form.show();
   }
 
-  async #fill() {
+  async function fill() {
     const found = await listed();
-    this.#present = found.folder;
-    for (const control of [...this.#form.elements, byId("show-new-session", HTMLButtonElement)]) {
+    present = found.folder;
+    for (const control of [...form.elements, byId("show-new-session", HTMLButtonElement)]) {
       /** @type {HTMLInputElement} */ (control).disabled = found.refusal !== null;
     }
-    if (found.refusal) this.#say(found.refusal, true);
-    this.#list.replaceChildren(...found.recent.map((one) => this.#row(one)));
+    if (found.refusal) say(found.refusal, true);
+    list.replaceChildren(...found.recent.map((one) => row(one)));
     byId("batches", HTMLElement).replaceChildren(
-      ...found.batches.map((batch) => batchTable(batch, (folder, at) => void this.#choose(folder, at))),
+      ...found.batches.map((batch) => batchTable(batch, (folder, at) => void choose(folder, at))),
     );
-    if (!found.recent.length && !found.refusal) this.#list.append(this.#firstRow());
-    if (document.activeElement === document.body) this.#folder.focus();
+    if (!found.recent.length && !found.refusal) list.append(firstRow());
+    if (document.activeElement === document.body) folder.focus();
   }
 
   /** Say what to do where no other session was opened before. */
-  #firstRow() {
+  function firstRow() {
     const text = "No other session was opened before. Make one of your own videos and their calibration:";
     const title = "Make a session of videos and a calibration";
-    const create = make("button", { type: "button", className: "is-primary", title, onclick: () => void this.showNew() }, "New session…");
+    const create = make("button", { type: "button", className: "is-primary", title, onclick: () => void showNew() }, "New session…");
     return make("li", "is-empty", text, create);
   }
 
   /** @param {Recent} session */
-  #row({ folder, name, opened }) {
+  function row({ folder, name, opened }) {
     const title = `Close this session and open ${folder}`;
-    const open = make("button", { type: "button", title, onclick: () => void this.#choose(folder) });
+    const open = make("button", { type: "button", title, onclick: () => void choose(folder) });
     const when = make("time", { dateTime: opened }, new Date(opened).toLocaleDateString([], { day: "numeric", month: "short" }));
     open.append(make("b", {}, name), when, make("small", "is-clipped", make("bdi", {}, folder)));
     return make("li", {}, open);
@@ -142,33 +129,35 @@ export class Sessions {
    * @param {string} folder
    * @param {{frame?: number, person?: string}} at what it shows first
    */
-  async #choose(folder, at = {}) {
-    this.#say("Checking…");
+  async function choose(folder, at = {}) {
+    say("Checking…");
     try {
-      await postJson("sessions/open", { folder, ...at }, (answer) => this.#store.set({ opening: JSON.parse(answer).name }));
-      this.#panel.hidePopover();
+      await postJson("sessions/open", { folder, ...at }, (answer) => store.set({ opening: JSON.parse(answer).name }));
+      panel.hidePopover();
     } catch (error) {
-      this.#say(error instanceof Error ? error.message : String(error), true);
+      say(error instanceof Error ? error.message : String(error), true);
       return;
     }
-    const showStep = (/** @type {string} */ step) => this.#store.set({ openingStep: step });
-    if (await untilAnotherIsOpen(this.#present, showStep)) {
+    const showStep = (/** @type {string} */ step) => store.set({ openingStep: step });
+    if (await untilAnotherIsOpen(present, showStep)) {
       location.reload();
       return;
     }
-    const text = `Expected ${this.#store.facts.opening} to be open by now. The terminal of the program says what is wrong.`;
-    this.#store.set({ opening: null, openingStep: "" });
-    this.#notify({ type: "notice", level: "error", text });
+    const text = `Expected ${store.facts.opening} to be open by now. The terminal of the program says what is wrong.`;
+    store.set({ opening: null, openingStep: "" });
+    notify({ type: "notice", level: "error", text });
   }
 
   /**
    * @param {string} text
    * @param {boolean} isFailure
    */
-  #say(text, isFailure = false) {
-    this.#note.textContent = text;
-    this.#note.classList.toggle("is-failed", isFailure);
+  function say(text, isFailure = false) {
+    note.textContent = text;
+    note.classList.toggle("is-failed", isFailure);
   }
+
+  return { completes, toggle, showNew, showBoard };
 }
 
 /**

@@ -11,161 +11,154 @@ const PROGRESS_MS = 400;
  *   `numbering` is a sentence of a `{frame}` and its `{number}` in the file, or empty where they are the same
  */
 
-export class ExportPanel {
-  #store;
-  #notify;
-  #panel = byId("export-panel", HTMLElement);
-  #open = byId("show-export", HTMLButtonElement);
-  #format = byId("export-format", HTMLSelectElement);
-  #person = byId("export-person", HTMLSelectElement);
-  #view = byId("export-view", HTMLSelectElement);
-  #frames = byId("export-frames", HTMLInputElement);
-  #progress = byId("export-progress", HTMLOutputElement);
-  #start;
-  #cancel;
-  /** @type {Format[]} */
-  #formats = [];
-  /** @type {AbortController | null} the export in progress */
-  #running = null;
+/** @typedef {ReturnType<typeof mountExportPanel>} ExportPanel */
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
-   */
-  constructor(store, notify) {
-    this.#store = store;
-    this.#notify = notify;
-    opensPopover(this.#panel, this.#open, () => void this.toggle());
-    this.#start = button("export-start", () => void this.#run());
-    this.#cancel = button("export-cancel", () => this.cancel());
-    this.#format.addEventListener("change", () => this.#show());
-    this.#frames.addEventListener("keydown", (event) => event.key === "Enter" && void this.#run());
-    this.#frames.addEventListener("input", () => this.#showNumbering());
-    for (const select of this.#panel.querySelectorAll("select")) { // whose keys must not reach the page
-      select.addEventListener("keydown", (event) => event.key !== "Escape" && event.stopPropagation());
-    }
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+ */
+export function mountExportPanel(store, notify) {
+  const panel = byId("export-panel", HTMLElement);
+  const open = byId("show-export", HTMLButtonElement);
+  const format = byId("export-format", HTMLSelectElement);
+  const person = byId("export-person", HTMLSelectElement);
+  const view = byId("export-view", HTMLSelectElement);
+  const frames = byId("export-frames", HTMLInputElement);
+  const progress = byId("export-progress", HTMLOutputElement);
+  /** @type {Format[]} */
+  let known = [];
+  /** @type {AbortController | null} the export in progress */
+  let isRunning = null;
+  opensPopover(panel, open, () => void toggle());
+  const start = button("export-start", () => void run());
+  const cancelButton = button("export-cancel", () => cancel());
+  format.addEventListener("change", () => show());
+  frames.addEventListener("keydown", (event) => event.key === "Enter" && void run());
+  frames.addEventListener("input", () => showNumbering());
+  for (const select of panel.querySelectorAll("select")) { // whose keys must not reach the page
+    select.addEventListener("keydown", (event) => event.key !== "Escape" && event.stopPropagation());
   }
 
   /** Cancel the export in progress. */
-  cancel() {
-    this.#running?.abort();
+  function cancel() {
+    isRunning?.abort();
   }
 
-  async toggle() {
-    if (!this.#panel.matches(":popover-open")) {
+  async function toggle() {
+    if (!panel.matches(":popover-open")) {
       try {
-        await this.#fill();
+        await fill();
       } catch {
-        this.#say("error", "The list of formats could not be loaded. Try again when the page is connected.");
+        say("error", "The list of formats could not be loaded. Try again when the page is connected.");
         return;
       }
     }
-    togglePopover(this.#panel, this.#open);
+    togglePopover(panel, open);
   }
 
   /** Fill the choices of the session, and the marked range. */
-  async #fill() {
+  async function fill() {
     const answer = await fetch("export");
     if (!answer.ok) throw new Error(`status ${answer.status}`);
-    this.#formats = await answer.json();
+    known = await answer.json();
     const isSent = (/** @type {Format} */ { name }) => name.startsWith("like/");
-    const sent = make("optgroup", { label: "Imported observations" }, ...this.#formats.filter(isSent).map(({ name, title }) => new Option(title, name)));
-    const formats = this.#formats.filter((one) => !isSent(one)).map(({ name, title }) => new Option(capital(title), name));
-    choices(this.#format, sent.children.length ? [...formats, sent] : formats);
-    const { session, range } = this.#store.facts;
+    const sent = make("optgroup", { label: "Imported observations" }, ...known.filter(isSent).map(({ name, title }) => new Option(title, name)));
+    const formats = known.filter((one) => !isSent(one)).map(({ name, title }) => new Option(capital(title), name));
+    choices(format, sent.children.length ? [...formats, sent] : formats);
+    const { session, range } = store.facts;
     const people = session?.people.map(({ name }) => new Option(name, name)) ?? [];
     const cameras = session?.cameras.map(({ name }) => new Option(name, name)) ?? [];
-    choices(this.#person, [new Option("Everyone", ""), ...people]);
-    choices(this.#view, [new Option("Grid of all", ""), ...cameras]);
-    if (range) this.#frames.value = `${range.first}-${range.last}`;
-    this.#show();
+    choices(person, [new Option("Everyone", ""), ...people]);
+    choices(view, [new Option("Grid of all", ""), ...cameras]);
+    if (range) frames.value = `${range.first}-${range.last}`;
+    show();
   }
 
   /** Show the options that the chosen format has. */
-  #show() {
-    const format = this.#chosen;
+  function show() {
+    const format = getChosen();
     const has = new Set(format?.options);
-    if (has.has("only") && (this.#store.facts.session?.people.length ?? 0) > 1) has.add("person");
+    if (has.has("only") && (store.facts.session?.people.length ?? 0) > 1) has.add("person");
     if (format && !format.holds_provenance) has.add("provenance");
-    for (const part of this.#panel.querySelectorAll("[data-option]")) {
+    for (const part of panel.querySelectorAll("[data-option]")) {
       if (part instanceof HTMLElement) part.hidden = !has.has(part.dataset.option ?? "");
     }
     byId("export-axes", HTMLSelectElement).value = format?.axes || "calibration";
     byId("export-units", HTMLSelectElement).value = format?.units || "m";
-    this.#showNumbering();
+    showNumbering();
   }
 
   /** Say how the file counts frames, of the first frame that is entered, else of frame 0. */
-  #showNumbering() {
-    const first = Number(/^\s*(\d{1,8})/.exec(this.#frames.value)?.[1] ?? 0);
-    const sentence = this.#chosen?.numbering ?? "";
+  function showNumbering() {
+    const first = Number(/^\s*(\d{1,8})/.exec(frames.value)?.[1] ?? 0);
+    const sentence = getChosen()?.numbering ?? "";
     byId("export-numbering", HTMLElement).textContent = sentence.replace("{frame}", String(first)).replace("{number}", String(first + 1));
   }
 
-  get #chosen() {
-    return this.#formats.find(({ name }) => name === this.#format.value);
+  function getChosen() {
+    return known.find(({ name }) => name === format.value);
   }
 
   /** @returns {string | null} the address of the export; null, with the reason shown, if the frames are wrong */
-  #address() {
+  function addressOf() {
     const words = new URLSearchParams();
-    for (const field of this.#panel.querySelectorAll("select[data-option]")) {
+    for (const field of panel.querySelectorAll("select[data-option]")) {
       if (field instanceof HTMLSelectElement && !field.hidden && field.value) words.set(field.dataset.option ?? "", field.value);
     }
-    const text = this.#frames.value.trim();
-    if (text && !this.#frames.hidden) {
-      const last = (this.#store.facts.session?.n_frames ?? 1) - 1;
+    const text = frames.value.trim();
+    if (text && !frames.hidden) {
+      const last = (store.facts.session?.n_frames ?? 1) - 1;
       const frames = framesOf(text, last);
       if (frames === null) {
-        this.#showMessage(`Expected frames within 0-${last}, such as 0-${Math.min(9, last)} or 0, ${last}, or nothing.`, true);
+        showMessage(`Expected frames within 0-${last}, such as 0-${Math.min(9, last)} or 0, ${last}, or nothing.`, true);
         return null;
       }
       words.set("frames", frames);
     }
-    if (this.#chosen?.options.includes("skip_lost") && byId("export-skip-lost", HTMLInputElement).checked) words.set("skip_lost", "1");
-    if (!this.#chosen?.holds_provenance && byId("export-provenance", HTMLInputElement).checked) words.set("provenance", "1");
-    return `export/${this.#format.value}?${words}`;
+    if (getChosen()?.options.includes("skip_lost") && byId("export-skip-lost", HTMLInputElement).checked) words.set("skip_lost", "1");
+    if (!getChosen()?.holds_provenance && byId("export-provenance", HTMLInputElement).checked) words.set("provenance", "1");
+    return `export/${format.value}?${words}`;
   }
 
-  async #run() {
-    if (this.#running) return;
-    const address = this.#address();
+  async function run() {
+    if (isRunning) return;
+    const address = addressOf();
     if (address === null) {
-      this.#frames.focus();
+      frames.focus();
       return;
     }
-    const running = (this.#running = new AbortController());
-    this.#start.disabled = true;
-    this.#cancel.hidden = false;
-    this.#showMessage("Exporting…");
-    this.#store.set({ exporting: 0 });
-    const timer = setInterval(() => void this.#showProgress(), PROGRESS_MS);
+    const running = (isRunning = new AbortController());
+    start.disabled = true;
+    cancelButton.hidden = false;
+    showMessage("Exporting…");
+    store.set({ exporting: 0 });
+    const timer = setInterval(() => void showProgress(), PROGRESS_MS);
     try {
       const name = await download(address, running.signal);
-      this.#showMessage(`Saved ${name}`);
-      this.#say("info", `Exported ${name}.`);
+      showMessage(`Saved ${name}`);
+      say("info", `Exported ${name}.`);
     } catch (error) {
-      if (running.signal.aborted) this.#showMessage("Canceled");
+      if (running.signal.aborted) showMessage("Canceled");
       else {
         const reason = error instanceof TypeError ? "the program cannot be reached" : String(/** @type {Error} */ (error).message);
-        this.#showMessage(`Failed: ${reason}`, true);
-        this.#say("error", `Export failed: ${reason}`);
+        showMessage(`Failed: ${reason}`, true);
+        say("error", `Export failed: ${reason}`);
       }
     } finally {
       clearInterval(timer);
-      this.#running = null;
-      this.#store.set({ exporting: null });
-      this.#start.disabled = false;
-      this.#cancel.hidden = true;
+      isRunning = null;
+      store.set({ exporting: null });
+      start.disabled = false;
+      cancelButton.hidden = true;
     }
   }
 
-  async #showProgress() {
+  async function showProgress() {
     try {
       const { done, total } = await (await fetch("export/progress")).json();
-      if (!this.#running || !total) return;
-      this.#showMessage(`Exporting, ${Math.floor((100 * done) / total)}%`);
-      this.#store.set({ exporting: done / total });
+      if (!isRunning || !total) return;
+      showMessage(`Exporting, ${Math.floor((100 * done) / total)}%`);
+      store.set({ exporting: done / total });
     } catch {
       // The export itself reports that the program cannot be reached.
     }
@@ -177,18 +170,20 @@ export class ExportPanel {
    * @param {string} text
    * @param {boolean} isFailure
    */
-  #showMessage(text, isFailure = false) {
-    this.#progress.textContent = text;
-    this.#progress.classList.toggle("is-failed", isFailure);
+  function showMessage(text, isFailure = false) {
+    progress.textContent = text;
+    progress.classList.toggle("is-failed", isFailure);
   }
 
   /**
    * @param {"error" | "info"} level
    * @param {string} text
    */
-  #say(level, text) {
-    this.#notify({ type: "notice", level, text });
+  function say(level, text) {
+    notify({ type: "notice", level, text });
   }
+
+  return { cancel, toggle };
 }
 
 /**

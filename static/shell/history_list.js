@@ -6,61 +6,56 @@ import { opensPopover, togglePopover } from "../widgets/popovers.js";
 const FIRST_LIMIT = 100;
 const MOST = 2000;
 
-export class HistoryList {
-  #store;
-  #send;
-  #panel = byId("history-panel", HTMLElement);
-  #button = byId("show-history", HTMLButtonElement);
-  #list = byId("history-list", HTMLElement);
-  #limit = 0;
+/** @typedef {ReturnType<typeof mountHistoryList>} HistoryList */
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   */
-  constructor(store, send) {
-    this.#store = store;
-    this.#send = send;
-    opensPopover(this.#panel, this.#button, () => this.toggle());
-    this.#panel.addEventListener("toggle", () => {
-      const isOpen = this.#panel.matches(":popover-open");
-      if (isOpen) this.#list.querySelector("[aria-current]")?.scrollIntoView({ block: "center" });
-      else this.#ask(0);
-    });
-    this.#list.addEventListener("keydown", (event) => this.#onKey(event));
-    store.on(["history"], () => this.#show());
-    store.on(["connected"], () => store.facts.connected && this.#limit > 0 && this.#ask(this.#limit));
-  }
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ */
+export function mountHistoryList(store, send) {
+  const panel = byId("history-panel", HTMLElement);
+  const button = byId("show-history", HTMLButtonElement);
+  const list = byId("history-list", HTMLElement);
+  let nEntries = 0;
+  opensPopover(panel, button, () => toggle());
+  panel.addEventListener("toggle", () => {
+    const isOpen = panel.matches(":popover-open");
+    if (isOpen) list.querySelector("[aria-current]")?.scrollIntoView({ block: "center" });
+    else request(0);
+  });
+  list.addEventListener("keydown", (event) => onKey(event));
+  store.on(["history"], () => show());
+  store.on(["connected"], () => store.facts.connected && nEntries > 0 && request(nEntries));
 
-  toggle() {
-    togglePopover(this.#panel, this.#button);
-    if (!this.#panel.matches(":popover-open")) return;
-    this.#ask(FIRST_LIMIT);
-    this.#panel.focus();
+  function toggle() {
+    togglePopover(panel, button);
+    if (!panel.matches(":popover-open")) return;
+    request(FIRST_LIMIT);
+    panel.focus();
   }
 
   /** @param {number} limit entries in each direction; 0 to end updates */
-  #ask(limit) {
-    this.#limit = limit;
-    this.#send({ type: "history", limit });
+  function request(limit) {
+    nEntries = limit;
+    send({ type: "history", limit });
   }
 
-  #show() {
-    const { history } = this.#store.facts;
+  function show() {
+    const { history } = store.facts;
     if (!history) return;
     const had = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.edit : undefined;
-    const wasEmpty = this.#list.childElementCount === 0;
+    const wasEmpty = list.childElementCount === 0;
     const { entries, earlier, later } = history;
     const current = entries.find(({ undone }) => !undone)?.edit ?? null;
-    const rows = entries.map((entry) => this.#row(entry, entry.edit === current));
-    if (later) rows.unshift(this.#more("Show later entries"));
-    if (earlier) rows.push(this.#more("Show earlier entries"));
-    else rows.push(this.#beginning(current === null));
-    this.#list.replaceChildren(...rows);
-    const again = had === undefined ? null : this.#list.querySelector(`[data-edit="${had}"]`);
+    const rows = entries.map((entry) => row(entry, entry.edit === current));
+    if (later) rows.unshift(more("Show later entries"));
+    if (earlier) rows.push(more("Show earlier entries"));
+    else rows.push(beginning(current === null));
+    list.replaceChildren(...rows);
+    const again = had === undefined ? null : list.querySelector(`[data-edit="${had}"]`);
     if (again instanceof HTMLElement) again.focus();
-    else if (wasEmpty || this.#panel.matches(":focus-within")) {
-      /** @type {HTMLElement | null} */ (this.#list.querySelector("[aria-current]"))?.focus();
+    else if (wasEmpty || panel.matches(":focus-within")) {
+      /** @type {HTMLElement | null} */ (list.querySelector("[aria-current]"))?.focus();
     }
   }
 
@@ -68,20 +63,20 @@ export class HistoryList {
    * @param {import("../model/protocol.js").HistoryEntry} entry
    * @param {boolean} isCurrent
    */
-  #row({ edit, label, author, time, undone }, isCurrent) {
+  function row({ edit, label, author, time, undone }, isCurrent) {
     const when = new Date(time);
     const [what, frame] = split(label);
     const where = [what, frame, author, displayTime(when)];
     const title = `${label}${author ? `, by ${author}` : ""}, ${when.toLocaleString()}${undone ? "; undone" : ""}. ${
       isCurrent ? "Current state." : undone ? "Redo up to here." : "Undo back to here."
     }`;
-    return this.#entry(edit, where, title, isCurrent, undone);
+    return entry(edit, where, title, isCurrent, undone);
   }
 
   /** @param {boolean} isCurrent */
-  #beginning(isCurrent) {
+  function beginning(isCurrent) {
     const title = isCurrent ? "Current state." : "Undo everything, back to the start of the session.";
-    return this.#entry(null, ["Beginning", "", "", ""], title, isCurrent, false);
+    return entry(null, ["Beginning", "", "", ""], title, isCurrent, false);
   }
 
   /**
@@ -91,31 +86,33 @@ export class HistoryList {
    * @param {boolean} isCurrent
    * @param {boolean} isUndone
    */
-  #entry(edit, cells, title, isCurrent, isUndone) {
+  function entry(edit, cells, title, isCurrent, isUndone) {
     const row = make("button", { type: "button", title, "data-edit": String(edit) }, ...cells.map((text) => make("span", "is-clipped", text)));
     row.classList.toggle("is-undone", isUndone);
     if (isCurrent) row.setAttribute("aria-current", "step");
-    row.addEventListener("click", () => isCurrent || this.#send({ type: "go_to", edit }));
+    row.addEventListener("click", () => isCurrent || send({ type: "go_to", edit }));
     return make("li", {}, row);
   }
 
   /** @param {string} text */
-  #more(text) {
-    const isLast = this.#limit >= MOST;
+  function more(text) {
+    const isLast = nEntries >= MOST;
     const title = isLast ? `Only ${MOST.toLocaleString("en")} entries are listed. Undo and redo also reach the others` : text;
-    const ask = () => this.#ask(Math.min(MOST, 4 * this.#limit));
+    const ask = () => request(Math.min(MOST, 4 * nEntries));
     return make("li", {}, make("button", { type: "button", className: "is-more", title, disabled: isLast, onclick: ask }, title));
   }
 
   /** @param {KeyboardEvent} event */
-  #onKey(event) {
-    const rows = [...this.#list.querySelectorAll("button")];
+  function onKey(event) {
+    const rows = [...list.querySelectorAll("button")];
     const at = rows.findIndex((row) => row === document.activeElement);
     const to = { ArrowDown: at + 1, ArrowUp: at - 1, Home: 0, End: rows.length - 1 }[event.key];
     if (to === undefined) return;
     event.preventDefault();
     rows[Math.max(0, Math.min(rows.length - 1, to))]?.focus();
   }
+
+  return { toggle };
 }
 
 /**

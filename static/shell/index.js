@@ -6,17 +6,17 @@
 
 import { button, byId } from "../widgets/elements.js";
 import { leaveFields, watchTyping } from "../widgets/typing.js";
-import { AdviceLine } from "./advice.js";
+import { mountAdvice } from "./advice.js";
 import { mountAnnouncer } from "./announcer.js";
 import { mountComparison } from "./comparison.js";
 import { deeds } from "./deeds.js";
-import { ExportPanel } from "./export_panel.js";
-import { HistoryList } from "./history_list.js";
+import { mountExportPanel } from "./export_panel.js";
+import { mountHistoryList } from "./history_list.js";
 import { KeyChoices, followChoices } from "./key_choices.js";
-import { KeyList } from "./key_list.js";
+import { mountKeyList } from "./key_list.js";
 import { listen, orderedByArea } from "./keys.js";
-import { Palette } from "./palette.js";
-import { People } from "./people.js";
+import { mountPalette } from "./palette.js";
+import { mountPeople } from "./people.js";
 import { mountSavedMark } from "./saved_mark.js";
 import { escapeBindings, helpBindings, peopleBindings } from "./shell_keys.js";
 import { mountTopBar } from "./top_bar.js";
@@ -48,10 +48,10 @@ export function mount(context, rooms) {
   const { posing, pinning } = rooms.posing;
   mountTopBar(store, actions);
   mountComparison(store, actions);
-  const people = new People(store, actions, posing);
+  const people = mountPeople(store, actions, posing);
   const workspace = new Workspace(store);
-  const history = new HistoryList(store, send);
-  const advice = new AdviceLine(store, deeds(context, rooms, new ExportPanel(store, context.notify)));
+  const history = mountHistoryList(store, send);
+  const advice = mountAdvice(store, deeds(context, rooms, mountExportPanel(store, context.notify)));
   context.onNotice((notice) => advice.answer(notice));
   mountSavedMark(store, send);
   mountAnnouncer(byId("announcer", HTMLElement), store);
@@ -69,9 +69,9 @@ export function mount(context, rooms) {
     own,
     ...[scene, search, timeline, rooms.posing, panes, inspector, annotation, participants].map(({ bindings }) => bindings),
   ]);
-  const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: inspector.inspector, away: reasons.away }, table);
+  const palette = mountPalette({ store, navigation, grid, posing, layers, actions, inspector: inspector.inspector, away: reasons.away }, table);
   const choices = new KeyChoices(table, (text) => context.say(text, "error"));
-  const keyList = new KeyList(table, choices);
+  const keyList = mountKeyList(table, choices);
   followChoices(choices);
   store.on(["session"], () => store.facts.session?.role === "host" && void choices.load());
   obeyKeys(context, table, scene.frame);

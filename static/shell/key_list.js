@@ -9,107 +9,99 @@ import { markSection } from "../timeline/mark_list.js";
  * @typedef {import("../widgets/key_matching.js").Binding} Binding
  */
 
-export class KeyList {
-  #dialog = byId("key-list", HTMLDialogElement);
-  #query = byId("key-query", HTMLInputElement);
-  #list = byId("key-areas", HTMLElement);
-  #marks = byId("key-marks", HTMLElement);
-  #none = byId("key-none", HTMLElement);
-  #reset;
-  #table;
-  #choices;
+/**
+ * @param {Binding[]} table
+ * @param {import("./key_choices.js").KeyChoices} choices
+ */
+export function mountKeyList(table, choices) {
+  const dialog = byId("key-list", HTMLDialogElement);
+  const queryField = byId("key-query", HTMLInputElement);
+  const list = byId("key-areas", HTMLElement);
+  const marks = byId("key-marks", HTMLElement);
+  const none = byId("key-none", HTMLElement);
   /** Buttons of the commands that are listed. @type {Map<Binding, HTMLButtonElement>} */
-  #buttons = new Map();
+  const buttons = new Map();
   /** Command whose key is asked for. @type {Binding | null} */
-  #asked = null;
+  let asked = null;
+  choices.onChange = () => dialog.open && search();
+  marks.append(markSection());
+  queryField.addEventListener("input", () => search());
+  button("show-key-list", () => show());
+  const reset = button("reset-keys", () => void choices.reset());
+  dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
+  dialog.addEventListener("keydown", (event) => take(event), true);
+  dialog.addEventListener("close", () => list.replaceChildren());
+  list.addEventListener("focusout", () => cancel());
 
-  /**
-   * @param {Binding[]} table
-   * @param {import("./key_choices.js").KeyChoices} choices
-   */
-  constructor(table, choices) {
-    this.#table = table;
-    this.#choices = choices;
-    choices.onChange = () => this.#dialog.open && this.#search();
-    this.#marks.append(markSection());
-    this.#query.addEventListener("input", () => this.#search());
-    button("show-key-list", () => this.show());
-    this.#reset = button("reset-keys", () => void choices.reset());
-    this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
-    this.#dialog.addEventListener("keydown", (event) => this.#take(event), true);
-    this.#dialog.addEventListener("close", () => this.#list.replaceChildren());
-    this.#list.addEventListener("focusout", () => this.#cancel());
-  }
-
-  show() {
-    this.#query.value = "";
-    this.#search();
-    this.#dialog.showModal();
+  function show() {
+    queryField.value = "";
+    search();
+    dialog.showModal();
   }
 
   /** List the commands that have keys, and with a query those without keys too. */
-  #search() {
-    const query = this.#query.value;
+  function search() {
+    const query = queryField.value;
     /** @type {Map<string, HTMLElement>} */
     const areas = new Map();
-    this.#buttons.clear();
-    for (const bindings of merged(this.#table.filter(({ keys }) => keys.length > 0 || query.trim() !== ""))) {
+    buttons.clear();
+    for (const bindings of merged(table.filter(({ keys }) => keys.length > 0 || query.trim() !== ""))) {
       const { area = "More" } = bindings[0];
       const label = joined(bindings.map((one) => one.label));
       if (fitness(query, `${label} ${bindings.flatMap(({ keys }) => keys).join(" ")} ${area}`) === null) continue;
       const section = areas.get(area) ?? make("section", {}, make("h3", {}, area), make("dl"));
       areas.set(area, section);
       const labels = JSON.stringify(bindings.map((one) => one.label));
-      section.lastChild?.appendChild(make("div", {}, make("dt", {}, ...bindings.map((one) => this.#caps(one))), make("dd", { "data-labels": labels }, label)));
+      section.lastChild?.appendChild(make("div", {}, make("dt", {}, ...bindings.map((one) => caps(one))), make("dd", { "data-labels": labels }, label)));
     }
-    this.#list.replaceChildren(...areas.values());
-    for (const row of this.#marks.querySelectorAll("dl > div")) row.toggleAttribute("hidden", fitness(query, `${row.textContent}`) === null);
-    this.#marks.hidden = this.#marks.querySelector("dl > div:not([hidden])") === null;
-    this.#none.hidden = areas.size > 0 || !this.#marks.hidden;
-    this.#reset.disabled = !this.#choices.areChanged;
+    list.replaceChildren(...areas.values());
+    for (const row of marks.querySelectorAll("dl > div")) row.toggleAttribute("hidden", fitness(query, `${row.textContent}`) === null);
+    marks.hidden = marks.querySelector("dl > div:not([hidden])") === null;
+    none.hidden = areas.size > 0 || !marks.hidden;
+    reset.disabled = !choices.areChanged;
   }
 
   /** @param {Binding} binding */
-  #caps(binding) {
+  function caps(binding) {
     const { keys, label, matches } = binding;
     if (matches) return make("span", { title: "This key cannot be changed" }, keyCaps(keys));
     const title = `Change the key of “${label}”`;
     const name = `${title}: ${keys.join(", ") || "none"}`;
-    const change = make("button", { type: "button", title, "aria-label": name, onclick: () => this.#ask(binding) }, capsOf(binding));
-    this.#buttons.set(binding, change);
+    const change = make("button", { type: "button", title, "aria-label": name, onclick: () => ask(binding) }, capsOf(binding));
+    buttons.set(binding, change);
     return change;
   }
 
   /** @param {Binding} binding */
-  #ask(binding) {
-    this.#cancel();
-    this.#asked = binding;
-    this.#buttons.get(binding)?.replaceChildren("Press a key");
-    this.#note(binding, "Esc cancels, Delete leaves it without a key");
+  function ask(binding) {
+    cancel();
+    asked = binding;
+    buttons.get(binding)?.replaceChildren("Press a key");
+    noteText(binding, "Esc cancels, Delete leaves it without a key");
   }
 
-  #cancel() {
-    if (!this.#asked) return;
-    this.#buttons.get(this.#asked)?.replaceChildren(capsOf(this.#asked));
-    this.#list.querySelector("output")?.remove();
-    this.#asked = null;
+  function cancel() {
+    if (!asked) return;
+    buttons.get(asked)?.replaceChildren(capsOf(asked));
+    list.querySelector("output")?.remove();
+    asked = null;
   }
 
   /** @param {KeyboardEvent} event */
-  async #take(event) {
-    const binding = this.#asked;
+  async function take(event) {
+    const binding = asked;
     if (!binding || ["Control", "Alt", "Shift", "Meta", "AltGraph"].includes(event.key)) return;
     event.preventDefault();
     event.stopPropagation();
-    this.#cancel();
+    cancel();
     if (event.key === "Escape") return;
     const key = event.key === "Delete" ? null : keyOf(event);
-    const owner = this.#table.find((one) => one !== binding && obeys(one, event));
+    const owner = table.find((one) => one !== binding && obeys(one, event));
     let note = owner?.matches ? `“${owner.label}” keeps this key.` : "Expected a letter, a sign or a named key, found another.";
     if (event.key === "Delete" || (key !== null && !owner?.matches)) {
-      note = (await this.#choices.choose(binding, key)) || (owner && key ? `Taken from “${owner.label}”` : "");
+      note = (await choices.choose(binding, key)) || (owner && key ? `Taken from “${owner.label}”` : "");
     }
-    this.#note(binding, note);
+    noteText(binding, note);
   }
 
   /**
@@ -118,12 +110,14 @@ export class KeyList {
    * @param {Binding} binding
    * @param {string} text
    */
-  #note(binding, text) {
-    this.#list.querySelector("output")?.remove();
-    const change = this.#buttons.get(binding);
+  function noteText(binding, text) {
+    list.querySelector("output")?.remove();
+    const change = buttons.get(binding);
     change?.closest("div")?.lastChild?.appendChild(make("output", {}, text));
     change?.focus();
   }
+
+  return { show };
 }
 
 /** @param {Binding} binding */

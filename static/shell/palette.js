@@ -13,54 +13,46 @@ const [RECENT_BONUS, SUITING_BONUS] = [6, 3];
 /** Factor of a bonus without a query, when nothing else ranks commands. */
 const ALONE = 1000;
 
-/** @typedef {import("./commands.js").Command} Command */
-
-export class Palette {
-  #dialog = byId("palette", HTMLDialogElement);
-  #input = byId("palette-query", HTMLInputElement);
-  #list = byId("palette-list", HTMLElement);
-  #why = byId("palette-why", HTMLElement);
-  #context;
-  #table;
+/**
+ * @typedef {import("./commands.js").Command} Command
+ * @param {import("./commands.js").CommandContext} context
+ * @param {import("../widgets/key_matching.js").Binding[]} table
+ */
+export function mountPalette(context, table) {
+  const dialog = byId("palette", HTMLDialogElement);
+  const input = byId("palette-query", HTMLInputElement);
+  const list = byId("palette-list", HTMLElement);
+  const why = byId("palette-why", HTMLElement);
   /** @type {Command[]} the listed commands */
-  #found = [];
-  #at = 0;
+  let found = [];
+  let at = 0;
+  input.addEventListener("input", () => search());
+  input.addEventListener("keydown", (event) => onKey(event));
+  dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
+  list.addEventListener("click", (event) => {
+    const option = event.target instanceof Element ? event.target.closest("[role=option]") : null;
+    if (option) choose([...list.children].indexOf(option));
+  });
 
-  /**
-   * @param {import("./commands.js").CommandContext} context
-   * @param {import("../widgets/key_matching.js").Binding[]} table
-   */
-  constructor(context, table) {
-    this.#context = context;
-    this.#table = table;
-    this.#input.addEventListener("input", () => this.#search());
-    this.#input.addEventListener("keydown", (event) => this.#onKey(event));
-    this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
-    this.#list.addEventListener("click", (event) => {
-      const option = event.target instanceof Element ? event.target.closest("[role=option]") : null;
-      if (option) this.#choose([...this.#list.children].indexOf(option));
-    });
-  }
-
-  toggle() {
-    if (this.#dialog.open) {
-      this.#dialog.close();
+  function toggle() {
+    if (dialog.open) {
+      dialog.close();
       return;
     }
-    this.#input.value = "";
-    this.#dialog.showModal();
-    this.#search();
+    input.value = "";
+    dialog.showModal();
+    search();
   }
 
-  #search() {
-    const query = this.#input.value;
+  function search() {
+    const query = input.value;
     const isAsked = query.trim() !== "";
-    const [recent, suiting] = [recentIds(), suitingLabels(this.#context.store.facts)];
+    const [recent, suiting] = [recentIds(), suitingLabels(context.store.facts)];
     const commands = [
-      ...contextCommands(this.#context, query),
-      ...keyCommands(this.#table),
-      ...buttonCommands(this.#table),
-      ...settingCommands(this.#context),
+      ...contextCommands(context, query),
+      ...keyCommands(table),
+      ...buttonCommands(table),
+      ...settingCommands(context),
     ];
     const scored = commands.flatMap((command) => {
       const found = fitness(query, `${command.label} ${command.area} ${command.words} ${command.keys.join(" ")}`);
@@ -76,61 +68,63 @@ export class Palette {
     // Without a query: recent commands, those that suit the state, then the order of the table.
     scored.sort((a, b) => (isAsked || a.mark || b.mark ? b.score - a.score : 0));
     const shown = scored.slice(0, MAX_SHOWN);
-    this.#found = shown.map(({ command }) => command);
-    this.#list.replaceChildren(...shown.map(({ command, mark }, index) => option(command, mark, index)));
-    this.#list.scrollTop = 0;
+    found = shown.map(({ command }) => command);
+    list.replaceChildren(...shown.map(({ command, mark }, index) => option(command, mark, index)));
+    list.scrollTop = 0;
     // Enter by itself must not change a pose: without a query nothing is chosen yet.
-    this.#show(isAsked ? 0 : -1);
-    if (!shown.length) this.#why.textContent = `No results for “${query}”. Enter a number to go to that frame.`;
+    show(isAsked ? 0 : -1);
+    if (!shown.length) why.textContent = `No results for “${query}”. Enter a number to go to that frame.`;
   }
 
   /** @param {KeyboardEvent} event */
-  #onKey(event) {
+  function onKey(event) {
     // The field of the closed dialog keeps the focus until the page is drawn again: its keys belong to the page.
-    if (!this.#dialog.open) return;
-    const count = this.#found.length;
+    if (!dialog.open) return;
+    const count = found.length;
     const page = 8;
     const to = {
-      ArrowDown: (this.#at + 1) % Math.max(1, count),
-      ArrowUp: (Math.max(this.#at, 0) - 1 + count) % Math.max(1, count),
-      PageDown: Math.min(count - 1, this.#at + page),
-      PageUp: Math.max(0, this.#at - page),
+      ArrowDown: (at + 1) % Math.max(1, count),
+      ArrowUp: (Math.max(at, 0) - 1 + count) % Math.max(1, count),
+      PageDown: Math.min(count - 1, at + page),
+      PageUp: Math.max(0, at - page),
     }[event.key];
     const isToggle = event.key.toLowerCase() === "k" && (event.ctrlKey || event.metaKey);
-    if (to !== undefined) this.#show(to);
-    else if (event.key === "Enter") this.#choose(this.#at);
-    else if (isToggle) this.#dialog.close();
+    if (to !== undefined) show(to);
+    else if (event.key === "Enter") choose(at);
+    else if (isToggle) dialog.close();
     else return;
     event.preventDefault();
   }
 
   /** @param {number} index */
-  #show(index) {
-    this.#list.children[this.#at]?.setAttribute("aria-selected", "false");
-    this.#at = index;
-    const now = this.#list.children[index];
+  function show(index) {
+    list.children[at]?.setAttribute("aria-selected", "false");
+    at = index;
+    const now = list.children[index];
     now?.setAttribute("aria-selected", "true");
     now?.scrollIntoView({ block: "nearest" });
-    this.#input.setAttribute("aria-activedescendant", now?.id ?? "");
-    this.#why.textContent = index < 0 ? "Type a few letters, or choose with ↑ and ↓." : (this.#found[index]?.why() ?? "");
+    input.setAttribute("aria-activedescendant", now?.id ?? "");
+    why.textContent = index < 0 ? "Type a few letters, or choose with ↑ and ↓." : (found[index]?.why() ?? "");
   }
 
   /** @param {number} index */
-  #choose(index) {
-    const command = this.#found[index];
+  function choose(index) {
+    const command = found[index];
     if (!command) return;
-    this.#show(index);
+    show(index);
     if (command.why() !== null) {
-      this.#why.classList.remove("is-asked");
-      void this.#why.offsetWidth; // restart the animation
-      this.#why.classList.add("is-asked");
+      why.classList.remove("is-asked");
+      void why.offsetWidth; // restart the animation
+      why.classList.add("is-asked");
       return;
     }
     const recent = [command.id, ...recentIds().filter((id) => id !== command.id)].slice(0, MAX_RECENT);
     localStorage.setItem(RECENT, JSON.stringify(recent));
-    this.#dialog.close();
+    dialog.close();
     command.run();
   }
+
+  return { toggle };
 }
 
 /**

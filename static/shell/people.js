@@ -9,49 +9,41 @@ const COPY = "M5.5 5.5h8v8h-8zM3.5 10.5h-1v-8h8v1";
 
 /** @typedef {{row: HTMLElement, radio: HTMLInputElement, eye: HTMLButtonElement, copy: HTMLButtonElement, summary: HTMLElement}} Row */
 
-export class People {
-  #store;
-  #actions;
-  #posing;
-  #bar = byId("people", HTMLElement);
-  #list = byId("people-list", HTMLElement);
-  #panel = byId("people-panel", HTMLElement);
-  #open = byId("show-people", HTMLButtonElement);
-  #solo;
-  #scope = byId("search-scope", HTMLSelectElement);
+/** @typedef {ReturnType<typeof mountPeople>} People */
+
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../model/actions.js").Actions} actions
+ * @param {import("../posing/posing.js").Posing} posing
+ */
+export function mountPeople(store, actions, posing) {
+  const bar = byId("people", HTMLElement);
+  const list = byId("people-list", HTMLElement);
+  const panel = byId("people-panel", HTMLElement);
+  const open = byId("show-people", HTMLButtonElement);
+  const scopeChoice = byId("search-scope", HTMLSelectElement);
   /** @type {HTMLInputElement[]} */
-  #chips = [];
+  let chips = [];
   /** @type {Row[]} */
-  #rows = [];
+  let rows = [];
+  const solo = button("solo", () => actions.toggleSolo());
+  opensPopover(panel, open, () => toggle());
+  onChange(scopeChoice, () => store.set({ scope: scopeChoice.value === "one" ? "one" : "all" }));
+  store.on(["session"], () => build());
+  store.on(["session", "state", "connected", "scope"], () => show());
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("../model/actions.js").Actions} actions
-   * @param {import("../posing/posing.js").Posing} posing
-   */
-  constructor(store, actions, posing) {
-    this.#store = store;
-    this.#actions = actions;
-    this.#posing = posing;
-    this.#solo = button("solo", () => actions.toggleSolo());
-    opensPopover(this.#panel, this.#open, () => this.toggle());
-    onChange(this.#scope, () => store.set({ scope: this.#scope.value === "one" ? "one" : "all" }));
-    store.on(["session"], () => this.#build());
-    store.on(["session", "state", "connected", "scope"], () => this.#show());
+  function toggle() {
+    if ((store.facts.session?.people.length ?? 0) > 1) togglePopover(panel, open);
   }
 
-  toggle() {
-    if ((this.#store.facts.session?.people.length ?? 0) > 1) togglePopover(this.#panel, this.#open);
-  }
-
-  #build() {
-    const everybody = this.#store.facts.session?.people ?? [];
+  function build() {
+    const everybody = store.facts.session?.people ?? [];
     const people = everybody.length > 1 ? everybody : [];
-    byId("people-group", HTMLElement).hidden = this.#scope.hidden = people.length === 0;
-    this.#chips = people.map((info, person) => this.#choice(this.#bar, "person", info, person));
-    this.#bar.replaceChildren(...this.#chips.map((chip) => /** @type {HTMLElement} */ (chip.parentElement)));
-    this.#rows = people.map((info, person) => this.#row(info, person));
-    this.#list.replaceChildren(...this.#rows.map(({ row }) => row));
+    byId("people-group", HTMLElement).hidden = scopeChoice.hidden = people.length === 0;
+    chips = people.map((info, person) => choice(bar, "person", info, person));
+    bar.replaceChildren(...chips.map((chip) => /** @type {HTMLElement} */ (chip.parentElement)));
+    rows = people.map((info, person) => row(info, person));
+    list.replaceChildren(...rows.map(({ row }) => row));
   }
 
   /**
@@ -62,11 +54,11 @@ export class People {
    * @param {import("../model/protocol.js").PersonInfo} info
    * @param {number} person
    */
-  #choice(within, name, info, person) {
+  function choice(within, name, info, person) {
     const input = make("input", { type: "radio", name, value: String(person) });
     input.addEventListener("change", () => {
-      this.#actions.selectPerson(person);
-      if (within === this.#bar) input.blur();
+      actions.selectPerson(person);
+      if (within === bar) input.blur();
     });
     make("label", { title: `Select ${info.name}` }, input, make("span", { className: "person-name is-clipped", "--person": info.color }, info.name));
     return input;
@@ -77,31 +69,31 @@ export class People {
    * @param {number} person
    * @returns {Row}
    */
-  #row(info, person) {
+  function row(info, person) {
     const row = make("li");
-    const radio = this.#choice(row, "person-in-list", info, person);
+    const radio = choice(row, "person-in-list", info, person);
     const model = make("span", "quiet", `${info.model}, ${info.height_m.toFixed(2)} m`);
     const summary = make("span", "quiet");
     const bend = `Copy the joint angles of ${info.name}; position and orientation stay`;
-    const copy = iconButton(COPY, bend, () => this.#posing.copyPerson(person));
+    const copy = iconButton(COPY, bend, () => posing.copyPerson(person));
     copy.setAttribute("aria-label", `Copy the pose of ${info.name}`);
     const eye = iconButton(EYE, `Show ${info.name}`, () =>
-      this.#actions.showPerson(person, !this.#store.facts.state?.people[person]?.shown),
+      actions.showPerson(person, !store.facts.state?.people[person]?.shown),
     );
     row.append(/** @type {HTMLElement} */ (radio.parentElement), model, summary, copy, eye);
     return { row, radio, eye, copy, summary };
   }
 
-  #show() {
-    const { state, session, connected, scope } = this.#store.facts;
+  function show() {
+    const { state, session, connected, scope } = store.facts;
     if (!state || !session || session.people.length < 2) return;
     const name = session.people[state.person].name;
-    this.#chips.forEach((chip, person) => {
+    chips.forEach((chip, person) => {
       chip.checked = person === state.person;
       chip.disabled = !connected;
       chip.parentElement?.classList.toggle("is-unseen", !state.people[person]?.shown);
     });
-    this.#rows.forEach(({ radio, eye, copy, summary }, person) => {
+    rows.forEach(({ radio, eye, copy, summary }, person) => {
       const { shown, source, status } = state.people[person];
       radio.checked = person === state.person;
       radio.disabled = eye.disabled = !connected;
@@ -111,11 +103,13 @@ export class People {
       eye.title = `${shown ? "Hide" : "Show"} ${session.people[person].name} in all views`;
       eye.querySelector("path")?.setAttribute("d", shown ? EYE : SHUT);
     });
-    this.#solo.disabled = !connected;
-    this.#solo.setAttribute("aria-pressed", String(state.solo));
-    this.#scope.disabled = !connected;
-    const only = this.#scope.options[1];
+    solo.disabled = !connected;
+    solo.setAttribute("aria-pressed", String(state.solo));
+    scopeChoice.disabled = !connected;
+    const only = scopeChoice.options[1];
     if (only.textContent !== `Only ${name}`) only.textContent = `Only ${name}`;
-    this.#scope.value = scope;
+    scopeChoice.value = scope;
   }
+
+  return { toggle };
 }

@@ -5,7 +5,7 @@ import { count, displayName, percent } from "../widgets/text.js";
 import { reasonOf } from "../model/selectors.js";
 import { contradictions } from "../model/keyframe_doubts.js";
 import { countDoubts } from "./doubts.js";
-import { ThumbnailLoader } from "./thumbnail_loader.js";
+import { makeThumbnailLoader } from "./thumbnail_loader.js";
 
 /** Entries that are listed at first, and after "more". The others follow as these are resolved. */
 const FEW_LISTED = 10;
@@ -24,7 +24,7 @@ export function mountDoubtList(store, queue) {
   const empty = byId("doubts-empty", HTMLElement);
   const controls = byId("doubt-controls", HTMLElement);
   const tabCount = byId("doubts-count", HTMLElement);
-  const loader = new ThumbnailLoader(panel);
+  const loader = makeThumbnailLoader(panel);
   /** @type {Map<string, HTMLLIElement>} rows by what they show */
   let rowsByKey = new Map();
   let limit = FEW_LISTED;

@@ -23,65 +23,61 @@ const [VIEWS_PX, LEAST_VIEWS_PX, LEAST_PX] = [200, 100, 60];
 
 /** @typedef {import("../model/series.js").Tab} Tab */
 
-export class Drawer {
-  #store;
-  #session = "";
-  /** @type {Tab | null} tab to open once it is known to have content */
-  #pending = null;
-  /** Whether the open tab has had content, or must have some to stay open. */
-  #needsContent = false;
-  #panel = byId("drawer", HTMLElement);
-  #stage = byId("drawer-stage", HTMLElement);
-  #grip = byId("drawer-grip", HTMLElement);
-  #tabs = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("input[name=drawer]")]);
-  #toggle;
+/** @typedef {ReturnType<typeof mountDrawer>} Drawer */
 
-  /** @param {import("../model/store.js").Store} store */
-  constructor(store) {
-    this.#store = store;
-    this.#toggle = button("show-curves", () => this.#open(this.#isOpen ? null : this.#lastTab));
-    button("close-drawer", () => this.#open(null));
-    for (const tab of this.#tabs) {
-      onChange(tab, () => this.#open(/** @type {import("../model/series.js").Tab} */ (tab.value)));
-    }
-    makeSeparator(this.#grip, {
-      position: () => -this.#stage.clientHeight,
-      moveTo: (position) => this.#resize(-position),
-      reset: () => this.#resize(null),
-    });
-    addEventListener("resize", () => this.#fit());
-    const heights = new ResizeObserver(() => this.#fit());
-    for (const bar of [...barsAround(), byId("timeline", HTMLElement)]) heights.observe(bar);
-    this.#show(null);
-    store.on(["session"], () => this.#begin());
-    store.on(["timeline"], () => this.#pending && !isEmpty(store.facts, this.#pending) && this.#restore(this.#pending));
-    store.on(["timeline", "lanes", "searchRuns", "rangeComparison", "state"], () => this.#check());
+/** @param {import("../model/store.js").Store} store */
+export function mountDrawer(store) {
+  let session = "";
+  /** @type {Tab | null} tab to open once it is known to have content */
+  let pending = null;
+  /** Whether the open tab has had content, or must have some to stay open. */
+  let needsContent = false;
+  const panel = byId("drawer", HTMLElement);
+  const stage = byId("drawer-stage", HTMLElement);
+  const grip = byId("drawer-grip", HTMLElement);
+  const tabs = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("input[name=drawer]")]);
+  const toggleButton = button("show-curves", () => openTab(getIsOpen() ? null : getLastTab()));
+  button("close-drawer", () => openTab(null));
+  for (const tab of tabs) {
+    onChange(tab, () => openTab(/** @type {import("../model/series.js").Tab} */ (tab.value)));
   }
+  makeSeparator(grip, {
+    position: () => -stage.clientHeight,
+    moveTo: (position) => resize(-position),
+    reset: () => resize(null),
+  });
+  addEventListener("resize", () => fit());
+  const heights = new ResizeObserver(() => fit());
+  for (const bar of [...barsAround(), byId("timeline", HTMLElement)]) heights.observe(bar);
+  show(null);
+  store.on(["session"], () => begin());
+  store.on(["timeline"], () => pending && !isEmpty(store.facts, pending) && restore(pending));
+  store.on(["timeline", "lanes", "searchRuns", "rangeComparison", "state"], () => check());
 
   /** Close the drawer in another session; open it there if it was open and has content. */
-  #begin() {
-    const name = this.#store.facts.session?.name ?? "";
-    if (name === this.#session) return;
-    this.#session = name;
+  function begin() {
+    const name = store.facts.session?.name ?? "";
+    if (name === session) return;
+    session = name;
     const tab = kept("drawer", name);
-    this.#show(null);
-    this.#pending = this.#tabs.some(({ value }) => value === tab) ? /** @type {Tab} */ (tab) : null;
+    show(null);
+    pending = tabs.some(({ value }) => value === tab) ? /** @type {Tab} */ (tab) : null;
   }
 
   /** @param {Tab} tab */
-  #restore(tab) {
-    this.#show(tab);
-    this.#needsContent = tab !== "doubts";
+  function restore(tab) {
+    show(tab);
+    needsContent = tab !== "doubts";
   }
 
   /** Close the drawer if its content is gone. A receipt of resolved doubts stays. */
-  #check() {
-    const { facts } = this.#store;
+  function check() {
+    const { facts } = store;
     const { drawer, connected } = facts;
-    if (drawer === null || drawer === "doubts" || !connected || facts.session?.name !== this.#session) return;
+    if (drawer === null || drawer === "doubts" || !connected || facts.session?.name !== session) return;
     if (drawer === "search" && !facts.searchRuns) return; // not known before the drawer has been open for a while
-    if (!isEmpty(facts, drawer)) this.#needsContent = true;
-    else if (this.#needsContent) this.#open(null);
+    if (!isEmpty(facts, drawer)) needsContent = true;
+    else if (needsContent) openTab(null);
   }
 
   /**
@@ -89,78 +85,75 @@ export class Drawer {
    *
    * @param {Tab} tab
    */
-  toggle(tab) {
-    this.#open(this.#store.facts.drawer === tab ? null : tab);
-  }
-
-  /** @param {Tab} tab */
-  open(tab) {
-    this.#open(tab);
+  function toggle(tab) {
+    openTab(store.facts.drawer === tab ? null : tab);
   }
 
   /** Open the last group of curves, or close the drawer if curves are shown. */
-  toggleCurves() {
+  function toggleCurves() {
     const stored = localStorage.getItem(STORED_CURVES);
-    const isShown = CURVE_GROUPS.some((group) => group === this.#store.facts.drawer);
-    this.#open(isShown ? null : (CURVE_GROUPS.find((group) => group === stored) ?? "arms"));
+    const isShown = CURVE_GROUPS.some((group) => group === store.facts.drawer);
+    openTab(isShown ? null : (CURVE_GROUPS.find((group) => group === stored) ?? "arms"));
   }
 
-  get #isOpen() {
-    return this.#store.facts.drawer !== null;
+  function getIsOpen() {
+    return store.facts.drawer !== null;
   }
 
-  get #lastTab() {
+  function getLastTab() {
     const stored = localStorage.getItem(STORED_TAB);
-    return /** @type {import("../model/series.js").Tab} */ (this.#tabs.find(({ value }) => value === stored)?.value ?? "arms");
+    return /** @type {import("../model/series.js").Tab} */ (tabs.find(({ value }) => value === stored)?.value ?? "arms");
   }
 
   /** @param {Tab | null} tab */
-  #open(tab) {
-    keep("drawer", this.#session, tab);
-    this.#show(tab);
-    this.#check();
+  function openTab(tab) {
+    keep("drawer", session, tab);
+    show(tab);
+    check();
   }
 
   /** @param {Tab | null} tab */
-  #show(tab) {
-    this.#pending = null;
-    this.#needsContent = false;
+  function show(tab) {
+    pending = null;
+    needsContent = false;
     if (tab !== null) localStorage.setItem(STORED_TAB, tab);
     if (CURVE_GROUPS.some((group) => group === tab)) localStorage.setItem(STORED_CURVES, String(tab));
-    this.#panel.hidden = tab === null;
-    this.#toggle.setAttribute("aria-pressed", String(tab !== null));
-    for (const one of this.#tabs) one.checked = one.value === tab;
-    this.#store.set({ drawer: tab });
-    this.#fit();
+    panel.hidden = tab === null;
+    toggleButton.setAttribute("aria-pressed", String(tab !== null));
+    for (const one of tabs) one.checked = one.value === tab;
+    store.set({ drawer: tab });
+    fit();
   }
 
   /** Curves and thumbnails need less height than the search, so each kind has its own. */
-  get #kind() {
-    const { drawer } = this.#store.facts;
+  function getKind() {
+    const { drawer } = store.facts;
     if (drawer === "doubts") return "doubts";
     return CURVE_GROUPS.some((group) => group === drawer) ? "curves" : "search";
   }
 
   /** Apply the stored height, as far as the window has room for it. */
-  #fit() {
+  function fit() {
     const bars = barsAround().reduce((sum, { offsetHeight }) => sum + offsetHeight, 0);
-    const free = innerHeight - bars - LEAST_VIEWS_PX + (this.#isOpen ? this.#stage.offsetHeight : 0);
+    const free = innerHeight - bars - LEAST_VIEWS_PX + (getIsOpen() ? stage.offsetHeight : 0);
     const max = Math.max(LEAST_PX, Math.round(free));
     const min = Math.min(MIN_PX, max);
-    const usual = Math.min(DEFAULT_SHARES[this.#kind] * innerHeight, max + LEAST_VIEWS_PX - VIEWS_PX);
-    const chosen = Number(localStorage.getItem(STORED_HEIGHT + this.#kind)) || usual;
+    const usual = Math.min(DEFAULT_SHARES[getKind()] * innerHeight, max + LEAST_VIEWS_PX - VIEWS_PX);
+    const chosen = Number(localStorage.getItem(STORED_HEIGHT + getKind())) || usual;
     const height = Math.round(Math.max(min, Math.min(max, chosen)));
-    this.#stage.style.height = `${height}px`;
-    showPosition(this.#grip, { now: height, min, max });
-    const drawerPx = this.#panel.offsetHeight;
-    if (drawerPx !== this.#store.facts.drawerPx) this.#store.set({ drawerPx });
+    stage.style.height = `${height}px`;
+    showPosition(grip, { now: height, min, max });
+    const drawerPx = panel.offsetHeight;
+    if (drawerPx !== store.facts.drawerPx) store.set({ drawerPx });
   }
 
   /** @param {number | null} height null for the default */
-  #resize(height) {
-    localStorage.setItem(STORED_HEIGHT + this.#kind, height === null ? "" : String(Math.max(MIN_PX, Math.round(height))));
-    this.#fit();
+  function resize(height) {
+    localStorage.setItem(STORED_HEIGHT + getKind(), height === null ? "" : String(Math.max(MIN_PX, Math.round(height))));
+    fit();
   }
+
+  return { toggle, open: openTab, toggleCurves };
 }
 
 /** The bars around the views; the drawer is part of the last one. */

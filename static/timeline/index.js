@@ -8,11 +8,11 @@ import { byId } from "../widgets/elements.js";
 import { mountCurveTools, mountCurves } from "./curves.js";
 import { mountDoubtList } from "./doubt_list.js";
 import { DoubtQueue } from "./doubt_queue.js";
-import { Drawer } from "./drawer.js";
+import { mountDrawer } from "./drawer.js";
 import { FrameWindow } from "./frame_window.js";
 import { mountJumpMenu } from "./jump_menu.js";
 import { Jumps } from "./jumps.js";
-import { Playback } from "./playback.js";
+import { makePlayback } from "./playback.js";
 import { mountRangeBar } from "./range_bar.js";
 import { mountTimeline } from "./timeline.js";
 import { curveBindings, drawerBindings, frameBindings, queueBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
@@ -29,13 +29,13 @@ import { mountTransport } from "./transport.js";
  * @param {import("../posing/index.js").PosingRoom} posing
  */
 export function mount({ store, actions, navigation, reasons, say }, { grid }, { curveEdits }) {
-  const playback = new Playback(store, navigation);
+  const playback = makePlayback(store, navigation);
   const queue = new DoubtQueue(store, navigation, actions, grid);
   const jumps = new Jumps(store, navigation, (frame) => queue.arriveAt(frame));
   const frameWindow = new FrameWindow(store);
   mountTransport(store, navigation, playback, actions);
   mountTrackBar(store, actions);
-  const drawer = new Drawer(store);
+  const drawer = mountDrawer(store);
   mountRangeBar(store, actions, () => drawer.open("runs"));
   mountJumpMenu(store, jumps, () => drawer.open("doubts"));
   mountDoubtList(store, queue);

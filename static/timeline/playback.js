@@ -12,87 +12,82 @@ const MAX_REST_MS = 100;
 /** Playback speeds relative to real time. */
 const RATES = [1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
 
-export class Playback {
-  #store;
-  #navigation;
+/** @typedef {ReturnType<typeof makePlayback>} Playback */
+
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../model/navigation.js").Navigation} navigation
+ */
+export function makePlayback(store, navigation) {
   /** Frame and time from which due frames are counted. */
-  #anchor = { frame: 0, time: 0 };
-  #ticked = 0;
+  let anchor = { frame: 0, time: 0 };
+  let ticked = 0;
   /** The frame requested last. */
-  #requested = 0;
+  let requested = 0;
   /** Timer of the next look at the clock. */
-  #timer = 0;
+  let timer = 0;
+  store.on(["rate", "everyFrame"], () => (anchor = here()));
+  store.on(["shown"], () => store.facts.playing && tick(performance.now()));
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("../model/navigation.js").Navigation} navigation
-   */
-  constructor(store, navigation) {
-    this.#store = store;
-    this.#navigation = navigation;
-    store.on(["rate", "everyFrame"], () => (this.#anchor = this.#here()));
-    store.on(["shown"], () => store.facts.playing && this.#tick(performance.now()));
-  }
-
-  toggle() {
-    const { playing, session, connected, target } = this.#store.facts;
-    if (playing || !session || !connected) return this.#navigation.pause();
-    const { first, last } = this.#interval;
+  function toggle() {
+    const { playing, session, connected, target } = store.facts;
+    if (playing || !session || !connected) return navigation.pause();
+    const { first, last } = getInterval();
     const isOutside = target < first || target >= last;
-    this.#store.set({ playing: true });
-    this.#anchor = { frame: isOutside ? first : target, time: performance.now() };
-    this.#ticked = performance.now();
-    this.#ask(this.#anchor.frame);
-    this.#rest();
+    store.set({ playing: true });
+    anchor = { frame: isOutside ? first : target, time: performance.now() };
+    ticked = performance.now();
+    ask(anchor.frame);
+    rest();
   }
 
-  toggleLoop() {
-    this.#store.set({ loops: !this.#store.facts.loops });
+  function toggleLoop() {
+    store.set({ loops: !store.facts.loops });
   }
 
-  toggleEveryFrame() {
-    this.#store.set({ everyFrame: !this.#store.facts.everyFrame });
+  function toggleEveryFrame() {
+    store.set({ everyFrame: !store.facts.everyFrame });
   }
 
   /** @param {1 | -1} way to the next faster or slower speed */
-  changeRate(way) {
-    const at = RATES.indexOf(this.#store.facts.rate);
-    this.#store.set({ rate: RATES[Math.max(0, Math.min(RATES.length - 1, at + way))] });
+  function changeRate(way) {
+    const at = RATES.indexOf(store.facts.rate);
+    store.set({ rate: RATES[Math.max(0, Math.min(RATES.length - 1, at + way))] });
   }
 
   /** @param {number} rate one of `RATES` */
-  setRate(rate) {
-    if (RATES.includes(rate)) this.#store.set({ rate });
+  function setRate(rate) {
+    if (RATES.includes(rate)) store.set({ rate });
   }
 
   /** First and last frame to play: the marked range in a loop, else the whole recording. */
-  get #interval() {
-    const { session, range, loops } = this.#store.facts;
+  function getInterval() {
+    const { session, range, loops } = store.facts;
     return loops && range ? range : { first: 0, last: (session?.n_frames ?? 1) - 1 };
   }
 
-  #here() {
-    return { frame: this.#store.facts.target, time: performance.now() };
+  function here() {
+    return { frame: store.facts.target, time: performance.now() };
   }
 
   /**
    * Rest until the next frame is due. An animation frame each time the screen is drawn would have the browser lay out and
    * compose the page again, also where nothing changes.
    */
-  #rest() {
-    const { session, rate, target } = this.#store.facts;
-    const nextMs = this.#anchor.time + ((target + 1 - this.#anchor.frame) * 1000) / ((session?.fps ?? 1) * rate) - performance.now();
-    const restMs = Math.min(MAX_REST_MS, this.#navigation.isWaiting ? MAX_REST_MS : nextMs - ANIMATION_FRAME_MS);
-    clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => requestAnimationFrame((now) => this.#tick(now)), restMs);
+  function rest() {
+    const { session, rate, target } = store.facts;
+    const nextMs = anchor.time + ((target + 1 - anchor.frame) * 1000) / ((session?.fps ?? 1) * rate) - performance.now();
+    const restMs = Math.min(MAX_REST_MS, navigation.isWaiting ? MAX_REST_MS : nextMs - ANIMATION_FRAME_MS);
+    clearTimeout(timer);
+    timer = setTimeout(() => requestAnimationFrame((now) => tick(now)), restMs);
   }
 
   /** @param {number} now */
-  #tick(now) {
-    const { playing, session } = this.#store.facts;
+  function tick(now) {
+    const { playing, session } = store.facts;
     if (!playing || !session) return;
-    this.#advance(now, session);
-    this.#rest();
+    advance(now, session);
+    rest();
   }
 
   /**
@@ -101,35 +96,37 @@ export class Playback {
    * @param {number} now
    * @param {import("../model/protocol.js").SessionMessage} session
    */
-  #advance(now, session) {
-    const { rate, everyFrame, target, loops } = this.#store.facts;
+  function advance(now, session) {
+    const { rate, everyFrame, target, loops } = store.facts;
     // A hidden tab draws nothing, and the user may have gone elsewhere: continue from the current frame.
     // The next frame is due now, so that slow machines still make progress.
-    if (now - this.#ticked > GAP_MS) this.#anchor = { frame: target + 1, time: now };
-    if (target !== this.#requested) {
-      this.#requested = target;
-      this.#anchor = this.#here();
+    if (now - ticked > GAP_MS) anchor = { frame: target + 1, time: now };
+    if (target !== requested) {
+      requested = target;
+      anchor = here();
     }
-    this.#ticked = now;
-    if (this.#navigation.isWaiting) return;
-    const { first, last } = this.#interval;
-    let due = this.#anchor.frame + Math.floor(((now - this.#anchor.time) * session.fps * rate) / 1000);
+    ticked = now;
+    if (navigation.isWaiting) return;
+    const { first, last } = getInterval();
+    let due = anchor.frame + Math.floor(((now - anchor.time) * session.fps * rate) / 1000);
     if (everyFrame && due > target + 1) {
       due = target + 1;
-      this.#anchor = { frame: due, time: now }; // late frames are not made up for
+      anchor = { frame: due, time: now }; // late frames are not made up for
     }
     if (due > last || (due >= last && !loops)) {
-      if (loops) this.#anchor = { frame: first, time: now };
-      else this.#navigation.pause();
-      this.#ask(loops ? first : last);
+      if (loops) anchor = { frame: first, time: now };
+      else navigation.pause();
+      ask(loops ? first : last);
     } else if (due > target) {
-      this.#ask(due);
+      ask(due);
     }
   }
 
   /** @param {number} frame */
-  #ask(frame) {
-    this.#requested = frame;
-    this.#navigation.request(frame);
+  function ask(frame) {
+    requested = frame;
+    navigation.request(frame);
   }
+
+  return { toggle, toggleLoop, toggleEveryFrame, changeRate, setRate };
 }

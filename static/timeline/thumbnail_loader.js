@@ -4,26 +4,22 @@ const AT_ONCE = 2;
 /** The program makes no thumbnails while it compiles or when too many wait. */
 const RETRY_MS = 3000;
 
-export class ThumbnailLoader {
+/** @param {HTMLElement} scroller contains the images */
+export function makeThumbnailLoader(scroller) {
   /** @type {Set<HTMLImageElement>} visible images that wait for their turn */
-  #waiting = new Set();
-  #loading = 0;
-  #observer;
-
-  /** @param {HTMLElement} scroller contains the images */
-  constructor(scroller) {
-    this.#observer = new IntersectionObserver(
-      (entries) => {
-        for (const { target, isIntersecting } of entries) {
-          const image = /** @type {HTMLImageElement} */ (target);
-          if (isIntersecting && !image.src) this.#waiting.add(image);
-          else this.#waiting.delete(image);
-        }
-        this.#next();
-      },
-      { root: scroller, rootMargin: "80px" },
-    );
-  }
+  const waiting = new Set();
+  let loading = 0;
+  const observer = new IntersectionObserver(
+    (entries) => {
+      for (const { target, isIntersecting } of entries) {
+        const image = /** @type {HTMLImageElement} */ (target);
+        if (isIntersecting && !image.src) waiting.add(image);
+        else waiting.delete(image);
+      }
+      next();
+    },
+    { root: scroller, rootMargin: "80px" },
+  );
 
   /**
    * Load an image when it becomes visible.
@@ -31,37 +27,39 @@ export class ThumbnailLoader {
    * @param {HTMLImageElement} image
    * @param {string} url
    */
-  watch(image, url) {
+  function watch(image, url) {
     image.dataset.url = url;
-    this.#observer.observe(image);
+    observer.observe(image);
   }
 
   /** @param {HTMLImageElement} image that was removed */
-  forget(image) {
-    this.#observer.unobserve(image);
-    this.#waiting.delete(image);
+  function forget(image) {
+    observer.unobserve(image);
+    waiting.delete(image);
   }
 
-  #next() {
-    for (const image of this.#waiting) {
-      if (this.#loading >= AT_ONCE) return;
-      this.#waiting.delete(image);
-      this.#loading += 1;
+  function next() {
+    for (const image of waiting) {
+      if (loading >= AT_ONCE) return;
+      waiting.delete(image);
+      loading += 1;
       const done = () => {
-        this.#loading -= 1;
-        this.#next();
+        loading -= 1;
+        next();
       };
       image.onload = done;
       image.onerror = () => {
         image.removeAttribute("src");
         setTimeout(() => {
           if (!image.isConnected) return;
-          this.#waiting.add(image);
-          this.#next();
+          waiting.add(image);
+          next();
         }, RETRY_MS);
         done();
       };
       image.src = image.dataset.url ?? "";
     }
   }
+
+  return { watch, forget };
 }

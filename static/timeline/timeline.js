@@ -12,7 +12,7 @@ import { statesByFrame } from "../model/tasks.js";
 import { prepare } from "../panes/drawing.js";
 import { describeFrame } from "./cell_text.js";
 import { drawCopy, drawDimmed } from "./cell_marks.js";
-import { CellTip } from "./cell_tip.js";
+import { mountCellTip } from "./cell_tip.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { zoomByWheel } from "./frame_window.js";
 import * as drawing from "./timeline_drawing.js";
@@ -41,7 +41,7 @@ export function mountTimeline(element, { store, navigation, jumps, frameWindow }
   /** Position that stays under the pointer while panning. */
   let held = 0;
   element.append(cellCanvas, cursor);
-  const tip = new CellTip(element);
+  const tip = mountCellTip(element);
   store.on(["session", "annotation", "otherCopy"], () => (element.style.height = `${layout().height}px`));
   store.on([...CELL_FACTS, "visible", "annotation", "otherCopy", "provenanceFilter", "annotators"], drawCells);
   store.on(["target", "session", "range", "visible", "annotation"], drawCursor);

@@ -53,8 +53,8 @@ def crowd(n_people: int, n_cameras: int) -> tuple[Session, State]:
         values[6:] += rng.normal(0.0, 0.2, len(values) - 6)
         shown.append(ShownPose(values, "tracked"))
     state = State(
-        0, tuple(shown), tuple(p.model for p in people), (1,) * n_people, (1,) * n_people,
-        locked=(frozenset(),) * n_people, pins=((),) * n_people,
+        people=tuple(shown), models=tuple(p.model for p in people), revisions=(1,) * n_people,
+        present=(1,) * n_people, locked=(frozenset(),) * n_people, pins=((),) * n_people,
     )  # fmt: skip
     return replace(session, cameras=cameras, people=people), state
 

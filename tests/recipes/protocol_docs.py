@@ -10,6 +10,7 @@ import inspect
 import re
 import sys
 import types
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
@@ -75,7 +76,7 @@ def to_typescript(hint: Any) -> str:
         return " | ".join(f'"{value}"' for value in args)
     if origin in (Union, types.UnionType):
         return " | ".join(to_typescript(a) for a in args if a is not msgspec.UnsetType)
-    if origin is dict:
+    if origin in (dict, Mapping):
         return f"Record<string, {to_typescript(args[1])}>"
     if origin in (list, frozenset) or (origin is tuple and args[-1] is Ellipsis):
         item = to_typescript(args[0])

@@ -60,7 +60,7 @@ class Alternatives:
             whose = f" of {names}" if len(session_state.session.people) > 1 else ""
             label = f"take alternative pose{whose}, frame {session_state.state.frame}"
             edit = session_state.saver.write(label, changes, None, by_program=False)
-            session_state.show_frame(session_state.state.frame)
+            session_state.show_frame()
             session_state.refresh_saving()
         for change in changes:
             self._assess(change, edit)
@@ -107,7 +107,7 @@ class Alternatives:
         others = (*stored[:at], *stored[at + 1 :])
         assert former is not None  # alternatives are stored with a pose
         sources = ("manual",) * len(taken.values)
-        record = PoseRecord(taken.values, sources, taken.model_revision, True, reviewed=True, **costs)
+        record = PoseRecord(taken.values, sources, taken.model_revision, True, reviewed=True, **vars(costs))
         back = Alternative(former.values, former.model_revision, former.cost_px)
         return PoseChange(session_state.session.people[person].name, frame, record, (*others, back))
 

@@ -1,6 +1,6 @@
 """Edit body sizes: first a draft that the views show, then a new model revision, as an entry of the history."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -32,7 +32,6 @@ from tracker.pipeline.body_acquisition import (
 )
 from tracker.pipeline.body_change import joints_off_m, moved_body
 from tracker.pipeline.chain import FOLLOWED
-from tracker.session.locked_dofs import load_locks
 from tracker.session.session import save_model
 from tracker.session.store.records import Change, PoseChange
 from tracker.session.store.stored_poses import StoredPose
@@ -153,14 +152,11 @@ class BodySizeEditing:
             n = len(refitted.changes)
             counted = f", {n} keyframe{'' if n == 1 else 's'} refitted" if n else ""
             outcome = counted if refit else ", poses kept"
-            edit = session_state.saver.write(
-                f"sizes of {name}{outcome}", refitted.changes, None, by_program=False, even_empty=True
-            )
-            self._note_edit(person, edit, before)
+            self._write(f"sizes of {name}{outcome}", refitted.changes, person, before)
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             message = f"Applied{outcome}{off}." + ("" if same or not refit else self._rest(person))
             self._runs.clear()
-            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=message)
+            session_state.show_frame(draft=None, sizes_message=message)
             session_state.refresh_saving()
 
     def change_body(self, person: int, to: str) -> None:
@@ -173,12 +169,9 @@ class BodySizeEditing:
             session_state, name = self._session_state, self._session_state.session.people[person].name
             before, body = session_state.saver.revisions.current(person), moved_body(session_state.session, person, to)
             session_state.set_body_models(save_model(session_state.session, person, body))
-            self._follow_joints()
+            session_state.follow_joints()
             refitted = self._refit(person, {}, with_found=True)
-            edit = session_state.saver.write(
-                f"body of {name}: {body.name}", refitted.changes, None, by_program=False, even_empty=True
-            )
-            self._note_edit(person, edit, before)
+            self._write(f"body of {name}: {body.name}", refitted.changes, person, before)
             n = len(refitted.changes)
             message = f"{name} has the body {body.name}, {n} pose{'' if n == 1 else 's'} refitted."
             n_kept = len(session_state.saver.index.frames(person)) - n
@@ -186,23 +179,16 @@ class BodySizeEditing:
                 message += f" {n_kept} tracked pose{' keeps' if n_kept == 1 else 's keep'} the former body and "
                 message += f"{'is' if n_kept == 1 else 'are'} not shown until tracked again."
             self._runs.clear()
-            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=message)
+            session_state.show_frame(draft=None, sizes_message=message)
             session_state.refresh_saving()
 
-    def _note_edit(self, person: int, edit: int | None, before: int) -> None:
-        """Note that an entry of the history has changed the body of a person from a revision to the present one."""
+    def _write(self, label: str, changes: Sequence[Change], person: int, before: int) -> None:
+        """Make an entry of the history that changes the body of a person from a revision to the present one."""
         saver, name = self._session_state.saver, self._session_state.session.people[person].name
+        edit = saver.write(label, changes, None, by_program=False, even_empty=True)
         if edit is not None and saver.error is None:
             changed = [(name, before, saver.revisions.current(person))]
             saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, changed))
-
-    def _follow_joints(self) -> None:
-        """Select, hold and lock nothing that the present bodies lack."""
-        session_state = self._session_state
-        state, people = session_state.state, session_state.session.people
-        point = state.point if state.point in people[state.person].model.point_names else None
-        held = frozenset(h for h in state.held if h.point in people[h.person].model.point_names)
-        session_state.set(point=point, held=held, locked=load_locks(people, session_state.saver.setting))
 
     def follow(self) -> None:
         """Restore the bodies that belong to the present entry of the history, after a move.
@@ -224,7 +210,7 @@ class BodySizeEditing:
         model = session_state.saver.revisions.body(revision)
         if model is not session_state.present[person]:
             session_state.set_body_models(save_model(session_state.session, person, model))
-            self._follow_joints()
+            session_state.follow_joints()
         self._runs.clear()
         session_state.set(draft=None, sizes_message="")
 
@@ -255,11 +241,8 @@ class BodySizeEditing:
         """
         session_state, saver = self._session_state, self._session_state.saver
         cameras = [c.camera for c in session_state.session.cameras]
-        becomes, revision, name = (
-            session_state.present[person],
-            saver.revisions.current(person),
-            session_state.session.people[person].name,
-        )
+        becomes, name = session_state.present[person], session_state.session.people[person].name
+        revision = saver.revisions.current(person)
         changes: list[Change] = []
         off_m: list[float] = []
         for row in saver.rows(person, range(session_state.session.n_frames)):

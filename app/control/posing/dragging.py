@@ -161,13 +161,13 @@ class Dragging:
         if grab is None or drag is None:
             return
         self._scores_moves = False
-        session_state.set(**session_state.costs(session_state.state.poses))
+        session_state.set(**vars(session_state.costs(session_state.state.poses)))
         has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
             self._save(drag, grab)
             self._hold(drag)
         elif not session_state.is_shown_stored(session_state.state):
-            session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source
+            session_state.show_frame()  # moved back: the pose has its former source
         self._gesture_grab = self._mode_grab = session_state.open_edit_owner = None
         session_state.set(drag=None)
         if has_moved:
@@ -205,7 +205,7 @@ class Dragging:
         costs = session_state.costs(scored.poses)
         with session_state.lock:
             if session_state.state.drag is not None and session_state.state.people is scored.people:
-                session_state.set(**costs)
+                session_state.set(**vars(costs))
 
 
 def _shortfall(grabbed: Grab, pointer_px: Array, values: Array, mode: str) -> tuple[float, tuple[float, float] | None]:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from app.control.posing.depth_check import note_unseen_depth
 from app.control.session.activities import Activities
 from app.control.session.comparing import note_comparison
-from app.control.session.session_state import Pins, SessionState
+from app.control.session.frame_poses import Pins
+from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
 from tracker.body.limbs import display_name, limb_display_name
 from tracker.body.model import PosedBody
@@ -75,9 +76,8 @@ class Pinning:
         session = self._session_state.session
         if not (0 <= frame < session.n_frames and 0 <= camera < len(session.cameras)):
             return
-        if not (
-            0 <= person < len(self._session_state.models) and point in self._session_state.models[person].point_names
-        ):
+        models = self._session_state.models
+        if not (0 <= person < len(models) and point in models[person].point_names):
             return
         source = session.cameras[camera].camera
         if not _is_shown(source, position_px):
@@ -105,10 +105,9 @@ class Pinning:
             position_px = _clipped(position_px, source.pinhole.size)
             if not _is_shown(source, position_px):
                 return
-            pins = _with_pin(
-                self._session_state.state.pins, drag.person, PointObservation(drag.point, drag.camera, position_px)
-            )
-            if pins == self._session_state.state.pins:
+            before = self._session_state.state.pins
+            pins = _with_pin(before, drag.person, PointObservation(drag.point, drag.camera, position_px))
+            if pins == before:
                 return  # a click only sets it
             if drag.live:
                 self._show_fit([drag.person], [drag.person], drag.people, pins)
@@ -255,18 +254,9 @@ class Pinning:
         if dofs is not None:
             constraints = [replace(c, active_dofs=session_state.active_dofs(i) & dofs) if i in fitted else c
                            for i, c in enumerate(constraints)]  # fmt: skip
-        found = fit_frame(
-            [
-                PosedBody(m, p.values, session_state.state.velocity(i))
-                for i, (m, p) in enumerate(zip(session_state.models, start, strict=True))
-            ],
-            self._timed(pins),
-            cameras,
-            views,
-            session_state.state.settings,
-            fitted,
-            constraints,
-        )
+        state, moving = session_state.state, map(session_state.state.velocity, range(len(start)))
+        bodies = [*map(PosedBody, session_state.models, (p.values for p in start), moving)]
+        found = fit_frame(bodies, self._timed(pins), cameras, views, state.settings, fitted, constraints)
         people = list(start)
         for person in fitted:
             free = session_state.free_sources(person, "fitted")
@@ -280,7 +270,7 @@ class Pinning:
             source = "pinned" if pins[person] else "fitted"
             people[person] = ShownPose(found.poses[person], source, *doubt, sources=sources)
         costs = session_state.costs(tuple(p.values for p in people))
-        session_state.set(people=tuple(people), pins=pins, **costs)
+        session_state.set(people=tuple(people), pins=pins, **vars(costs))
 
     def _timed(self, pins: Pins) -> list[list[PointObservation]]:
         """Return the pins of all people with the times of their pictures."""

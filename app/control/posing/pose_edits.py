@@ -5,6 +5,7 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
@@ -54,8 +55,7 @@ class PoseEdits:
         Raises:
             TrackerError: it is locked.
         """
-        with self._on(person, frame) as model:
-            before = self._session_state.state.poses[person]
+        with self._on(person, frame) as (model, before, _):
             by = value - model.difference(before, model.neutral())[dof]
             self._move(person, [dof], by, before, f"set {display_name(model.dof_names[dof])}", ("dof", dof))
 
@@ -70,8 +70,8 @@ class PoseEdits:
         if not is_known or len(set(dofs)) < len(dofs) or not np.isfinite(values).all():
             raise TrackerError("expected finite values of the body's degrees of freedom, found others; reload the page")
         require_unlocked(models[person], self._session_state.state.locked[person], dofs)
-        with self._on(person, None) as model:
-            (moved,) = poses_along(model, self._session_state.state.poses[person], dofs, np.array([values]))
+        with self._on(person, None) as (model, before, _):
+            (moved,) = poses_along(model, before, dofs, np.array([values]))
             names = " and ".join(display_name(model.dof_names[d]) for d in dofs)
             self._apply(person, model.clip(moved), f"set {names}")
 
@@ -81,13 +81,11 @@ class PoseEdits:
         Raises:
             TrackerError: it is not a pose of the person's body.
         """
-        with self._on(person, frame) as model:
+        with self._on(person, frame) as (model, before, free):
             if values.shape != (len(model.value_names),) or not np.isfinite(values).all():
                 found = values.shape if np.isfinite(values).all() else "numbers that are not finite"
                 n = len(model.value_names)
                 raise TrackerError(f"expected the {n} values of '{model.name}', found {found}; see its value_names")
-            free = self._session_state.active_dofs(person)
-            before = self._session_state.state.poses[person]
             self._apply(person, copy_dofs(model, before, model.clip(values), free), "set pose")
 
     def turn(
@@ -106,10 +104,10 @@ class PoseEdits:
         Raises:
             TrackerError: one of them is locked.
         """
-        with self._on(person, frame) as model:
+        with self._on(person, frame) as (model, before, _):
             state = self._session_state.state
             if self._dragged[0] != (drag, person, state.frame) or drag is None:
-                self._dragged = (drag, person, state.frame), state.poses[person]
+                self._dragged = (drag, person, state.frame), before
             name = display_name(model.dof_names[dofs[0]]) if len(dofs) == 1 else f"{len(dofs)} curves"
             label, gesture = f"{'nudge' if drag is None else 'drag'} {name}", ("dof", *dofs, drag)
             self._move(person, dofs, by, self._dragged[1], label, gesture, lasting=drag is not None)
@@ -137,9 +135,8 @@ class PoseEdits:
         Raises:
             TrackerError: the point is behind the camera, or all degrees of freedom that move it are locked.
         """
-        with self._on(person, frame) as model:
+        with self._on(person, frame) as (model, values, _):
             view = self._session_state.session.cameras[camera].camera.pinhole
-            values = self._session_state.state.poses[person]
             name = model.point_names[0] if point is None else point
             place = model.points_world(values)[model.point_names.index(name)]
             step = view.T_world_camera[:3, :3] @ np.array([right_m, -up_m, 0.0])
@@ -161,8 +158,7 @@ class PoseEdits:
             position_world: target of the root, (3,), metres; None leaves it.
             gesture: changes of one gesture make one entry of the history.
         """
-        with self._on(person, None) as model:
-            values, free = self._session_state.state.poses[person], self._session_state.active_dofs(person)
+        with self._on(person, None) as (model, values, free):
             T = model.kinematics(values).Ts_world_part[part]
             if position_world is not None:
                 step = np.zeros(model.n_dofs)
@@ -174,13 +170,8 @@ class PoseEdits:
 
     def mirror(self, person: int, frame: int | None = None) -> None:
         """Mirror the pose in the body's plane of symmetry."""
-        with self._on(person, frame) as model:
-            values = self._session_state.state.poses[person]
-            self._apply(
-                person,
-                copy_dofs(model, values, mirror_pose(model, values), self._session_state.active_dofs(person)),
-                "mirror",
-            )
+        with self._on(person, frame) as (model, values, free):
+            self._apply(person, copy_dofs(model, values, mirror_pose(model, values), free), "mirror")
 
     def copy_from(self, person: int, other: int, frame: int | None = None) -> None:
         """Copy the stored pose of another frame.
@@ -188,7 +179,7 @@ class PoseEdits:
         Raises:
             TrackerError: the person has no pose there.
         """
-        with self._on(person, frame) as model:
+        with self._on(person, frame) as (model, values, free):
             stored = self._session_state.saver.pose(person, other)
             if stored is None:
                 name = self._session_state.session.people[person].name
@@ -197,10 +188,7 @@ class PoseEdits:
                 )
             assert stored.revision is not None
             copied = retarget_pose(stored.values, self._session_state.saver.revisions.body(stored.revision), model)
-            values = copy_dofs(
-                model, self._session_state.state.poses[person], copied, self._session_state.active_dofs(person)
-            )
-            self._apply(person, values, f"copy frame {other}")
+            self._apply(person, copy_dofs(model, values, copied, free), f"copy frame {other}")
 
     def copy_person(self, person: int, other: int, frame: int | None = None) -> None:
         """Copy the joint angles of another person on the same frame, by joint name; the root stays.
@@ -210,27 +198,25 @@ class PoseEdits:
         """
         if other == person or not 0 <= other < len(self._session_state.models):
             raise TrackerError(f"expected another person to copy the pose of, found number {other}; choose another")
-        with self._on(person, frame) as model:
-            values, body = self._session_state.state.poses, self._session_state.models[other]
-            bent = copy_joint_angles(
-                model, values[person], body, values[other], self._session_state.active_dofs(person)
-            )
+        with self._on(person, frame) as (model, values, free):
+            body, others = self._session_state.models[other], self._session_state.state.poses[other]
+            bent = copy_joint_angles(model, values, body, others, free)
             self._apply(person, bent, f"copy the pose of {self._session_state.session.people[other].name}")
 
     def reset(self, person: int, point: str | None, frame: int | None = None) -> None:
         """Reset the limb of a point to the neutral pose; without a point, or for the root, all but the root."""
-        with self._on(person, frame) as model:
+        with self._on(person, frame) as (model, values, free):
             limb, dofs = limb_of(model, point)
-            dofs = dofs & self._session_state.active_dofs(person)
-            values = copy_dofs(model, self._session_state.state.poses[person], model.neutral(), dofs)
-            self._apply(person, values, f"reset {limb_display_name(limb)}")
+            neutral = copy_dofs(model, values, model.neutral(), dofs & free)
+            self._apply(person, neutral, f"reset {limb_display_name(limb)}")
 
     @contextmanager
-    def _on(self, person: int, frame: int | None) -> Generator[BodyModel, None, None]:
-        """Edit the frame that the user saw; yields the person's model."""
+    def _on(self, person: int, frame: int | None) -> Generator[tuple[BodyModel, Array, NDArray[np.bool_]], None, None]:
+        """Edit the frame that the user saw; yields the person's model, pose and unlocked degrees of freedom."""
+        session_state = self._session_state
         with self._activities.editing():
-            self._session_state.go_to(frame)
-            yield self._session_state.models[person]
+            session_state.go_to(frame)
+            yield session_state.models[person], session_state.state.poses[person], session_state.active_dofs(person)
 
     def _move(
         self, person: int, dofs: Sequence[int], by: Array | float, before: Array, label: str, gesture: object,

@@ -55,7 +55,7 @@ class Replay:
                 candidate = None if run.is_contour_fit else run.poses_of(recorded.candidate)
                 best, stage = run.poses_of(recorded.best), run.stages[recorded.stage].name
                 px, evaluations = recorded.candidate_px, recorded.evaluations
-            costs = self._session_state.costs(best)
+            costs = vars(self._session_state.costs(best))
             shown = ReplayState(
                 number, at, len(run.steps), candidate, best, stage, px, evaluations, **costs, fitted_from=fitted_from
             )
@@ -125,7 +125,7 @@ class Replay:
             p if p.source is not None and np.array_equal(p.values, new) else ShownPose(new, "searched")
             for p, new in zip(session_state.state.people, poses, strict=True)
         )
-        session_state.set(people=people, **session_state.costs(poses))
+        session_state.set(people=people, **vars(session_state.costs(poses)))
         session_state.save(label, "searched")
 
     def _run(self, number: int) -> SearchRun:

@@ -193,7 +193,7 @@ class SearchRunner:
                 p if p.values is v else ShownPose(v, p.source) for p, v in zip(state.people, poses, strict=True)
             )
             plan = None if contours is None else FitPlan(models, free, contours == "chains")
-            known_px = np.nan if plan is not None or costs["cost_px"] is None else costs["cost_px"]
+            known_px = np.nan if plan is not None or costs.cost_px is None else costs.cost_px
             planned = None if plan is None else plan.stages
             run = self._runs.add(SearchRun(frame, models, poses, known_px, settings, free, planned))
             subjects = Subjects.of(models, active_dofs=free)
@@ -235,10 +235,10 @@ class SearchRunner:
             shown = replace(
                 session_state.state.search, running=job.running, kind="search", stage=step.stage.name,
                 evaluations=step.evaluations,
-                best_px=costs["cost_px"], candidate=step.candidate, message="",
+                best_px=costs.cost_px, candidate=step.candidate, message="",
             )  # fmt: skip
             changed = any(a is not b for a, b in zip(people, session_state.state.people, strict=True))
-            session_state.set(people=people, search=shown, search_view=self._compared_with(self._run), **costs)
+            session_state.set(people=people, search=shown, search_view=self._compared_with(self._run), **vars(costs))
             if changed and time.monotonic() - session_state.last_save > _SAVE_S:
                 session_state.save("search", "searched", job)
 
@@ -286,7 +286,7 @@ class SearchRunner:
         """Compare the shown poses with those before the search."""
         if self._before is not None:
             before, costs = self._before
-            if costs["cost_px"] is None:  # the evidence came with the first step
+            if costs.cost_px is None:  # the evidence came with the first step
                 self._before = before, costs = before, self._session_state.costs(tuple(p.values for p in before))
             moved = [person for person in range(len(before)) if not self._is_fixed(person)]
             note_comparison(self._session_state, "search", before, costs, moved)

@@ -47,7 +47,6 @@ class Annotating:
         session_state.set(annotation=replace(session_state.state.annotation, author=author))
         if reader is not None:
             return
-        self._seen = -1
         self._reading = threading.Lock()  # the last reading that begins is the last one shown
         self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._read, "plan of annotation", _REST_S)
         session_state.subscribe(self._changed, "timeline_version")
@@ -102,7 +101,7 @@ class Annotating:
                 mark = MarkChange(name, frame, keyframe=False, reviewed=True)
                 session_state.saver.write(label, [mark], None, by_program=False)
                 session_state.note_moved()
-                session_state.show_frame(session_state.state.frame)
+                session_state.show_frame()
                 session_state.refresh_saving()
         self._decide(name, frame, "verified", seen=seen)
 
@@ -175,9 +174,7 @@ class Annotating:
         self._read(0)
 
     def _changed(self, state: State) -> None:
-        if state.timeline_version != self._seen:
-            self._seen = state.timeline_version
-            self._latest.offer(state.timeline_version)
+        self._latest.offer(state.timeline_version)
 
     def _read(self, _: int) -> None:
         """Read the plan into the state."""

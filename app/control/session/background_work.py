@@ -61,7 +61,7 @@ class BackgroundWork:
         """
         with self._session_state.lock:
             self.require_free()
-            self._session_state.set_part(self._part, replace(begin, running=True, stage="starting"))
+            self._show(replace(begin, running=True, stage="starting"))
             self._stopping.clear()
         self._thread = threading.Thread(target=self._work, args=(run,), name=self._name, daemon=True)
         self._thread.start()
@@ -81,7 +81,10 @@ class BackgroundWork:
     def set(self, **changes: Any) -> None:
         """Change values of the part."""
         with self._session_state.lock:
-            self._session_state.set_part(self._part, replace(self.state, **changes))
+            self._show(replace(self.state, **changes))
+
+    def _show(self, part: Any) -> None:
+        self._session_state.set(**{self._part: part})
 
     def report(self, stage: str, share: float, text: str = "", /) -> None:
         """Show progress.

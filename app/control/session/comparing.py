@@ -95,8 +95,8 @@ def note_comparison(
         before=before,
         after=state.poses,
         revisions=state.revisions,
-        before_px=costs["cost_px"],
-        before_view_costs_px=costs["view_costs_px"],
+        before_px=costs.cost_px,
+        before_view_costs_px=costs.view_costs_px,
         after_px=state.cost_px,
         after_view_costs_px=state.view_costs_px,
     )

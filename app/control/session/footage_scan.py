@@ -55,7 +55,7 @@ class FootageScan:
         if found != before:
             with session_state.lock:
                 # The evidence may have been computed by the attempt to read it again.
-                session_state.set(footage=found, **session_state.costs(session_state.state.poses))
+                session_state.set(footage=found, **vars(session_state.costs(session_state.state.poses)))
                 session_state.request_evidence()
         if error is not None:
             return _RETRY_S

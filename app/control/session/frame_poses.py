@@ -39,8 +39,8 @@ class FramePoses:
             for i, person in enumerate(session.people)
         )
 
-    def people(self, frame: int) -> ShownFrame:
-        """Return the stored poses of a frame; a person without one is shown in the pose of the nearest frame."""
+    def shown(self, frame: int) -> ShownFrame:
+        """Return what is stored of a frame; a person without a pose is shown in that of the nearest frame."""
         people: list[ShownPose] = []
         for person, default in enumerate(self._default_poses):
             stored = self._saver.pose(person, frame)
@@ -51,7 +51,10 @@ class FramePoses:
                 people.append(ShownPose(default if nearest is None else nearest, None))
         present = tuple(self._saver.revisions.current(person) for person in range(len(people)))
         models, revisions = self.bodies(people)
-        return {"people": tuple(people), "models": models, "revisions": revisions, "present": present}
+        return ShownFrame(
+            frame=frame, people=tuple(people), models=models, revisions=revisions, present=present,
+            velocities=self.velocities(frame), pins=self.pins(frame),
+        )  # fmt: skip
 
     def bodies(self, shown: Sequence[ShownPose]) -> tuple[tuple[BodyModel, ...], tuple[int, ...]]:
         """Return the bodies of poses and their model revisions; poses that are not stored have the present body."""

@@ -71,5 +71,5 @@ class History:
                 for follow in self._follow:
                     follow()
             finally:
-                self._session_state.show_frame(min(changed, key=lambda frame: abs(frame - here), default=here))
+                self._session_state.show_frame(frame=min(changed, key=lambda frame: abs(frame - here), default=here))
                 self._session_state.refresh_saving()

@@ -130,7 +130,7 @@ class OtherCopies:
             record = session_state.saver.record(person, frame)
             assert record is not None, "the decision has a pose"
             session_state.set(other_copy=replace(copy, decided={**copy.decided, (person, frame): record.values}))
-            session_state.show_frame(frame)
+            session_state.show_frame(frame=frame)
             session_state.refresh_saving()
         if isinstance(change, PoseChange):
             self._assess(change, edit)

@@ -5,17 +5,17 @@ import time
 from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import TypeVar, Unpack
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.control.session.frame_poses import FramePoses, Pins
+from app.control.session.frame_poses import FramePoses
 from app.remedies import page_text
 from app.session.frame_cache import FrameCache
 from app.state.people import ShownPose, is_same_pose
 from app.state.search import SearchView
-from app.state.state import Costs, State, StateChanges, finite_or_none
+from app.state.state import Costs, ShownFrame, State, finite_or_none, takes_changes_of
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.interpretation import interpreted
@@ -64,7 +64,7 @@ class SessionState:
         self.frame_poses = FramePoses(session, saver)
         """Loads the poses of a frame."""
         self._subscribers: list[tuple[Callable[[State], None], frozenset[str]]] = []
-        self._stored: tuple[tuple[ShownPose, ...], Pins] | None = None  # the shown poses and pins that are on disk
+        self._stored: ShownFrame | None = None  # the shown poses and pins that are on disk
         self.unwritten: list[Callable[[], bool]] = []
         """Functions that return whether a part of the controller holds poses that it has not saved yet."""
         self.edit: int | None = None
@@ -74,12 +74,11 @@ class SessionState:
         self.last_save = 0.0
         """Time of the last save, s of the monotonic clock."""
         unlocked = (frozenset[int](),) * len(session.people)
-        shown = self.frame_poses.people(0)
-        self.state = State(frame=0, pins=self.frame_poses.pins(0), locked=unlocked, compiled=compiled, **shown)
+        self.state = State(locked=unlocked, compiled=compiled, **vars(self.frame_poses.shown(0)))
         self.note_stored()
         self.refresh_saving()
         self.request_evidence()
-        self.set(**self.costs(self.state.poses))  # others may have needed the evidence before
+        self.set(**vars(self.costs(self.state.poses)))  # others may have needed the evidence before
 
     @property
     def models(self) -> tuple[BodyModel, ...]:
@@ -161,12 +160,16 @@ class SessionState:
         self.session = session
         self.saver.follow_session(session)
         self.frame_poses.place(session)
-        names = [p.model.point_names for p in session.people]
-        point = self.state.point if self.state.point in names[self.state.person] else None
-        held = frozenset(h for h in self.state.held if h.point in names[h.person])
         floor = replace(self.state.floor, up=session.up, plane=session.floor, picking=None)
-        locked = load_locks(session.people, self.saver.setting)
-        self.show_frame(self.state.frame, point=point, held=held, floor=floor, locked=locked, draft=None)
+        self.follow_joints()
+        self.show_frame(floor=floor, draft=None)
+
+    def follow_joints(self) -> None:
+        """Select, hold and lock nothing that the present bodies lack."""
+        people, state = self.session.people, self.state
+        point = state.point if state.point in people[state.person].model.point_names else None
+        held = frozenset(h for h in state.held if h.point in people[h.person].model.point_names)
+        self.set(point=point, held=held, locked=load_locks(people, self.saver.setting))
 
     def subscribe(self, view: Callable[[State], None], *fields: str) -> Callable[[], None]:
         """Call a view with each state in which one of these fields is new; returns the function that ends this.
@@ -186,11 +189,8 @@ class SessionState:
 
         return unsubscribe
 
-    def set_part(self, part: str, value: object) -> None:
-        """Change the field of that name; its type is the caller's."""
-        self.set(**{part: value})  # pyrefly: ignore[bad-argument-type]
-
-    def set(self, **changes: Unpack[StateChanges]) -> None:
+    @takes_changes_of(State)
+    def set(self, **changes: Any) -> None:
         """Change fields of the state and call the views.
 
         A new frame brings its pins unless they are given, and ends replay, preview and comparison of recorded searches.
@@ -211,45 +211,40 @@ class SessionState:
                 if not fields or new & fields:
                     view(self.state)
 
-    def show_frame(self, frame: int, /, **changes: Unpack[StateChanges]) -> None:
-        """Show the stored poses of a frame, with other changes; the next save makes a new entry of the history."""
-        self.open_edit_owner = None
-        shown, velocities = self.frame_poses.people(frame), self.frame_poses.velocities(frame)
-        costs = self.costs(tuple(p.values for p in shown["people"]), frame, shown["models"], velocities)
-        loaded: StateChanges = {
-            "frame": frame, "pins": self.frame_poses.pins(frame), "velocities": velocities, **shown, **costs
-        }  # fmt: skip
-        no_gesture: StateChanges = {"drag": None, "is_pin_held": False}
-        after: StateChanges = {**loaded, **no_gesture, **changes}
-        self._stored = loaded["people"], loaded["pins"]
-        self.set(**after)
-        self.request_evidence()
+    @takes_changes_of(State)
+    def show_frame(self, **changes: Any) -> None:
+        """Show the stored poses of a frame, by default the shown one, with other changes; ends gestures.
 
-    def show_again(self) -> None:
-        """Show the stored poses of the shown frame in place of others."""
-        self.show_frame(self.state.frame)
+        The next save makes a new entry of the history.
+        """
+        self.open_edit_owner = None
+        self._stored = shown = self.frame_poses.shown(changes.get("frame", self.state.frame))
+        costs = self.costs(tuple(p.values for p in shown.people), shown.frame, shown.models, shown.velocities)
+        loaded: dict[str, Any] = {**vars(shown), **vars(costs), "drag": None, "is_pin_held": False}
+        self.set(**loaded | changes)
+        self.request_evidence()
 
     def take_over(self) -> bool:
         """Show what others have stored of the shown frame, and return whether anything is new.
 
         The others leave poses alone that change here, so that these stay as they are shown.
         """
-        state, (stored, stored_pins) = self.state, self._stored or (self.state.people, self.state.pins)
-        loaded, pins = self.frame_poses.people(state.frame), self.frame_poses.pins(state.frame)
-        new = [not is_same_pose(*pair) for pair in zip(stored, loaded["people"], strict=True)]
-        new_pins = [now != before for now, before in zip(pins, stored_pins, strict=True)]
+        state, stored = self.state, self._stored or self.state
+        loaded = self.frame_poses.shown(state.frame)
+        new = [not is_same_pose(*pair) for pair in zip(stored.people, loaded.people, strict=True)]
+        new_pins = [now != before for now, before in zip(loaded.pins, stored.pins, strict=True)]
         if not any(new + new_pins):
             return False
-        people = chosen(new, loaded["people"], state.people)
-        models = chosen(new, loaded["models"], state.models)
-        self._stored = chosen(new, loaded["people"], stored), pins
+        people = chosen(new, loaded.people, state.people)
+        models = chosen(new, loaded.models, state.models)
+        self._stored = replace(loaded, people=chosen(new, loaded.people, stored.people))
         self.set(
             people=people,
             models=models,
-            revisions=chosen(new, loaded["revisions"], state.revisions),
-            present=loaded["present"],
-            pins=chosen(new_pins, pins, state.pins),
-            **self.costs(tuple(p.values for p in people), state.frame, models),
+            revisions=chosen(new, loaded.revisions, state.revisions),
+            present=loaded.present,
+            pins=chosen(new_pins, loaded.pins, state.pins),
+            **vars(self.costs(tuple(p.values for p in people), state.frame, models)),
         )
         return True
 
@@ -276,7 +271,7 @@ class SessionState:
             self.set(compiled=stages)
             self.request_evidence()
             if "cost" in stages:  # a cost that was interpreted stays until then
-                self.set(**self.costs(self.state.poses))
+                self.set(**vars(self.costs(self.state.poses)))
 
     def costs(
         self,
@@ -298,7 +293,7 @@ class SessionState:
         """
         views = self.frames.cached_evidence(self.state.frame if frame is None else frame)
         if views is None or "cost" not in self.state.compiled:
-            return {"cost_px": None, "view_costs_px": ()}
+            return Costs()
         moving = self.state.velocities if velocities is None else velocities
         return self._scored(views, models or self.models, poses, moving)
 
@@ -313,22 +308,21 @@ class SessionState:
             costs = self._scored(views, models, scored.poses, scored.velocities)
         with self.lock:
             if self.state.people is scored.people and self.state.frame == scored.frame:
-                self.set(**costs)
+                self.set(**vars(costs))
 
     def _scored(
         self, views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array],
         velocities: Sequence[Array | None],
     ) -> Costs:  # fmt: skip
         cost = frame_cost(views, [*map(PosedBody, models, poses, velocities or [None] * len(poses))])
-        return {
-            "cost_px": finite_or_none(cost.total_px),
-            "view_costs_px": tuple(finite_or_none(c) for c in cost.view_costs_px),
-        }
+        return Costs(
+            cost_px=finite_or_none(cost.total_px), view_costs_px=tuple(finite_or_none(c) for c in cost.view_costs_px)
+        )
 
     def show_pose(self, person: int, values: Array) -> None:
         """Show a person in a pose set by hand, (n_values,), with its cost."""
         people = self.people_with_pose(person, values)
-        self.set(people=people, **self.costs(tuple(p.values for p in people)))
+        self.set(people=people, **vars(self.costs(tuple(p.values for p in people))))
 
     def people_with_pose(self, person: int, values: Array) -> tuple[ShownPose, ...]:
         """Return the shown people, one of them in a pose set by hand, (n_values,)."""
@@ -339,13 +333,13 @@ class SessionState:
     def go_to(self, frame: int | None) -> None:
         """Show the frame that the user saw, which a tracker may have left; None for the shown one."""
         if frame is not None and frame != self.state.frame and 0 <= frame < self.session.n_frames:
-            self.show_frame(frame)
+            self.show_frame(frame=frame)
 
     def revert(self, gesture: object) -> None:
         """Show the frame as it was before a gesture, and undo what was saved of the gesture."""
         if self.open_edit_owner is gesture:
             self.saver.moves.undo()
-        self.show_frame(self.state.frame)
+        self.show_frame()
         self.refresh_saving()
 
     def save(
@@ -384,7 +378,7 @@ class SessionState:
 
     def note_stored(self) -> None:
         """Note that the saver has the shown poses and pins; those that it cannot write wait in its queue."""
-        self._stored = self.state.people, self.state.pins
+        self._stored = self.state
 
     def note_moved(self) -> None:
         """Note that the stored poses of the shown frame may have changed; `show_frame` shows them."""
@@ -401,9 +395,9 @@ class SessionState:
 
     def is_shown_stored(self, state: State) -> bool:
         """Return whether the saver has the poses and pins that a state shows; drafts need not be stored."""
-        if self._stored is None or state.pins != self._stored[1]:
+        if self._stored is None or state.pins != self._stored.pins:
             return False
-        pairs = zip(state.people, self._stored[0], strict=True)
+        pairs = zip(state.people, self._stored.people, strict=True)
         return all(shown is stored or shown.source is None for shown, stored in pairs)
 
     def _is_saved(self, state: State) -> bool:
@@ -416,4 +410,4 @@ class SessionState:
     def _evidence_ready(self, frame: int) -> None:
         with self.lock:
             if frame == self.state.frame:
-                self.set(**self.costs(self.state.poses))
+                self.set(**vars(self.costs(self.state.poses)))

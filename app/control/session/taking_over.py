@@ -2,9 +2,13 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from typing import Any
 
 from app.control.session.session_state import SessionState
-from app.state.state import State, StateChanges
+from app.state.state import State
+
+_OF_SESSION = ("footage", "inconsistent_frames", "keyframe_doubts")
+"""Fields of the state that are the same for everybody."""
 
 
 class TakingOver:
@@ -63,14 +67,11 @@ class FollowingHost:
         own = session_state.state
         if own.compiled != host.compiled:
             session_state.note_compiled(host.compiled)
-        changes: StateChanges = {}
-        if own.footage != host.footage:
-            changes["footage"] = host.footage
-            changes = {**changes, **session_state.costs(own.poses)}
-        if own.inconsistent_frames is not host.inconsistent_frames:
-            changes["inconsistent_frames"] = host.inconsistent_frames
-        if own.keyframe_doubts is not host.keyframe_doubts:
-            changes["keyframe_doubts"] = host.keyframe_doubts
+        changes: dict[str, Any] = {
+            name: getattr(host, name) for name in _OF_SESSION if getattr(own, name) is not getattr(host, name)
+        }
+        if "footage" in changes:
+            changes |= vars(session_state.costs(own.poses))
         if own.calibration.n_changes != host.calibration.n_changes:
             changes["calibration"] = replace(own.calibration, n_changes=host.calibration.n_changes)
         plan, theirs = own.annotation, host.annotation

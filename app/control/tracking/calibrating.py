@@ -125,7 +125,7 @@ class Calibrating:
                 start, within = starts[len(starts) // 2], range(every[0], every[-1] + 1)
                 self._tracking.start_outward(start, tuple(sorted(people)), None, lambda _: None, within)
             else:
-                session_state.show_frame(every[0])
+                session_state.show_frame(frame=every[0])
                 self._tracking.start(False, every[-1], from_shown=True)
 
     def follow(self) -> None:
@@ -144,7 +144,7 @@ class Calibrating:
         session_state, n = self._session_state, self._session_state.state.calibration.n_changes
         session_state.set_cameras(session)
         self._set(check=None, is_previewed=False, preview=None, message=message, n_changes=n + 1)
-        session_state.show_frame(session_state.state.frame)
+        session_state.show_frame()
         session_state.refresh_saving()
 
     def _found(self) -> CalibrationCheck:

@@ -27,7 +27,6 @@ class ComparingRuns:
         self._session_state = session_state
         self._latest: LatestWinsWorker[range | None] = LatestWinsWorker(self._work, "comparison", _REST_S)
         self._runs = 0
-        self._offered = session_state.state.timeline_version
         session_state.subscribe(self._changed, "timeline_version")
 
     def compare(self, first: int, last: int) -> None:
@@ -60,10 +59,8 @@ class ComparingRuns:
         self._latest.close()
 
     def _changed(self, state: State) -> None:
-        if state.timeline_version != self._offered:
-            self._offered = state.timeline_version
-            if state.range_comparison is not None:
-                self._latest.offer(None)
+        if state.range_comparison is not None:
+            self._latest.offer(None)
 
     def _work(self, run: range | None) -> None:
         if run is None:

@@ -176,7 +176,7 @@ class FindingPeople:
             frame = trying.frame if best is None else best.frame
             if frame is not None and self._is_watched() and state.frame != frame:
                 self._shown = frame
-                session_state.show_frame(frame, finding=finding)
+                session_state.show_frame(frame=frame, finding=finding)
             elif finding != state.finding:
                 session_state.set(finding=finding)
 
@@ -186,7 +186,7 @@ class FindingPeople:
         named = error.camera if isinstance(error, TrackerError) else None
         with self._session_state.lock:
             if frame is not None and self._is_watched() and frame != self._shown:
-                self._session_state.show_frame(frame)
+                self._session_state.show_frame(frame=frame)
         return {**_ENDED, **failure(error), "tried": frame, "camera": names.index(named) if named in names else None}
 
     def _is_watched(self) -> bool:
@@ -215,7 +215,7 @@ class FindingPeople:
             self._session_state.saver.store_setting(AXES, axes)
             frame, lines = _axes(axes)
             finding = replace(self._session_state.state.finding, frame=frame, axes=lines, tried=None, **_ENDED)
-            self._session_state.show_frame(found.frame, finding=finding)
+            self._session_state.show_frame(frame=found.frame, finding=finding)
 
     def place(self, found: FirstPoses, label: str) -> int | None:
         """Store people who were found otherwise; return the new entry of the history, to add to."""
@@ -242,7 +242,7 @@ class FindingPeople:
             resized = partial(resized_start, stored, acquired.body)
             self._store(start, {person: acquired.body}, {person: resized}, "find people")
             if self._session_state.state.frame == start:
-                self._session_state.show_frame(start)
+                self._session_state.show_frame(frame=start)
 
     def _store(
         self, frame: int, bodies: Mapping[int, BodyModel], records: Mapping[int, Callable[[int], PoseRecord]],

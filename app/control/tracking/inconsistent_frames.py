@@ -39,7 +39,6 @@ class InconsistentFrames:
         self._doubted: list[dict[int, KeyframeDoubt]] = [{} for _ in session_state.models]
         self._seen = 0  # checked version of the timeline
         self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._check, "disagreements", _REST_S)
-        self._offered = 0
         session_state.subscribe(self._changed, "timeline_version")
         self._changed(session_state.state)
 
@@ -48,9 +47,7 @@ class InconsistentFrames:
         self._latest.close()
 
     def _changed(self, state: State) -> None:
-        if state.timeline_version != self._offered:
-            self._offered = state.timeline_version
-            self._latest.offer(state.timeline_version)
+        self._latest.offer(state.timeline_version)
 
     def _check(self, version: int) -> None:
         session_state = self._session_state

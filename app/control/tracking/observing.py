@@ -154,7 +154,7 @@ class Observing:
             session_state.set_cameras(store_import(session_state.session, plan))
             session_state.saver.follow_session(session_state.session)
             self._set(plan=None, message=f"The cameras use the masks of {plan.name} as silhouettes.", failed=False)
-            session_state.show_frame(session_state.state.frame)
+            session_state.show_frame()
 
     def _list(self) -> None:
         session = self._session_state.session
@@ -213,7 +213,7 @@ class Observing:
                 if state.frame != shown or state.drag is not None or monotonic() - at_s < _SHOWN_EVERY_S:
                     return
                 shown, at_s = frame, monotonic()
-                self._session_state.show_frame(frame, observations=replace(state.observations, shown=seen()))
+                self._session_state.show_frame(frame=frame, observations=replace(state.observations, shown=seen()))
 
         try:
             found = detect_people(session, recording, detector, plan, report, show)
@@ -261,7 +261,7 @@ class Observing:
             ]
             saver.write(label, changes, edit, by_program=True)
             session_state.refresh_saving()
-            session_state.show_frame(session_state.state.frame)
+            session_state.show_frame()
         return f"Stored poses on {len(set().union(*found.values()))} frames; keyframes stayed. Undo takes them back."
 
 

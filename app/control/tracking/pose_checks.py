@@ -100,7 +100,7 @@ class PoseChecks:
             row = AssessmentChange.of(change.person, change.frame, found)
             saver.write(f"assess the pose, frame {change.frame}", [row], amend, by_program=False)
             if session_state.state.frame == change.frame:
-                session_state.show_frame(change.frame)
+                session_state.show_frame(frame=change.frame)
             session_state.refresh_saving()
 
 

@@ -218,7 +218,7 @@ class Ranges:
         with self._activities.editing():
             begin, end = (last, first) if backward else (first, last)
             if self._session_state.state.frame != begin:
-                self._session_state.show_frame(begin)
+                self._session_state.show_frame(frame=begin)
             self._tracking.start(backward, end)
 
     def halt(self) -> None:
@@ -290,7 +290,7 @@ class Ranges:
                     run.written.setdefault(change.person, set()).add(change.frame)
             ranges = replace(ranges, done=_count(run))
             if any(c.frame == session_state.state.frame for c in piece):
-                session_state.show_frame(session_state.state.frame, ranges=ranges)
+                session_state.show_frame(ranges=ranges)
             else:
                 session_state.set(ranges=ranges)
             session_state.refresh_saving()

@@ -3,11 +3,12 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
 from app.state.progress import TrackStage, TrackState
-from app.state.state import StateChanges, finite_or_none
+from app.state.state import Costs, finite_or_none
 from tracker.estimation.tracking import confidence
 from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
 from tracker.pipeline.track_session import EstimatedRows, EstimateStep, Step, TrackSession
@@ -54,7 +55,7 @@ class RunDisplay:
         session_state.note_stored()
         session_state.refresh_saving()
         state = session_state.state
-        session_state.show_frame(state.frame, follow=state.follow, track=self._with_doubts(state.track))
+        session_state.show_frame(follow=state.follow, track=self._with_doubts(state.track))
 
     def _show_tracked(self, found: PoseEstimate, seconds: float) -> None:
         """Show the progress of the first pass, and the frame if it is shown or followed."""
@@ -68,13 +69,11 @@ class RunDisplay:
             doubtful=track.doubtful + (worst == "doubtful"), lost=track.lost + (worst == "lost"),
         )  # fmt: skip
         if session_state.state.follow or session_state.state.frame == found.frame:
-            changes = self._tracked_frame(found)
-            changes["track"] = track
-            session_state.set(**changes)
+            session_state.set(track=track, **self._tracked_frame(found))
         else:
             session_state.set(track=track)
 
-    def _tracked_frame(self, found: PoseEstimate) -> StateChanges:
+    def _tracked_frame(self, found: PoseEstimate) -> dict[str, Any]:
         """Return the fields of the state that show a tracked frame."""
         session_state, subjects = self._session_state, self._session.subjects
         keyframes, tracked = subjects.keyframes_at(found.frame), subjects.tracked
@@ -91,14 +90,9 @@ class RunDisplay:
                 shown = ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], part_costs_px)
                 people.append(replace(shown, trace=trace))
         models, revisions = session_state.frame_poses.bodies(people)
-        return {
-            "frame": found.frame,
-            "people": tuple(people),
-            "models": models,
-            "revisions": revisions,
-            "cost_px": finite_or_none(found.cost_px),
-            "view_costs_px": tuple(map(finite_or_none, found.view_costs_px)),
-        }
+        view_costs_px = tuple(map(finite_or_none, found.view_costs_px))
+        costs = Costs(cost_px=finite_or_none(found.cost_px), view_costs_px=view_costs_px)
+        return {"frame": found.frame, "people": tuple(people), "models": models, "revisions": revisions, **vars(costs)}
 
     def _with_doubts(self, track: TrackState) -> TrackState:
         """Return the progress with the numbers of frames that are doubtful and lost by now."""

@@ -141,7 +141,7 @@ class Tracking:
         """
         session_state = self._session_state
         with self._activities.editing():
-            session_state.show_frame(start)
+            session_state.show_frame(frame=start)
             stride = session_state.state.run_choices.stride
             every = range(session_state.session.n_frames) if within is None else within
             frames = range(start - (start - every.start) // stride * stride, every.stop, stride)
@@ -277,7 +277,7 @@ class Tracking:
             at = self._session_state.state.track.at
             if follow and at is not None and at != self._session_state.state.frame:
                 self.flush()
-                self._session_state.show_frame(at)
+                self._session_state.show_frame(frame=at)
 
     def observer(self) -> Observer:
         """Return the observer of the chosen cameras."""
@@ -341,7 +341,7 @@ class Tracking:
             self._save(run)
         except TurnError as error:
             how, failed = f"stopped, because {page_text(error)}", True
-            self._session_state.show_frame(self._session_state.state.frame)  # the stored poses: a shown one may be lost
+            self._session_state.show_frame()  # the stored poses: a shown one may be lost
         summary = run.display.summary()
         self._run = None
         tracked = run.session.tracked

@@ -4,6 +4,7 @@ from app.advice.situations import advise
 from app.advice.stored_work import PersonWork, StoredWork
 from app.control.controller import Controller
 from app.messages.advice import AdviceMessage
+from app.state.page_view import View
 from app.state.state import State
 
 
@@ -16,10 +17,12 @@ class AdviceFeed:
         self._stored: StoredWork | None = None
         self._version = -1
 
-    def update(self, controller: Controller, state: State) -> AdviceMessage | None:
-        """Return the message that brings the page up to date; None where it is, and during a drag."""
-        if state.is_dragging:
-            return None
+    def is_due(self, state: State, _: View | None = None) -> bool:
+        """Return whether there may be an update; quick. None is made during a drag."""
+        return not state.is_dragging
+
+    def updates(self, controller: Controller, state: State) -> list[AdviceMessage]:
+        """Return the message that the page lacks. It sums up the timeline: call it in a worker."""
         is_busy = state.track.running and self._stored is not None  # its poses change twice a second
         if not is_busy and self._version != state.timeline_version:
             self._version = state.timeline_version
@@ -27,7 +30,7 @@ class AdviceFeed:
         assert self._stored is not None
         message = AdviceMessage(tuple(advise(state, self._stored)))
         is_known, self._sent = message == self._sent, message
-        return None if is_known else message
+        return [] if is_known else [message]
 
 
 def stored_work(controller: Controller) -> StoredWork:

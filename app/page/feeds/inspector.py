@@ -19,6 +19,7 @@ from app.state.annotation import AnnotationState, ProposedClick
 from app.state.floor_picking import FloorState
 from app.state.identity import are_same
 from app.state.observations import ObservationsState
+from app.state.page_view import View
 from app.state.people import AcquisitionState
 from app.state.progress import FindState
 from app.state.run_choices import RunChoices
@@ -47,7 +48,7 @@ class InspectorFeed:
         self._sent: list[Message] = []
         self._drawn: tuple[CalibrationCheck | None, MisfitField] = None, NO_MISFITS
 
-    def is_behind(self, state: State) -> bool:
+    def is_due(self, state: State, _: View | None = None) -> bool:
         """Return whether there may be updates; quick, because during drags a state follows every few milliseconds."""
         return not are_same(_ingredients(state), self._made_from)
 
@@ -88,14 +89,7 @@ def _ingredients(state: State) -> tuple[object, ...]:
 def settings(found: TrackSettings, choices: RunChoices) -> wire.SettingsMessage:
     """Describe the settings of tracker and search."""
     default = TrackSettings()
-    return wire.SettingsMessage(
-        track_values(choices), search_values(found), track_values(RunChoices()), search_values(default), methods()
-    )
-
-
-def track_values(choices: RunChoices) -> wire.TrackValues:
-    """Describe the choices for a run."""
-    return made_of(wire.TrackValues, choices, options=dict(choices.options))
+    return wire.SettingsMessage(choices, search_values(found), RunChoices(), search_values(default), methods())
 
 
 def methods() -> tuple[wire.MethodInfo, ...]:
@@ -162,12 +156,7 @@ def acquisition(found: AcquisitionState) -> wire.AcquisitionMessage:
     result, outlines = None, found.outlines
     if outlines is not None:
         result = made_of(
-            wire.AcquisitionResult,
-            found,
-            sizes=tuple(wire.AcquiredSizeRow(*row) for row in found.sizes),
-            size_px=outlines.size_px,
-            front=wire.OutlinePair(outlines.front.before, outlines.front.after),
-            side=wire.OutlinePair(outlines.side.before, outlines.side.after),
+            wire.AcquisitionResult, found, size_px=outlines.size_px, front=outlines.front, side=outlines.side
         )
     return made_of(wire.AcquisitionMessage, found, result=result)
 
@@ -190,7 +179,6 @@ def observations(found: ObservationsState, people: Sequence[str]) -> observed.Ob
         found: their state.
         people: names of the people of the session.
     """
-    sets = tuple(made_of(observed.ObservedSetInfo, s) for s in found.sets)
     judged = tuple(
         observed.JudgedPerson(j.person, j.share_in_order, len(j.frames), tuple(j.sentences)) for j in found.judgements
     )
@@ -199,7 +187,7 @@ def observations(found: ObservationsState, people: Sequence[str]) -> observed.Ob
     worst = tuple(_judged_limb(person, doubt) for person, doubt in doubts[:_MAX_LISTED])
     shown, is_previewed = found.shown.name if found.shown is not None else "", found.plan is not None
     return made_of(
-        observed.ObservationsMessage, found, sets=sets, shown=shown, is_previewed=is_previewed, people=judged,
+        observed.ObservationsMessage, found, shown=shown, is_previewed=is_previewed, people=judged,
         worst=worst, off=len(doubts),
     )  # fmt: skip
 

@@ -34,10 +34,10 @@ class ObservabilityFeed:
         busy = state.is_dragging or state.search.running or "contours" not in state.compiled
         return not busy and _ingredients(state) != self._made_from
 
-    def update(self, controller: Controller, state: State) -> ObservabilityMessage:
+    def updates(self, controller: Controller, state: State) -> list[ObservabilityMessage]:
         """Return the message that brings the page up to date. It takes some milliseconds: call it in a worker."""
         self._made_from = _ingredients(state)
-        return observability(controller.session, state)
+        return [observability(controller.session, state)]
 
 
 def observability(session: Session, state: State) -> ObservabilityMessage:

@@ -81,8 +81,8 @@ def _ingredients(state: State) -> tuple[object, ...]:
         Identity(None if state.reason is None else state.reason.alternatives),
         Identity(None if state.other_copy is None else state.other_copy.poses),
         Identity(state.observations.plan),
-        Identity(state.observations.drawn),
-        Identity(state.observations.drawn_judgements),
+        Identity(state.observations.shown),
+        Identity(state.observations.judgements),
     )
     return (*drawn, _pins(state), state.floor.picking)
 

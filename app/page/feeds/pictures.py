@@ -32,7 +32,10 @@ class PictureSets:
         nothing if the frame is not listed yet, or if the page has moved to another frame meanwhile. While a tracker
         runs the page always has, and gets the pictures all the same.
         """
-        wanted = self._available(_wanted(state, view), state)
+        wanted = _wanted(state, view)
+        if wanted == self._sent:
+            return []
+        wanted = self._available(wanted, state)
         missing = [key for key, content in wanted.items() if self._sent.get(key) != content]
         self._sent = wanted
         made = await asyncio.gather(*(self._made(key, state, view) for key in missing))

@@ -11,6 +11,7 @@ from app.messages.observation import (
     WatchProvenance,
 )
 from app.state.identity import Identity
+from app.state.page_view import View
 from app.state.state import State
 from app.storage.pose_origins import PoseOrigin
 from tracker.interchange.exports.provenance import point_lost
@@ -35,7 +36,7 @@ class ProvenanceFeed:
         for kind in (ProvenanceMessage, AnnotatorsMessage):
             self._sent.pop(kind, None)
 
-    def is_due(self, state: State) -> bool:
+    def is_due(self, state: State, _: View | None = None) -> bool:
         """Return whether there may be updates; quick. None are made during a drag or a search."""
         return not (state.is_dragging or state.search.running) and self._ingredients(state) != self._made_from
 

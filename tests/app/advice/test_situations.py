@@ -49,7 +49,7 @@ def filled(*shares):
 
 CHECK = SimpleNamespace(named=("RIGHT",), contradictions=["RIGHT is turned by 0.8 degrees"])
 OFF = "Footage of RIGHT ends at frame 12"
-SETS = (ObservedSet("network", n_frames=90),)
+SETS = (ObservedSet("network", frames=90),)
 DRAFT = SizeDraft(0, None, {3: POSE})
 DEPTH = DepthNote(0, 0, POSE, UnseenDepth(("left_wrist", "left_knee"), 1))
 MOVES = (limb_move("left_forearm", 0.21), limb_move("right_shin", 0.12))

@@ -46,7 +46,7 @@ def test_a_hand_that_holds_still_sees_what_the_pose_costs(controller):
         controller.dragging.move(PAGE, (start[0] + way, start[1]), seq)
     shown = controller.state.poses
     wait_for(lambda: controller.state.cost_px != before)
-    wait_for(lambda: controller.state.cost_px == controller.session_state.costs(shown)["cost_px"])
+    wait_for(lambda: controller.state.cost_px == controller.session_state.costs(shown).cost_px)
     assert controller.state.drag is not None
     controller.dragging.cancel(PAGE)
     assert controller.state.cost_px == before

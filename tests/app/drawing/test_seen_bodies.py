@@ -27,7 +27,8 @@ def late(session):
     model = loaded.people[0].model
     pose, velocity = model.neutral(), np.zeros(model.n_dofs)
     pose[:3], velocity[0] = (0.0, 0.0, 1.0), 0.1
-    return replace(loaded, cameras=tuple(cameras)), State(2, (ShownPose(pose, "manual"),), velocities=(velocity,))
+    state = State(frame=2, people=(ShownPose(pose, "manual"),), velocities=(velocity,))
+    return replace(loaded, cameras=tuple(cameras)), state
 
 
 def places(session, state):

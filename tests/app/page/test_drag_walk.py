@@ -6,7 +6,7 @@ import pytest
 from page_visits import visiting
 from walks import traced
 
-MAX_FILES, MAX_CROSSINGS = 50, 280
+MAX_FILES, MAX_CROSSINGS = 40, 250
 """Of a move with the news that it makes; they may only fall."""
 
 

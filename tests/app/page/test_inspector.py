@@ -252,7 +252,7 @@ def test_the_searches_on_a_frame_are_shown_from_the_store(page):
     saver.write("track", [PoseChange("person", state.frame + 2, record)], None, by_program=True)
     found = []
     for frame in range(state.frame, state.frame + 3):
-        controller.session_state.show_frame(frame)
+        controller.session_state.show_frame(frame=frame)
         found.append(page.updates()["reason"].tried)
     assert [(x.what, x.before_nats, x.after_nats, x.taken) for x in found[0]] == [
         ("left arm and right leg", 41.0, 12.0, True),

@@ -13,7 +13,7 @@ def test_only_a_page_that_shows_the_layer_receives_it_and_once_for_a_pose(contro
     assert not feed.is_due(state, None)
     assert not feed.is_due(state, HIDDEN)
     assert feed.is_due(state, SHOWN)
-    message = feed.update(controller, state)
+    (message,) = feed.updates(controller, state)
     assert (message.frame, message.person) == (state.frame, state.person)
     assert not feed.is_due(state, SHOWN)
     moved = replace(state, people=tuple(replace(p, values=p.values + 0.1) for p in state.people))
@@ -24,7 +24,7 @@ def test_only_a_page_that_shows_the_layer_receives_it_and_once_for_a_pose(contro
 
 def test_corrected_cameras_have_other_figures(controller):
     feed, state = ObservabilityFeed(), controller.state
-    feed.update(controller, state)
+    feed.updates(controller, state)
     assert feed.is_due(replace(state, calibration=replace(state.calibration, n_changes=1)), SHOWN)
 
 

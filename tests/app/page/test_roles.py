@@ -14,6 +14,7 @@ from app.control.session.annotating import Annotating
 from app.messages import annotation as plan_wire
 from app.messages import client as wire
 from app.messages.base import Command
+from app.messages.inspector import FindPeople
 from app.messages.parsing import check_allowed
 from app.page import socket
 from app.page.inbox import MAX_HELD_UP, MAX_WAITING
@@ -70,7 +71,7 @@ def test_a_page_that_looks_moves_in_a_place_of_its_own_only():
     assert not allowed("look", wire.ToggleMark("reviewed"))
 
 
-@pytest.mark.parametrize("message", [wire.FindPeople("start"), wire.UseClocks("nudge"), wire.EditFloor("begin")])
+@pytest.mark.parametrize("message", [FindPeople("start"), wire.UseClocks("nudge"), wire.EditFloor("begin")])
 def test_bodies_cameras_and_floor_are_the_hosts(message):
     assert allowed("host", message)
     assert not allowed("annotate", message)

@@ -53,7 +53,7 @@ def test_a_person_is_drawn_at_the_time_of_the_picture(made):
     assert body.velocity is None
     late = replace(controller.session, cameras=tuple(replace(c, clock=Clock(0.5)) for c in cameras))
     controller.frames.set_cameras = lambda _: None  # the observer is shared by other tests
-    controller.session_state.show_frame(1)
+    controller.session_state.show_frame(frame=1)
     drag(controller, "torso", (30.0, 0.0))  # another pose beside it gives a velocity
     controller.session_state.set_cameras(late)
     assert found.jpeg(0, 0, None)

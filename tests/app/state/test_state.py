@@ -1,19 +1,12 @@
-"""The fields by which a state is changed are those of the state."""
+"""The state is made of parts, each of which declares fields of its own."""
 
-from typing import get_type_hints
+from collections import Counter
+from dataclasses import fields
 
-from app.state.state import Costs, ShownFrame, State, StateChanges
-
-
-def test_changes_have_the_fields_and_types_of_the_state():
-    assert get_type_hints(StateChanges) == get_type_hints(State)
+from app.state.state import State
 
 
-def test_every_change_is_optional():
-    assert not StateChanges.__required_keys__
-
-
-def test_costs_and_frames_are_parts_of_the_state():
-    fields = get_type_hints(State).items()
-    assert get_type_hints(Costs).items() <= fields
-    assert get_type_hints(ShownFrame).items() <= fields
+def test_each_field_is_declared_once():
+    declared = Counter(name for part in State.__bases__ for name in part.__annotations__)
+    assert set(declared) == {f.name for f in fields(State)}
+    assert set(declared.values()) == {1}

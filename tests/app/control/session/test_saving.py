@@ -97,7 +97,7 @@ def alternative(controller):
     record = session_state.saver.record(0, 2)
     other = Alternative(record.values + 0.01, record.model_revision, 1.0)
     session_state.saver.write("track", [PoseChange("person", 2, record, (other,))], None, by_program=False)
-    session_state.show_frame(2)
+    session_state.show_frame(frame=2)
     controller.alternatives.take_alternative(0)
 
 

@@ -21,7 +21,7 @@ def store_tracked(controller, names):
             record = PoseRecord(values, ("tracked",) * len(values), revision, status="good", errors=known)
             changes += [PoseChange(person.name, frame, record)] if person.name in names else []
     session_state.saver.write("track", changes, None, by_program=True)
-    session_state.show_frame(TRACKED)
+    session_state.show_frame(frame=TRACKED)
     return controller
 
 

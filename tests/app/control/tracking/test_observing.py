@@ -64,7 +64,7 @@ def test_files_are_previewed_and_then_stored(controller, request_of):
     controller.observing.store()
     (found,) = controller.state.observations.sets
     assert (found.name, found.format, found.is_in_space) == ("openpose", "openpose", False)
-    assert found.n_frames == controller.session.n_frames
+    assert found.frames == controller.session.n_frames
     assert controller.state.observations.plan is None
 
 
