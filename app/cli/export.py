@@ -148,8 +148,7 @@ def _only(arguments: ExportArguments) -> "Checked | None":
 
 def _export_dataset(arguments: ExportArguments) -> None:
     """Write a dataset of several sessions, or of one with a split."""
-    from tracker.interchange.exports.datasets.dataset import export_dataset, plan_dataset
-    from tracker.interchange.exports.datasets.labels import DatasetRecording
+    from tracker.interchange.exports.datasets.dataset import DatasetRecording, export_dataset, plan_dataset
     from tracker.interchange.exports.datasets.splits import parse_splits, recording_names
     from tracker.interchange.exports.export_files import check_options
     from tracker.interchange.exports.motion import read_motion

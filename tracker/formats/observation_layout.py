@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from tracker.errors import FormatError
-from tracker.formats.delimited import head_cells
+from tracker.formats.number_rows import head_cells
 from tracker.formats.text_files import TABLE_BYTES, TextKind, read_json, read_lines
 
 _TEXT = TextKind("file", TABLE_BYTES, FormatError)

@@ -18,7 +18,7 @@ from tracker.formats.trc import write_trc
 from tracker.interchange.exports import formats
 from tracker.interchange.exports.export_format import ExportFormat
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.session.session import load_session
 
 

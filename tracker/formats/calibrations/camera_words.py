@@ -23,13 +23,17 @@ from tracker.formats.calibrations.camera_matrices import (
 from tracker.formats.calibrations.document import Document, refuse
 from tracker.formats.calibrations.lens_words import (
     FISHEYE,
+    LISTS,
+    MEANINGS,
     UnknownLensError,
     is_fisheye,
+    is_known,
+    is_of,
     is_understood,
     is_unknown,
     names_lens,
+    spelled,
 )
-from tracker.formats.calibrations.words import LISTS, MEANINGS, is_known, is_of, spelled
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import USUAL_SIZES

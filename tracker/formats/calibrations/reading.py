@@ -9,18 +9,31 @@ import numpy as np
 
 from tracker.errors import CalibrationError, Remedy
 from tracker.files import paths_in
+from tracker.formats.anipose import METRES, CameraEntry, Units, check_names, read_entry
 from tracker.formats.calibrations.calibration_layout import CalibrationLayout
 from tracker.formats.calibrations.camera_matrices import is_transposed
 from tracker.formats.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.formats.calibrations.convention_names import CONVENTIONS, PoseConvention
-from tracker.formats.calibrations.document import Document, read_document, refuse
-from tracker.formats.calibrations.foreign import foreign, name_binary, named, refuse_program
+from tracker.formats.calibrations.data_layouts import board_square
+from tracker.formats.calibrations.document import (
+    Document,
+    foreign,
+    name_binary,
+    named,
+    read_document,
+    refuse,
+    refuse_program,
+)
 from tracker.formats.calibrations.layouts import find_layout
-from tracker.formats.calibrations.pose_conventions import check_convention, odd_camera, read_pose
-from tracker.formats.calibrations.rotation_forms import check_turned, refuse_angles, with_quaternions
-from tracker.formats.calibrations.toml_layouts import board_square
+from tracker.formats.calibrations.pose_conventions import (
+    check_convention,
+    check_turned,
+    odd_camera,
+    read_pose,
+    refuse_angles,
+    with_quaternions,
+)
 from tracker.formats.calibrations.units import check_focal_lengths, check_units
-from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import METRES_BY_WORD

@@ -1,7 +1,8 @@
 """Read tables of joints: rows of each frame, or of each point of a frame; people in columns, in rows or alone."""
 
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -9,9 +10,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
-from tracker.formats.delimited import Delimited, read_delimited
 from tracker.formats.joint_tables.columns import Columns, ColumnsOf
-from tracker.formats.number_rows import MAX_NAMES, MAX_TIME, NumberRows, check_size
+from tracker.formats.number_rows import MAX_NAMES, MAX_TIME, Delimited, NumberRows, check_size, read_delimited
 from tracker.formats.text_files import LOST
 from tracker.formats.trc import MarkerTable, mask_missing, stated_rate
 from tracker.geometry.arrays import Array, IntArray
@@ -168,3 +168,34 @@ def _timed(frames: IntArray, times: Array, second: float | None, rate: float, wh
         found = f"steps of {step:g} from frame to frame"
         raise FormatError.mismatch(where, "times in seconds", found, "name their unit, such as time_ms")
     return times, 1 / (mean if abs(mean / step - 1) < 0.01 else step)  # the mean is exact, but of a gap in the times
+
+
+def by_subject(table: MarkerTable, kept: Sequence[str] = ()) -> list[MarkerTable]:
+    """Return a table for each subject, with names without prefixes; all in one if no two subjects have equal names.
+
+    Args:
+        table: the points of a file.
+        kept: names that are asked for as they stand.
+    """
+    groups: dict[str, list[int]] = {}
+    for i, name in enumerate(table.names):
+        groups.setdefault(name.rpartition(":")[0], []).append(i)
+    subjects = {prefix: columns for prefix, columns in groups.items() if prefix}
+    if table.person or not subjects or any(name in kept for name in table.names):
+        return [table]
+    plain = [name.rpartition(":")[2] for name in table.names]
+    largest = max(subjects, key=lambda prefix: len(subjects[prefix]))
+    own = {plain[i] for i in subjects[largest]}
+    people = [p for p, columns in subjects.items() if p == largest or own & {plain[i] for i in columns}]
+    if len(people) == 1:
+        names = [plain[i] if i in subjects[largest] else name for i, name in enumerate(table.names)]
+        is_once = len(set(names)) == len(names)
+        return [replace(table, names=tuple(names), person=largest) if is_once else table]
+    rest = [table.names[columns[0]] for prefix, columns in groups.items() if prefix not in people]
+    notes = (f"points of no person, such as {rest[0]}, are left out",) if rest else ()
+    table = replace(table, notes=(*table.notes, *notes))
+    parts = [(person, subjects[person]) for person in people]
+    return [
+        replace(table, names=tuple(plain[i] for i in own), points=table.points[:, own], person=person)
+        for person, own in parts
+    ]

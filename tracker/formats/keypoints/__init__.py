@@ -13,7 +13,6 @@ __all__ = [
     "hand_labels",
     "hdf5",
     "json_patching",
-    "openpose",
     "picture_names",
     "picture_table",
 ]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tracker.formats.keypoints.coco_reading import read_dataset
-from tracker.formats.keypoints.point_changes import Changes
+from tracker.formats.keypoints.picture_table import Changes
 from tracker.formats.text_patch import PIXEL_DECIMALS, Span, SpanList, TextPatch, number_like
 from tracker.geometry.arrays import Array
 

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tracker.interchange.exports.motion import ExportedMotion
-    from tracker.interchange.exports.options import AxesName, ExportOptions, UnitName
+    from tracker.interchange.exports.motion import AxesName, ExportedMotion, ExportOptions, UnitName
 
 Tick = Callable[[], None]
 """Called after each frame of each file; it may raise to stop the export."""

@@ -13,8 +13,7 @@ from tracker.errors import Remedy, TrackerError
 from tracker.interchange.exports.export_format import ExportFormat, Tick, Writer
 
 if TYPE_CHECKING:
-    from tracker.interchange.exports.motion import ExportedMotion
-    from tracker.interchange.exports.options import ExportOptions
+    from tracker.interchange.exports.motion import ExportedMotion, ExportOptions
 
 
 def _by_writer(name: str, module: str = "writers") -> Writer:
@@ -52,18 +51,18 @@ _OWN: Mapping[str, ExportFormat] = {f.name: f for f in (
         is_folder=True),
     ExportFormat("scene", "one frame with cameras and pictures (glTF)", (".glb",),
         _by_writer("write_scene", "mesh_writers"), frozenset(("faces",)), axes="y-up", gaps="left out"),
-    ExportFormat("c3d", "joint centers (C3D)", (".c3d",), _by_writer("write_person_c3d", "array_writers"), _PLACE,
+    ExportFormat("c3d", "joint centers (C3D)", (".c3d",), _by_writer("write_person_c3d"), _PLACE,
         one_person=True, units="mm", has_rate=True, numbering=f"C3D {_FROM_1} frame {{number}} of the file"),
     ExportFormat("openpose", "keypoints (OpenPose)", ("_openpose",), _by_writer("write_points", "label_writers"),
         frozenset(("pixels", "faces")), gaps="left without people", is_folder=True),
-    ExportFormat("masks", "masks of parts (PNG)", ("_masks",), _by_writer("write_masks", "mask_writers"),
+    ExportFormat("masks", "masks of parts (PNG)", ("_masks",), _by_writer("write_masks", "label_writers"),
         frozenset(("pixels", "faces")), gaps="left without people", is_folder=True),
     ExportFormat("movement", "poses (movement, netCDF)", (".nc", "_views.nc"),
-        _by_writer("write_movement", "array_writers"), frozenset(("axes",)), gaps="left as NaN", has_rate=True,
+        _by_writer("write_movement"), frozenset(("axes",)), gaps="left as NaN", has_rate=True,
         holds_provenance=True),
     ExportFormat("nwb", "poses (NWB, ndx-pose)", (".nwb",), _by_writer("write_poses_nwb", "nwb_writer"),
         frozenset(("axes",)), gaps="left as NaN", has_rate=True, holds_provenance=True),
-    ExportFormat("npz", "poses and cameras (NPZ)", (".npz",), _by_writer("write_npz", "array_writers"),
+    ExportFormat("npz", "poses and cameras (NPZ)", (".npz",), _by_writer("write_npz"),
         frozenset(("axes",)), gaps="left as NaN", holds_provenance=True),
     ExportFormat("dataset", "dataset of pictures and labels", ("_dataset",),
         _by_writer("write_dataset", "datasets.dataset"), frozenset(("keypoints", "pixels", "pictures", "faces")),

@@ -8,8 +8,7 @@ from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.robust_triangulation import Views
-from tracker.interchange.observations.joints import observed_joints, triangulate_observations
-from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.observed import ObservationSet, observed_joints, triangulate_observations
 
 
 def body_points(observations: ObservationSet, cameras: Sequence[Camera]) -> dict[str, BodyPoints]:

@@ -8,16 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.errors import FormatError, Remedy, SessionError
-from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_size, read_joint_map
-from tracker.formats.joint_tables.subjects import by_subject
+from tracker.formats.joint_tables.table_reading import by_subject
 from tracker.formats.number_rows import check_size
-from tracker.formats.trc import MarkerTable
+from tracker.formats.trc import MarkerTable, remap_axes
 from tracker.geometry.arrays import Array
 from tracker.interchange.observations.observed import ObservedJoints
 from tracker.interchange.observations.placing import short_list
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.readers import SPACE_FORMATS
-from tracker.interchange.observations.request import ImportRequest
 from tracker.session.clocks import Placement, place_rows, row_places
 from tracker.session.session import Session
 from tracker.validation import same_form

@@ -11,8 +11,7 @@ import numpy as np
 
 from tracker.compute.distribution import program_version
 from tracker.geometry.arrays import Array
-from tracker.interchange.exports.motion import ExportedMotion, frames_text
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, frames_text
 from tracker.interchange.exports.provenance import PoseProvenance, pose_provenance
 
 TO_FILL_IN = "TO BE FILLED IN"
