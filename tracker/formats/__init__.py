@@ -21,5 +21,4 @@ __all__ = [
     "text_files",
     "text_patch",
     "trc",
-    "unread",
 ]

@@ -13,9 +13,9 @@ from xml.etree import ElementTree
 
 from tracker.errors import CalibrationError
 from tracker.formats.anipose import KIND
+from tracker.formats.observation_layout import begin_of, marks_of, unread
 from tracker.formats.plain_data import parse_json, parse_xml, parse_yaml, storage_data
 from tracker.formats.text_files import parse_toml, read_text
-from tracker.formats.unread import begin_of, marks_of, unread
 from tracker.validation import quoted
 
 EXPECTED = "a calibration of a layout that docs/log/recordings.md lists"

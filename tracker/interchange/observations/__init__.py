@@ -16,7 +16,6 @@ __all__ = [
     "plans",
     "readers",
     "sides",
-    "space",
     "stored",
     "stored_masks",
 ]

@@ -19,7 +19,7 @@ from tracker.geometry.arrays import IntArray
 from tracker.interchange.observations.checks import agreement_problem, picture_problems, timing_problems
 from tracker.interchange.observations.masks import plan_masks
 from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
-from tracker.interchange.observations.placing import place_pictures, rescaled
+from tracker.interchange.observations.placing import place_pictures, read_space, rescaled
 from tracker.interchange.observations.plans import ImportPlan, ImportRequest, MaskPlan, ViewPreview, refuse_choices
 from tracker.interchange.observations.readers import MASK_FORMATS, PICTURE_FORMATS, find_files
 from tracker.interchange.observations.sources import (
@@ -30,7 +30,6 @@ from tracker.interchange.observations.sources import (
     source_files,
     videos_of_footage,
 )
-from tracker.interchange.observations.space import read_space
 from tracker.interchange.observations.stored import files_folder, new_folder, save_observations, source_path
 from tracker.interchange.observations.stored_masks import store_masks
 from tracker.session.session import Session

@@ -21,10 +21,9 @@ from tracker.formats.keypoints.detections import read_openpose
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
 from tracker.formats.keypoints.json_patching import patch_coco, patch_openpose
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_files
-from tracker.formats.observation_layout import ObservationLayout, Sample
+from tracker.formats.observation_layout import ObservationLayout, Sample, unread
 from tracker.formats.text_files import TABLE_BYTES, TextKind, read_json
 from tracker.formats.trc import MarkerTable, patch_trc, read_trc
-from tracker.formats.unread import unread
 from tracker.interchange.observations.mask_files import MaskFiles
 from tracker.interchange.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
 from tracker.validation import quoted
