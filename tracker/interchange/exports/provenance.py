@@ -33,45 +33,12 @@ class PoseProvenance:
 
     record: PoseRecord
     """The pose as stored: status, keyframe, reviewed, author, time, program, body revision."""
-    source: str
-    """The most manual source of its values, one of `SOURCES`."""
+    fields: dict[str, str | bool | int]
+    """Everything that is known of the whole pose, by the name in files; docs/log/export.md lists it."""
     point_sources: tuple[str, ...]
     """The source of each point of the body, in the order of its `point_names`: see `sources_of_points`."""
     point_lost: Array
     """Probability that the limb of each point is lost, (n_points,); NaN where not assessed, and for the trunk."""
-    calibration_revision: int
-    """The calibration that the pose was made with, from 1."""
-    is_earlier_calibration: bool
-    """Whether the session has another calibration now."""
-    verified_by: str
-    """Name of the person who verified it as a task of the plan; empty for nobody."""
-    verified_time: str
-    """Time of that, ISO 8601, UTC; empty for nobody."""
-
-    @property
-    def is_reviewed(self) -> bool:
-        """Whether a person has checked it, or set it."""
-        return self.record.reviewed or self.record.keyframe
-
-    @property
-    def fields(self) -> dict[str, str | bool | int]:
-        """Everything that is known of the whole pose, by the name in files; docs/log/export.md lists it."""
-        record = self.record
-        return {
-            "status": record.status,
-            "source": self.source,
-            "annotator": record.author,
-            "edit_time": record.time,
-            "program": record.program,
-            "remark": record.remark,
-            "verified_by": self.verified_by,
-            "verified_time": self.verified_time,
-            "keyframe": record.keyframe,
-            "reviewed": self.is_reviewed,
-            "body_revision": record.model_revision,
-            "calibration_revision": self.calibration_revision,
-            "earlier_calibration": self.is_earlier_calibration,
-        }
 
     def covariances(self, R_file_world: Array) -> Array:
         """Return the covariance of each point in the axes of a file, (n_points, 3, 3), m^2; NaN where not known."""
@@ -87,12 +54,24 @@ def pose_provenance(motion: ExportedMotion, person: PersonMotion, frame: int) ->
     stored = person.poses[frame]
     model, record = stored.body.model, stored.record
     revision = motion.calibration_of(person, frame)
-    sources = sources_of_points(model, record.sources)
-    is_earlier = revision != motion.calibrations.present
-    lost = point_lost(model, record.limbs_lost)
     verified = motion.verifications.get((person.person.name, frame))
-    by, time = ("", "") if verified is None else (verified.author, verified.time)
-    return PoseProvenance(record, stored.source, sources, lost, revision, is_earlier, by, time)
+    fields: dict[str, str | bool | int] = {
+        "status": record.status,
+        "source": stored.source,
+        "annotator": record.author,
+        "edit_time": record.time,
+        "program": record.program,
+        "remark": record.remark,
+        "verified_by": verified.author if verified else "",
+        "verified_time": verified.time if verified else "",
+        "keyframe": record.keyframe,
+        "reviewed": record.reviewed or record.keyframe,
+        "body_revision": record.model_revision,
+        "calibration_revision": revision,
+        "earlier_calibration": revision != motion.calibrations.present,
+    }
+    sources = sources_of_points(model, record.sources)
+    return PoseProvenance(record, fields, sources, point_lost(model, record.limbs_lost))
 
 
 def sources_of_points(model: BodyModel, sources: Sequence[str]) -> tuple[str, ...]:

@@ -37,7 +37,7 @@ from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.keypoints import Keypoints
 from tracker.interchange.exports.label_writers import write_views
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, PersonMotion, file_from_world, up_in_file
-from tracker.interchange.exports.provenance import pose_arrays, pose_values
+from tracker.interchange.exports.provenance import pose_arrays, pose_provenance, pose_values
 from tracker.interchange.exports.views import FrameViews, exported_cameras, view_arrays
 
 
@@ -56,16 +56,12 @@ def write_tables(motion: ExportedMotion, options: ExportOptions, paths: Sequence
     columns = [f"{name}.{what}_{options.units}" for name in found.points for what in ("x", "y", "z", "error")]
     angles = poses * [units[name][1] for name in names]
     of_values = [name + units[name][0] for name in names]
-    for path, titles, values in (
-        (paths[0], columns, places.reshape(*places.shape[:2], -1)),
-        (paths[1], of_values, angles),
-    ):
-        rows = [
-            _row(motion, person, frame, values[i, j].tolist())
-            for j, person in enumerate(motion.exported)
-            for i, frame in enumerate(motion.frames)
-        ]
-        write_motion_csv(path, [c.camera.name for c in motion.session.cameras], titles, rows)
+    rows = [_row(motion, person, frame) for person in motion.exported for frame in motion.frames]
+    tables = (columns, places.reshape(*places.shape[:2], -1)), (of_values, angles)
+    for path, (titles, values) in zip(paths, tables, strict=True):
+        by_person = np.concatenate(np.swapaxes(values, 0, 1)).tolist()
+        filled = [replace(row, values=own) for row, own in zip(rows, by_person, strict=True)]
+        write_motion_csv(path, motion.session.camera_names, titles, filled)
 
 
 def write_person_opensim(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
@@ -174,17 +170,13 @@ class _FileNames:
         return CocoImage(id, f"{camera.name}/{name}", *camera.size, camera.name, frame, self._source.footage.name, at)
 
 
-def _row(motion: ExportedMotion, person: PersonMotion, frame: int, values: Sequence[float]) -> MotionRow:
-    """Return the row of a person in a frame."""
-    row = MotionRow(person.person.name, frame, motion.time_s(frame), values=values)
-    stored = person.poses.get(frame)
-    if stored is None:
+def _row(motion: ExportedMotion, person: PersonMotion, frame: int) -> MotionRow:
+    """Return the row of a person in a frame, without values."""
+    row = MotionRow(person.person.name, frame, motion.time_s(frame))
+    if frame not in person.poses:
         return row
-    record, calibration = stored.record, motion.calibration_of(person, frame)
-    return replace(
-        row, status=record.status, source=stored.source, is_keyframe=record.keyframe, calibration=calibration,
-        is_earlier=calibration != motion.calibrations.present, costs_px=(record.cost_px, *record.view_costs_px),
-    )  # fmt: skip
+    found = pose_provenance(motion, person, frame)
+    return replace(row, provenance=found.fields, costs_px=(found.record.cost_px, *found.record.view_costs_px))
 
 
 def _unit(unit: str, options: ExportOptions) -> tuple[str, float]:
