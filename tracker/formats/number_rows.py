@@ -146,28 +146,23 @@ class NumberRows:
         Raises:
             FormatError: the row has another number of columns or is not numbers, or the table is too large.
         """
-        self._check_size(line)
         row = self._complete_row(text)
-        self._append(
-            row or self._numbers(split_cells(text, self._separator, f"{self._where}, line {line}"), line), line
-        )
+        where = f"{self._where}, line {line}"
+        self._append(row or self._numbers(split_cells(text, self._separator, where), line), line)
 
     def add_cells(self, cells: Sequence[str], line: int) -> None:
         """Add a row of cells; see `add`."""
-        self._check_size(line)
         self._append(self._complete_row(self._separator.join(cells)) or self._numbers(cells, line), line)
 
     def _append(self, row: list[float], line: int) -> None:
         if not (row[0].is_integer() and abs(row[0]) <= MAX_FRAMES):
             expected = f"a whole frame number of at most {MAX_FRAMES} first"
             raise FormatError.mismatch(f"{self._where}, line {line}", expected, f"{row[0]:g}", "correct it")
-        self._values.frombytes(np.array(row).tobytes())
-        self._lines.append(line)
-
-    def _check_size(self, line: int) -> None:
         if len(self._values) + self._n_columns > MAX_VALUES:
             expected = f"at most {MAX_VALUES} values"
             raise FormatError.mismatch(f"{self._where}, line {line}", expected, "more", "cut it in pieces")
+        self._values.frombytes(np.array(row).tobytes())
+        self._lines.append(line)
 
     def _complete_row(self, text: str) -> list[float] | None:
         """Parse a row without blanks, twice as fast as `_numbers`; None if it needs a closer look."""

@@ -28,10 +28,15 @@ def write_points(motion: ExportedMotion, options: ExportOptions, paths: Sequence
     Raises:
         RecordingError: the footage cannot be read.
     """
-    cameras = exported_cameras(motion, options)
-    files = OpenPoseFiles(motion, cameras, paths[0])
-    with undistorted_pictures(motion, options, paths[0]) as pictures:
-        write_views(motion, cameras, pictures, files.write, tick)
+    files = OpenPoseFiles(motion, exported_cameras(motion, options), paths[0])
+    _write(files, motion, options, paths[0], tick)
+
+
+def _write(
+    labels: "OpenPoseFiles | Masks", motion: ExportedMotion, options: ExportOptions, folder: Path, tick: Tick
+) -> None:
+    with undistorted_pictures(motion, options, folder) as pictures:
+        write_views(motion, exported_cameras(motion, options), pictures, labels.write, tick)
 
 
 def write_views(
@@ -114,10 +119,7 @@ def write_masks(motion: ExportedMotion, options: ExportOptions, paths: Sequence[
         FormatError: there are more people or parts than labels.
         RecordingError: the footage cannot be read.
     """
-    cameras = exported_cameras(motion, options)
-    masks = Masks(motion, cameras, paths[0])
-    with undistorted_pictures(motion, options, paths[0]) as pictures:
-        write_views(motion, cameras, pictures, masks.write, tick)
+    _write(Masks(motion, exported_cameras(motion, options), paths[0]), motion, options, paths[0], tick)
 
 
 class Masks:

@@ -237,14 +237,11 @@ def write_dataset(motion: ExportedMotion, options: ExportOptions, paths: Sequenc
 
 
 def _check(options: ExportOptions) -> None:
-    if options.pictures == "video" and options.pixels == "undistorted":
-        raise FormatError(
-            "expected images with undistorted pixels, found video: footage is copied as it is", Remedy("export_images")
-        )
-    if options.pictures == "video" and options.faces == "blurred":
-        raise FormatError(
-            "expected images with blurred faces, found video: footage is copied as it is", Remedy("export_images")
-        )
+    kinds = {"undistorted pixels": options.pixels == "undistorted", "blurred faces": options.faces == "blurred"}
+    if options.pictures == "video" and any(kinds.values()):
+        kind = next(kind for kind, is_wanted in kinds.items() if is_wanted)
+        found = "video: footage is copied as it is"
+        raise FormatError.mismatch("", f"images with {kind}", found, Remedy("export_images"))
 
 
 def _write(folder: Path, plan: DatasetPlan, options: ExportOptions, tick: Tick) -> list[RecordingSummary]:
