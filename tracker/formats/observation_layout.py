@@ -16,18 +16,10 @@ import msgspec
 
 from tracker.errors import FormatError
 from tracker.files import open_regular
+from tracker.formats import text_files
 from tracker.formats.number_rows import head_cells
-from tracker.formats.text_files import (
-    DOCUMENT_BYTES,
-    TABLE_BYTES,
-    TextKind,
-    packaged_texts,
-    parse_toml,
-    read_json,
-    read_lines,
-)
 
-_TEXT = TextKind("file", TABLE_BYTES, FormatError)
+_TEXT = text_files.TextKind("file", text_files.TABLE_BYTES, FormatError)
 _HEAD_LINES = 12
 """Lines in which all known tables have shown their columns: the header of a C3D export by QTM takes 10."""
 T = TypeVar("T")
@@ -48,7 +40,7 @@ class Sample:
     def head(self) -> tuple[str, ...]:
         """First lines, without their ends; none if the file is no text."""
         try:
-            return tuple(islice(read_lines(self.path, _TEXT), _HEAD_LINES))
+            return tuple(islice(text_files.read_lines(self.path, _TEXT), _HEAD_LINES))
         except FormatError:
             return ()
 
@@ -61,7 +53,7 @@ class Sample:
     def data(self) -> Any:
         """Plain data of a JSON file; None if it is none."""
         try:
-            return read_json(self.path, _TEXT)
+            return text_files.read_json(self.path, _TEXT)
         except FormatError:
             return None
 
@@ -120,9 +112,10 @@ class Unread(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return bool(self.marks) and all(pattern in marks or matching(marks, pattern) for pattern in self.marks)
 
 
-_KIND = TextKind("table of programs", DOCUMENT_BYTES, FormatError)
+_KIND = text_files.TextKind("table of programs", text_files.DOCUMENT_BYTES, FormatError)
 _ROWS: Mapping[str, tuple[Unread, ...]] = msgspec.convert(
-    parse_toml(packaged_texts("formats")["unread"], "unread.toml", _KIND), dict[str, tuple[Unread, ...]]
+    text_files.parse_toml(text_files.packaged_texts("formats")["unread"], "unread.toml", _KIND),
+    dict[str, tuple[Unread, ...]],
 )
 
 

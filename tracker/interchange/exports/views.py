@@ -1,10 +1,9 @@
 """The views of an export: their cameras in its pixels, their pictures, and the people in them, as points and labels."""
 
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple
 
 import cv2
@@ -76,10 +75,8 @@ class Pictures:
         path.write_bytes(data.tobytes())
         return True
 
-    def __enter__(self) -> "Pictures":
-        return self
-
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+    def close(self) -> None:
+        """Close the footage."""
         self._recording.close()
 
 
@@ -98,7 +95,7 @@ def undistorted_pictures(
         return
     cameras = exported_cameras(motion, options)
     write_text_atomic(folder / CALIBRATION, format_calibration(cameras))
-    with Pictures(motion, options, cameras, folder) as pictures:
+    with closing(Pictures(motion, options, cameras, folder)) as pictures:
         yield pictures
 
 

@@ -13,15 +13,7 @@ from tracker.footage.chapters import chapter_files
 from tracker.footage.image_folder import ImageFolder
 from tracker.formats.bvh import UPRIGHT_Y, BvhFrame, write_bvh
 from tracker.formats.file_names import identifier
-from tracker.formats.keypoints.coco import (
-    CocoAnnotation,
-    CocoCategory,
-    CocoImage,
-    body_category,
-    keypoint_triples,
-    person_category,
-    write_coco,
-)
+from tracker.formats.keypoints import coco
 from tracker.formats.model_toml import format_model
 from tracker.formats.motion_csv import MotionRow, write_motion_csv
 from tracker.formats.pose_csv import value_units
@@ -102,7 +94,7 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
     """Write the keypoints of people in all views as COCO."""
     categories = coco_categories(motion, options)
     names = [_FileNames(source) for source in motion.session.cameras]
-    images, annotations = list[CocoImage](), list[CocoAnnotation]()
+    images, annotations = list[coco.CocoImage](), list[coco.CocoAnnotation]()
 
     def write(views: FrameViews, view: int, frame: int) -> None:
         images.append(names[view].image(len(images) + 1, frame))
@@ -111,42 +103,42 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
 
     write_views(motion, [c.camera for c in motion.session.cameras], None, write, tick)
     description = f"{motion.session.name}, exported by Quadrille, {motion.calibration_note}"
-    write_coco(paths[0], description, motion.calibrations.present, categories, images, annotations)
+    coco.write_coco(paths[0], description, motion.calibrations.present, categories, images, annotations)
 
 
-def coco_categories(motion: ExportedMotion, options: ExportOptions) -> list[CocoCategory]:
+def coco_categories(motion: ExportedMotion, options: ExportOptions) -> list[coco.CocoCategory]:
     """Return the sets of keypoints of an export."""
-    categories: list[CocoCategory] = []
+    categories: list[coco.CocoCategory] = []
     if options.keypoints != "body":
-        categories.append(person_category(1))
+        categories.append(coco.person_category(1))
     if options.keypoints != "coco17":
         for model in {m.name: m for p in motion.exported for m in p.models}.values():
-            categories.append(body_category(len(categories) + 1, model))
+            categories.append(coco.body_category(len(categories) + 1, model))
     return categories
 
 
 def coco_annotations(
     motion: ExportedMotion,
-    categories: Sequence[CocoCategory],
+    categories: Sequence[coco.CocoCategory],
     person: PersonMotion,
     body: PosedBody,
     seen: Keypoints,
-    image: CocoImage,
+    image: coco.CocoImage,
     n_before: int,
-) -> list[CocoAnnotation]:
+) -> list[coco.CocoAnnotation]:
     """Return the annotations of a person in an image, one for each category that the body has."""
-    out: list[CocoAnnotation] = []
+    out: list[coco.CocoAnnotation] = []
     status = person.poses[image.frame].record.status
     calibration = motion.calibration_of(person, image.frame)
     is_earlier = calibration != motion.calibrations.present
     for category in categories:
         if category.name not in ("person", body.model.name):
             continue
-        triples = keypoint_triples(body.model.point_names, seen.points_px, seen.visibility, category.keypoints)
+        triples = coco.keypoint_triples(body.model.point_names, seen.points_px, seen.visibility, category.keypoints)
         n = sum(v > 0 for v in triples[2::3])
         assert seen.box_px is not None
         out.append(
-            CocoAnnotation(
+            coco.CocoAnnotation(
                 n_before + len(out) + 1, image.id, category.id, triples, n, seen.box_px, seen.area_px,
                 person.person.name, person.index, status, calibration, is_earlier,
             )
@@ -163,11 +155,13 @@ class _FileNames:
         is_folder = source.footage.is_dir() and not chapter_files(source.footage)
         self._names = [p.name for p in ImageFolder(source.footage, source.camera.name).files] if is_folder else None
 
-    def image(self, id: int, frame: int) -> CocoImage:
+    def image(self, id: int, frame: int) -> coco.CocoImage:
         """Return the entry of a frame."""
         camera, at = self._source.camera, frame + self._source.offset
         name = f"{at:06d}.jpg" if self._names is None else self._names[at]
-        return CocoImage(id, f"{camera.name}/{name}", *camera.size, camera.name, frame, self._source.footage.name, at)
+        return coco.CocoImage(
+            id, f"{camera.name}/{name}", *camera.size, camera.name, frame, self._source.footage.name, at
+        )
 
 
 def _row(motion: ExportedMotion, person: PersonMotion, frame: int) -> MotionRow:

@@ -134,7 +134,7 @@ class FilmedPeople:
     """Whether a view shows anybody, (F, n_views)."""
     motion: FilmedMotion | None = None
     """How the pictures move; None where that is unknown."""
-    is_filmed: bool = True
+    knows_frames: bool = True
     """Whether they are those of footage; else people may be anywhere in the pictures."""
     is_whole: bool = True
     """Whether silhouettes show people whole: against the median of a recording, only what moves is seen."""
@@ -148,11 +148,6 @@ class FilmedPeople:
     def n_views(self) -> int:
         """Number of views, each of which shows the limbs."""
         return len(self.cameras)
-
-    @property
-    def knows_frames(self) -> bool:
-        """Whether there is footage."""
-        return self.is_filmed
 
     def lag_errors_m(self, places: Places, most: int) -> list[Array]:
         """Return how far limbs move beside the pictures of other frames, and how far they are from their silhouettes.
@@ -241,7 +236,7 @@ def _filmed(recording: Recording, finder: SilhouetteFinder, frames: IntArray) ->
 
 def _anywhere(cameras: tuple[Camera, ...], n_frames: int) -> FilmedPeople:
     distances = tuple(np.broadcast_to(np.uint8(0), (n_frames, c.height, c.width)) for c in cameras)
-    return FilmedPeople(cameras, distances, np.ones((n_frames, len(cameras)), dtype=bool), is_filmed=False)
+    return FilmedPeople(cameras, distances, np.ones((n_frames, len(cameras)), dtype=bool), knows_frames=False)
 
 
 def _distances(mask: Mask) -> NDArray[np.uint8]:

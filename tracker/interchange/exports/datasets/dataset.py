@@ -17,7 +17,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
@@ -275,7 +275,7 @@ def _write_recording(
     with ExitStack() as stack:
         pictures = None
         if options.pictures == "images":
-            pictures = stack.enter_context(Pictures(motion, options, cameras, folder))
+            pictures = stack.enter_context(closing(Pictures(motion, options, cameras, folder)))
         else:
             _copy_footage(motion, folder / "videos")
         write_views(motion, cameras, pictures, labels.write, tick)
