@@ -13,8 +13,7 @@ from app.cli.target import Target, load_target
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
-from tracker.interchange.exports.export_format import ExportFormat
-from tracker.interchange.exports.formats import FORMATS, OPTIONS, find_format
+from tracker.interchange.exports.formats import FORMATS, OPTIONS, ExportFormat, find_format
 
 if TYPE_CHECKING:
     from tracker.interchange.exports.datasets.card import RecordingSummary

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tracker.interchange.exports.export_format import ExportFormat
+from tracker.interchange.exports.formats import ExportFormat
 
 if TYPE_CHECKING:
     from tracker.interchange.exports.motion import ExportedMotion, ExportOptions

@@ -7,7 +7,6 @@ and method of each pose and point.
 
 __all__ = [
     "export_files",
-    "export_format",
     "faces",
     "formats",
     "keypoints",

@@ -14,7 +14,7 @@ import msgspec
 
 from tracker.errors import Remedy, TrackerError
 from tracker.formats.file_names import identifiers
-from tracker.interchange.exports.export_format import ExportFormat
+from tracker.interchange.exports.formats import ExportFormat
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions
 from tracker.interchange.exports.provenance import SIDE_FILE, write_provenance
 from tracker.session.holder import is_alive, read_holder, this_holder

@@ -12,7 +12,7 @@ from tracker.formats.joint_maps import known_joint_maps
 from tracker.formats.keypoints.detections import OpenPosePerson, file_name, write_openpose
 from tracker.formats.write_only.indexed_png import write_indexed_png
 from tracker.geometry.cameras import Camera
-from tracker.interchange.exports.export_format import Tick
+from tracker.interchange.exports.formats import Tick
 from tracker.interchange.exports.keypoints import project_through_lens
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions
 from tracker.interchange.exports.provenance import point_lost

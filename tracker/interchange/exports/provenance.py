@@ -18,7 +18,7 @@ from tracker.body.model import BodyModel
 from tracker.files import write_text_atomic
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
-from tracker.interchange.exports.export_format import Tick
+from tracker.interchange.exports.formats import Tick
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, PersonMotion, file_from_world
 from tracker.session.store.edit_tree import program_version
 from tracker.session.store.records import SEEN, SOURCES, Pin, PoseRecord

@@ -18,8 +18,8 @@ from tracker.formats.anipose import format_calibration
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import BEYOND_PX, MAX_PINHOLE_ANGLE, Camera
 from tracker.geometry.lens_tables import lens_of, undistortion_map
-from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.faces import recording_of
+from tracker.interchange.exports.formats import Tick
 from tracker.interchange.exports.keypoints import Keypoints, keypoints_in_views
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, PersonMotion
 

@@ -25,7 +25,7 @@ from tracker.formats.write_only.opensim_model import write_mot, write_osim
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import up_rotation
-from tracker.interchange.exports.export_format import Tick
+from tracker.interchange.exports.formats import Tick
 from tracker.interchange.exports.keypoints import Keypoints
 from tracker.interchange.exports.label_writers import write_views
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, PersonMotion, file_from_world, up_in_file

@@ -35,7 +35,7 @@ from tracker.geometry.cameras import Camera
 from tracker.interchange.exports.datasets.card import TO_FILL_IN, LabelCounts, RecordingSummary, format_card, summarize
 from tracker.interchange.exports.datasets.splits import SplitChoice, divide
 from tracker.interchange.exports.export_files import FOLDER_PROVENANCE, is_export_folder, moved_at_end, unwritable
-from tracker.interchange.exports.export_format import Tick
+from tracker.interchange.exports.formats import Tick
 from tracker.interchange.exports.label_writers import OpenPoseFiles, write_views
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions
 from tracker.interchange.exports.provenance import write_provenance
