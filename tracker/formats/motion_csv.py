@@ -13,14 +13,8 @@ from pathlib import Path
 
 from tracker.files import write_text_atomic
 
-PROVENANCE = {
-    "status": "status",
-    "source": "source",
-    "keyframe": "keyframe",
-    "calibration_revision": "calibration",
-    "earlier_calibration": "earlier_calibration",
-}
-"""Columns of what is known of a pose, by the names that other files give them."""
+PROVENANCE = ("status", "source", "keyframe", "calibration_revision", "earlier_calibration")
+"""Columns of what is known of a pose, as other files name it; `calibration_revision` is called `calibration` here."""
 _DIGITS = 7
 """Decimals of a value: a tenth of a micrometre."""
 
@@ -54,7 +48,8 @@ def write_motion_csv(
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     costs = ["cost_px", *(f"cost_{camera}_px" for camera in cameras)]
-    table.writerow(["person", "frame", "time_s", *PROVENANCE.values(), *costs, *columns])
+    known_columns = [name.removesuffix("_revision") for name in PROVENANCE]
+    table.writerow(["person", "frame", "time_s", *known_columns, *costs, *columns])
     for row in rows:
         known = [row.provenance.get(key, "") for key in PROVENANCE]
         flags = [str(value).lower() if isinstance(value, bool) else value for value in known]

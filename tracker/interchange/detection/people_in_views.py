@@ -229,13 +229,8 @@ class PeopleInViews:
         center, chest = camera.distort_points(camera.project(np.array([hips, shoulders])))
         if not ((center >= 0) & (center < camera.size)).all():
             return None
-        side = (
-            ADULT.square_m
-            * float(np.median(track.legs_m or ADULT.leg_m))
-            / ADULT.leg_m
-            * self._views.focal_px[view]
-            / depth
-        )
+        square_m = ADULT.square_m * float(np.median(track.legs_m or ADULT.leg_m)) / ADULT.leg_m
+        side = square_m * self._views.focal_px[view] / depth
         # From above or below the trunk has no direction in the picture.
         is_along = np.hypot(*(chest - center)) > 0.1 * side
         return PictureSquare(center, side, _turn(chest - center if is_along else self._up_px(view, hips)))

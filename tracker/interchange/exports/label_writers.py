@@ -143,11 +143,8 @@ class Masks:
         )
         rows = {(p.index, part.name): part for p in motion.exported for model in p.models for part in model.parts}
         if max(in_scene, len(rows) + 1) > SOMEBODY:
-            raise FormatError(
-                f"expected at most {SOMEBODY - 1} parts of all people together, as masks of 8 bits have labels, found "
-                f"{max(in_scene, len(rows))}",
-                Remedy("fewer_people"),
-            )
+            expected = f"at most {SOMEBODY - 1} parts of all people together, as masks of 8 bits have labels"
+            raise FormatError.mismatch("", expected, max(in_scene, len(rows)), Remedy("fewer_people"))
         self._labels = {key: label for label, key in enumerate(rows, 1)}
         self._part_colors = {self._labels[key]: part.color for key, part in rows.items()} | {SOMEBODY: _SOMEBODY_COLOR}
         self._colors = {p.index + 1: p.person.color for p in motion.exported} | {SOMEBODY: _SOMEBODY_COLOR}

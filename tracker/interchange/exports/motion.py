@@ -153,11 +153,8 @@ class PersonMotion:
         """
         other = next((m for m in self.models if m.value_names != self.model.value_names), None)
         if other is not None:
-            raise SessionError(
-                f"expected poses of '{self.person.name}' with the degrees of freedom of '{self.model.name}', found "
-                f"some of '{other.name}'",
-                Remedy("frames_of_one_body"),
-            )
+            expected = f"poses of '{self.person.name}' with the degrees of freedom of '{self.model.name}'"
+            raise SessionError.mismatch("", expected, f"some of '{other.name}'", Remedy("frames_of_one_body"))
         return {f: retarget_pose(p.body.values, p.body.model, self.model) for f, p in self.poses.items()}
 
     def without_gaps(self, frames: Sequence[int]) -> Array:

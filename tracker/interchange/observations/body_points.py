@@ -30,13 +30,9 @@ def body_points(observations: ObservationSet, cameras: Sequence[Camera]) -> dict
             for i, person in enumerate(observations.people)
         }
     found = triangulate_observations(observations, cameras)
+    joints_world, px, confidence = found.joints.joints_world, found.positions_px[..., at, :], found.confidence[..., at]
     return {
-        person: BodyPoints(
-            names,
-            found.joints.joints_world[:, i, at],
-            _normalized(cameras, found.positions_px[:, i][:, :, at]),
-            found.confidence[:, i][:, :, at],
-        )
+        person: BodyPoints(names, joints_world[:, i, at], _normalized(cameras, px[:, i]), confidence[:, i])
         for i, person in enumerate(observations.people)
     }
 

@@ -159,10 +159,6 @@ class TriangulatedObservations:
     """Detection of each person, (n_frames, n_people, n_views); -1 where a view shows none."""
     is_exchanged: Mask
     """Whether left and right were exchanged in a view, and mended, (n_frames, n_people, n_views, 2): arms, legs."""
-    is_inlier: Mask
-    """Whether a view agrees with a point, (n_frames, n_people, n_views, n_points)."""
-    residuals_px: Array
-    """Distance of each observation from its point, (n_frames, n_people, n_views, n_points), undistorted px."""
     positions_px: Array
     """Each observation with its sides mended, (n_frames, n_people, n_views, n_points, 2), undistorted px; NaN where
     absent."""
@@ -208,13 +204,11 @@ def triangulate_observations(
             flags[..., g] = exchanged_sides(views, own_px, own_confidence, pairs)
             own_px = with_sides_exchanged(own_px, pairs, flags[..., g])
             own_confidence = with_sides_exchanged(own_confidence, pairs, flags[..., g])
-        found.append((flags, own_px, own_confidence, *triangulate_points(views, own_px, own_confidence)))
+        points_world, covariances, *_ = triangulate_points(views, own_px, own_confidence)
+        found.append((flags, own_px, own_confidence, points_world, covariances))
     flags, own_px, own_confidence, *of_joints = (np.stack(part, axis=1) for part in zip(*found, strict=True))
-    world, covariances, residuals_px, is_inlier = of_joints
-    joints = ObservedJoints(points.names, people, world, covariances)
-    return TriangulatedObservations(
-        joints, identities, detections, flags, is_inlier, residuals_px, own_px, own_confidence
-    )
+    joints = ObservedJoints(points.names, people, *of_joints)
+    return TriangulatedObservations(joints, identities, detections, flags, own_px, own_confidence)
 
 
 def side_pairs(observations: ObservationSet) -> list[list[tuple[int, int]]]:

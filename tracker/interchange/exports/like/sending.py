@@ -232,11 +232,8 @@ def export_like(
             f"expected key points, in which sides can be exchanged, found the points in space '{observations.name}'"
         )
     if not observations.sources:
-        raise FormatError(
-            f"expected observations that were imported, found '{observations.name}', which was detected here and has "
-            "no files to send back",
-            Remedy("export_joints"),
-        )
+        found = f"'{observations.name}', which was detected here and has no files to send back"
+        raise FormatError.mismatch("", "observations that were imported", found, Remedy("export_joints"))
     contents = _stored_contents(session, observations)
     cameras = [c.camera for c in session.cameras]
     joints_world = observed_joints(observations, cameras).joints_world
