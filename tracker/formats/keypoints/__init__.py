@@ -12,7 +12,6 @@ __all__ = [
     "detections",
     "hand_labels",
     "hdf5",
-    "json_patching",
     "picture_names",
     "picture_table",
 ]
