@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tracker.api.work import acquire, find, track
     from tracker.errors import TrackerError
     from tracker.evaluation.metric import ComparedJoints, Metric
-    from tracker.interchange.exports.export_format import ExportFormat
+    from tracker.interchange.exports.formats import ExportFormat
 
 __all__ = [
     "ComparedJoints",
@@ -46,7 +46,7 @@ _PLACES = {
     "tracker.api.work": ("acquire", "find", "track"),
     "tracker.errors": ("TrackerError",),
     "tracker.evaluation.metric": ("ComparedJoints", "Metric"),
-    "tracker.interchange.exports.export_format": ("ExportFormat",),
+    "tracker.interchange.exports.formats": ("ExportFormat",),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 _PLACE = str(Path(__file__).resolve().parents[1])

@@ -166,7 +166,7 @@ def _extensions() -> list[Finding]:
     from tracker.evaluation.metric import Metric
     from tracker.formats.calibrations.calibration_layout import CalibrationLayout
     from tracker.interchange.detection.detector import DetectorKind
-    from tracker.interchange.exports.export_format import ExportFormat
+    from tracker.interchange.exports.formats import ExportFormat
 
     kinds = (ExportFormat, Metric, CalibrationLayout, DetectorKind, None)
     found = []

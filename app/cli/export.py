@@ -13,8 +13,7 @@ from app.cli.target import Target, load_target
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
-from tracker.interchange.exports.export_format import ExportFormat
-from tracker.interchange.exports.formats import FORMATS, OPTIONS, find_format
+from tracker.interchange.exports.formats import FORMATS, OPTIONS, ExportFormat, find_format
 
 if TYPE_CHECKING:
     from tracker.interchange.exports.datasets.card import RecordingSummary
@@ -148,8 +147,7 @@ def _only(arguments: ExportArguments) -> "Checked | None":
 
 def _export_dataset(arguments: ExportArguments) -> None:
     """Write a dataset of several sessions, or of one with a split."""
-    from tracker.interchange.exports.datasets.dataset import export_dataset, plan_dataset
-    from tracker.interchange.exports.datasets.labels import DatasetRecording
+    from tracker.interchange.exports.datasets.dataset import DatasetRecording, export_dataset, plan_dataset
     from tracker.interchange.exports.datasets.splits import parse_splits, recording_names
     from tracker.interchange.exports.export_files import check_options
     from tracker.interchange.exports.motion import read_motion

@@ -162,8 +162,7 @@ def _detected(name: str | None, session: "Session", frames: range, reporter: Rep
     """Detect people unless that was done; return the name of the observations."""
     from tracker.footage.recording import Recording
     from tracker.interchange.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
-    from tracker.interchange.detection.detectors import load_detector
-    from tracker.interchange.detection.model_files import default_folder
+    from tracker.interchange.detection.detectors import default_folder, load_detector
     from tracker.session.lock import SessionLock
 
     detector, text = load_detector("blazepose", None, default_folder())

@@ -20,8 +20,7 @@ from tracker.footage.video_writer import VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image
 from tracker.geometry.cameras import Camera
 from tracker.interchange.exports.faces import recording_of
-from tracker.interchange.exports.motion import ExportedMotion
-from tracker.interchange.exports.options import ExportOptions, load_character
+from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, load_character
 from tracker.session.session import Session
 
 _LAYERS = frozenset(("contours", "hidden"))

@@ -4,11 +4,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tracker.interchange.exports.export_format import ExportFormat
+from tracker.interchange.exports.formats import ExportFormat
 
 if TYPE_CHECKING:
-    from tracker.interchange.exports.motion import ExportedMotion
-    from tracker.interchange.exports.options import ExportOptions
+    from tracker.interchange.exports.motion import ExportedMotion, ExportOptions
 
 
 def _write(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:

@@ -22,8 +22,7 @@ from app.runtime.temporary_folder import TemporaryFolder
 from app.server import connections
 from app.server.page_requests import require_page
 from tracker.errors import TrackerError
-from tracker.interchange.exports.export_format import ExportFormat
-from tracker.interchange.exports.formats import FORMATS, OPTIONS
+from tracker.interchange.exports.formats import FORMATS, OPTIONS, ExportFormat
 
 if TYPE_CHECKING:
     from tracker.interchange.exports.motion import Checked

@@ -25,7 +25,7 @@ from tracker.errors import TrackerError
 from tracker.formats.file_names import identifier
 from tracker.formats.joint_maps import known_joint_maps
 from tracker.geometry.lengths import METRES_BY_WORD
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.validation import FileStem, Name
 
 _Size = Annotated[int, Meta(ge=1, le=100_000, title="Picture size", description="a width and a height in pixels")]

@@ -10,8 +10,8 @@ from app.remedies import page_text
 from app.session.camera_check import exchange_of
 from app.session.path_choice import TypedPath, TypedPaths, typed_path, typed_paths
 from tracker.errors import SessionError, TrackerError
+from tracker.formats.anipose import Units
 from tracker.formats.calibrations.convention_names import PoseConvention
-from tracker.formats.camera_section import Units
 from tracker.geometry.lengths import height_m
 from tracker.session.assemble import DEFAULT_MODEL, NewSession, SessionParts, check_parts
 from tracker.session.footage_files import footage_in

@@ -11,9 +11,9 @@ from app.remedies import page_text
 from app.session.new_session import MAX_CAMERAS, Up
 from app.session.path_choice import TypedPath, TypedPaths, typed_path, typed_paths
 from tracker.errors import TrackerError
+from tracker.formats.anipose import CameraEntry, Units
 from tracker.formats.calibrations.convention_names import PoseConvention
 from tracker.formats.calibrations.reading import read_cameras
-from tracker.formats.camera_section import CameraEntry, Units
 from tracker.session.footage_files import footage_in, side_parts
 from tracker.session.matching import camera_name
 from tracker.session.rig_summary import RigSummary, summarize_rig

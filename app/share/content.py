@@ -99,20 +99,14 @@ def _figure(model: BodyModel) -> list[list[int]]:
 
 
 def _pose(motion: ExportedMotion, person: PersonMotion, frame: int, figures: dict[BodyModel, int]) -> dict[str, Any]:
-    found, body = pose_provenance(motion, person, frame), person.body(frame)
-    record = found.record
+    found, body = pose_provenance(motion, person, frame).fields, person.body(frame)
     return {
         "figure": figures[body.model],
         "points": np.round(1000 * body.points_world).astype(int).ravel().tolist(),
-        "status": record.status,
-        "source": found.source,
-        "keyframe": record.keyframe,
-        "reviewed": found.is_reviewed,
-        "remark": record.remark,
-        "time": record.time,
-        "program": record.program,
-        "calibration": found.calibration_revision,
-        "body": f"{body.model.name}, revision {record.model_revision}",
+        **{key: found[key] for key in ("status", "source", "keyframe", "reviewed", "remark", "program")},
+        "time": found["edit_time"],
+        "calibration": found["calibration_revision"],
+        "body": f"{body.model.name}, revision {found['body_revision']}",
     }
 
 

@@ -14,8 +14,7 @@ from app.share.pictures import GRADES, Encoder, choose_encoder
 from tracker.footage.recording import Recording
 from tracker.interchange.exports.export_files import moved_at_end, unwritable
 from tracker.interchange.exports.faces import recording_of
-from tracker.interchange.exports.motion import ExportedMotion
-from tracker.interchange.exports.options import FacesName
+from tracker.interchange.exports.motion import ExportedMotion, FacesName
 
 _FILES = ("index.html", "page.js", "page.css", "data.js")
 """Files of a shared folder beside its pictures."""

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tracker.body.model import BodyModel
-from tracker.interchange.exports.point_origins import PointOrigin, point_origins
+from tracker.interchange.exports.provenance import PointOrigin, point_origins
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.calibration_log import present_revision, revisions_of_poses
 from tracker.session.store.records import PoseRecord

@@ -33,8 +33,7 @@ from tracker.formats.calibrations.reading import read_cameras
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
-from tracker.interchange.observations.joints import triangulate_observations
-from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.observed import ObservationSet, triangulate_observations
 from tracker.simulate.stage.camera_rig import make_cameras
 
 KINDS = ("recordings", "simulated", "several", "alone")

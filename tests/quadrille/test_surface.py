@@ -11,7 +11,7 @@ from tracker.estimation.acquisition.from_contours import Acquisition
 from tracker.evaluation.judging.judge import Judgement
 from tracker.evaluation.metric import ComparedJoints, Metric
 from tracker.evaluation.metrics import Evaluation
-from tracker.interchange.exports.export_format import ExportFormat
+from tracker.interchange.exports.formats import ExportFormat
 from tracker.session.session import Session
 
 SURFACE = Path(__file__).with_name("surface.txt")

@@ -13,7 +13,7 @@ from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording, read_mask
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.pipeline.find_people import FindSettings, find_people
 from tracker.session.session import create_session
 from tracker.simulate.record import Simulation, simulate

@@ -19,7 +19,7 @@ from tracker.footage.video_writer import VideoWriter
 from tracker.formats.joint_maps import LIMB_JOINTS, known_joint_maps
 from tracker.formats.model_toml import load_model
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.pipeline.find_people import FindSettings, find_people
 from tracker.session.session import Person, create_session, load_session
 from tracker.simulate.record import Simulation, simulate

@@ -9,8 +9,7 @@ from rigs import cameras, ring
 from tracker.formats.joint_maps import known_joint_maps
 from tracker.formats.model_toml import load_model
 from tracker.interchange.plausibility.examine import contradictions
-from tracker.interchange.plausibility.filmed_motion import FilmedMotion
-from tracker.interchange.plausibility.filmed_people import FilmedPeople
+from tracker.interchange.plausibility.filmed_people import FilmedMotion, FilmedPeople
 from tracker.interchange.plausibility.readings import Reading, ReadPoints
 from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of

@@ -16,9 +16,8 @@ from tracker.evaluation.stored_evaluation import evaluate_stored
 from tracker.interchange.exports.export_files import check_options, for_format
 from tracker.interchange.exports.export_files import export as export_motion
 from tracker.interchange.exports.formats import find_format
-from tracker.interchange.exports.motion import Checked, read_motion
-from tracker.interchange.exports.options import ExportOptions
-from tracker.interchange.exports.pose_arrays import pose_arrays
+from tracker.interchange.exports.motion import Checked, ExportOptions, read_motion
+from tracker.interchange.exports.provenance import pose_arrays
 
 
 def read_poses(session: SessionOrFolder, person: PersonName = None, frames: Sequence[int] | None = None) -> PoseSeries:

@@ -10,7 +10,7 @@ The module that it names should import little, because help and menus load it. G
 
 | group | object |
 |---|---|
-| `quadrille.exporters` | `tracker.interchange.exports.export_format.ExportFormat` |
+| `quadrille.exporters` | `tracker.interchange.exports.formats.ExportFormat` |
 | `quadrille.metrics` | `tracker.evaluation.metric.Metric` |
 | `quadrille.calibrations` | `tracker.formats.calibrations.calibration_layout.CalibrationLayout` |
 | `quadrille.detectors` | `tracker.interchange.detection.detector.DetectorKind` |

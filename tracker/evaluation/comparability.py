@@ -6,14 +6,12 @@ import numpy as np
 
 from tracker.errors import Remedy
 from tracker.evaluation.metrics import LOST_M, best_rigid, gather_joints
-from tracker.formats.file_axes import axes_matrix
 from tracker.formats.joint_maps import LIMB_JOINTS, JointMap
-from tracker.formats.trc import MarkerTable
+from tracker.formats.trc import MarkerTable, axes_matrix
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.interchange.plausibility.posed_people import read_beside
-from tracker.interchange.plausibility.readings import Reading, ReadPoints
+from tracker.interchange.plausibility.readings import Reading, ReadPoints, read_beside
 
 APART_M = 1.0
 """Median distance above which two motions are not estimates of one."""

@@ -11,15 +11,14 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
 from tracker.evaluation.metrics import Motion, PoseDoubt, joints_of_poses
-from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import joints_of, read_joint_map
-from tracker.formats.joint_tables.subjects import by_subject
+from tracker.formats.joint_tables.layouts import by_subject
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.pose_csv import PoseTable, is_pose_table, read_pose_table
-from tracker.formats.trc import MarkerTable
+from tracker.formats.trc import MarkerTable, remap_axes
 from tracker.geometry.arrays import Array
+from tracker.interchange.observations.placing import name_points
 from tracker.interchange.observations.readers import FORMATS, SPACE_FORMATS, find_files
-from tracker.interchange.observations.space import name_points
 from tracker.session.clocks import Clock, Placement, place_rows
 from tracker.session.folder import SESSION_FILE
 from tracker.session.session import Session, load_session

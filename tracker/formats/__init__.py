@@ -8,12 +8,8 @@ session. Callers use the modules: `anipose`, `model_toml`, `pose_csv`, `trc`,
 __all__ = [
     "anipose",
     "bvh",
-    "bvh_patching",
     "bvh_reading",
     "c3d",
-    "camera_section",
-    "delimited",
-    "file_axes",
     "file_names",
     "joint_maps",
     "model_toml",
@@ -25,5 +21,4 @@ __all__ = [
     "text_files",
     "text_patch",
     "trc",
-    "unread",
 ]

@@ -7,12 +7,14 @@ components of quaternions have none. A missing value is an empty cell, which pan
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tracker.files import write_text_atomic
 
+PROVENANCE = ("status", "source", "keyframe", "calibration_revision", "earlier_calibration")
+"""Columns of what is known of a pose, as other files name it; `calibration_revision` is called `calibration` here."""
 _DIGITS = 7
 """Decimals of a value: a tenth of a micrometre."""
 
@@ -24,16 +26,8 @@ class MotionRow:
     person: str
     frame: int
     time_s: float
-    status: str = ""
-    """Status of the pose as its tracker assessed it; empty without a pose or an assessment."""
-    source: str = ""
-    """The most manual source of its values; empty without a pose."""
-    is_keyframe: bool | None = None
-    """None without a pose."""
-    calibration: int | None = None
-    """Revision of the calibration that the pose was made with; None without a pose."""
-    is_earlier: bool | None = None
-    """Whether that is another one than the session's present calibration; None without a pose."""
+    provenance: Mapping[str, str | bool | int] = field(default_factory=dict)
+    """Values of the columns `PROVENANCE`, perhaps with others; empty without a pose."""
     costs_px: Sequence[float | None] = ()
     """Mean cost, then the cost of each view, px; empty where unknown."""
     values: Sequence[float] = ()
@@ -54,18 +48,14 @@ def write_motion_csv(
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     costs = ["cost_px", *(f"cost_{camera}_px" for camera in cameras)]
-    names = ["person", "frame", "time_s", "status", "source", "keyframe", "calibration", "earlier_calibration"]
-    table.writerow([*names, *costs, *columns])
+    known_columns = [name.removesuffix("_revision") for name in PROVENANCE]
+    table.writerow(["person", "frame", "time_s", *known_columns, *costs, *columns])
     for row in rows:
-        calibration = "" if row.calibration is None else row.calibration
-        cells = [row.person, row.frame, f"{row.time_s:.6f}", row.status, row.source, _flag(row.is_keyframe)]
-        cells += [calibration, _flag(row.is_earlier)]
-        table.writerow([*cells, *_cells(row.costs_px, len(costs)), *_cells(row.values, len(columns))])
+        known = [row.provenance.get(key, "") for key in PROVENANCE]
+        flags = [str(value).lower() if isinstance(value, bool) else value for value in known]
+        cells = [*flags, *_cells(row.costs_px, len(costs)), *_cells(row.values, len(columns))]
+        table.writerow([row.person, row.frame, f"{row.time_s:.6f}", *cells])
     write_text_atomic(Path(path), text.getvalue())
-
-
-def _flag(value: bool | None) -> str:
-    return "" if value is None else str(value).lower()
 
 
 def _cells(numbers: Sequence[float | None], count: int) -> list[str]:

@@ -1,17 +1,102 @@
-"""Rows of numbers from the lines of a table file: a frame number first, the same number of columns in each."""
+"""Lines of a delimited table as cells, and as rows of numbers: a frame number first, equally many columns in each.
 
+Separator and quotes are found.
+"""
+
+import csv
 import re
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import FormatError
-from tracker.formats.delimited import split_cells
+from tracker.formats.text_files import TABLE_BYTES, TextKind, read_lines
 from tracker.geometry.arrays import Array
 from tracker.validation import MAX_FRAMES, quoted
+
+_KIND = TextKind("table", TABLE_BYTES, FormatError, "export it again")
+_SEPARATORS = "\t;,"
+_SKIPPED = ("#", "sep=")
+"""Beginnings of comments, and of Excel's name for the separator."""
+
+
+class TableLine(NamedTuple):
+    """A line of a table."""
+
+    line: int
+    """Its number in the file, from 1."""
+    cells: list[str]
+    """Without spaces around them; none of a blank line."""
+
+
+class Delimited(NamedTuple):
+    """A delimited table."""
+
+    where: str
+    """Names the file in messages."""
+    separator: str
+    rows: Iterator[TableLine]
+    """All lines but comments; taken once."""
+
+    @property
+    def filled(self) -> Iterator[TableLine]:
+        """Rows that are not blank, taken from all."""
+        return (row for row in self.rows if any(row.cells))
+
+
+def read_delimited(path: Path, kind: TextKind = _KIND, separator: str | None = None) -> Delimited:
+    """Read the lines of a table one by one; with a given separator, no line is a comment.
+
+    Raises:
+        FormatError: the file is missing or no text, or a line is malformed; the message has the line.
+    """
+    where, skipped = f"{kind.name} {path}", () if separator else _SKIPPED
+    separator = separator or _separator(read_lines(path, kind))
+    return Delimited(where, separator, _rows(where, separator, read_lines(path, kind), skipped))
+
+
+def head_cells(lines: Sequence[str]) -> list[list[str]]:
+    """Return the cells of the first lines of a file that are not blank; none of another kind of file."""
+    try:
+        return [line.cells for line in _rows("", _separator(lines), lines) if any(line.cells)]
+    except FormatError:
+        return []
+
+
+def _separator(lines: Iterable[str]) -> str:
+    """Return the separator of which the first line with any has most."""
+    for line in lines:
+        most = max(_SEPARATORS, key=line.count)
+        if most in line and not line.startswith("#"):
+            return most
+    return ","
+
+
+def _rows(where: str, separator: str, lines: Iterable[str], skipped: tuple[str, ...] = _SKIPPED) -> Iterator[TableLine]:
+    for number, line in enumerate(lines, 1):
+        if line.startswith(skipped):
+            continue
+        cells = split_cells(line, separator, f"{where}, line {number}")
+        yield TableLine(number, [cell.strip() for cell in cells] if line.strip(" \r") else [])
+
+
+def split_cells(line: str, separator: str, place: str) -> list[str]:
+    """Return the cells of a line, without quotes around them; `place` is that of the line in messages.
+
+    Raises:
+        FormatError: it is malformed.
+    """
+    is_plain = '"' not in line and len(line) <= csv.field_size_limit()
+    try:
+        return line.split(separator) if is_plain else next(csv.reader([line], delimiter=separator))
+    except csv.Error as error:
+        raise FormatError(f"{place}: {error}; export it again") from error
+
 
 MAX_VALUES = 40_000_000
 """Largest number of values of a table, 320 MB: an hour of 30 points at 120 Hz."""
@@ -61,28 +146,23 @@ class NumberRows:
         Raises:
             FormatError: the row has another number of columns or is not numbers, or the table is too large.
         """
-        self._check_size(line)
         row = self._complete_row(text)
-        self._append(
-            row or self._numbers(split_cells(text, self._separator, f"{self._where}, line {line}"), line), line
-        )
+        where = f"{self._where}, line {line}"
+        self._append(row or self._numbers(split_cells(text, self._separator, where), line), line)
 
     def add_cells(self, cells: Sequence[str], line: int) -> None:
         """Add a row of cells; see `add`."""
-        self._check_size(line)
         self._append(self._complete_row(self._separator.join(cells)) or self._numbers(cells, line), line)
 
     def _append(self, row: list[float], line: int) -> None:
         if not (row[0].is_integer() and abs(row[0]) <= MAX_FRAMES):
             expected = f"a whole frame number of at most {MAX_FRAMES} first"
             raise FormatError.mismatch(f"{self._where}, line {line}", expected, f"{row[0]:g}", "correct it")
-        self._values.frombytes(np.array(row).tobytes())
-        self._lines.append(line)
-
-    def _check_size(self, line: int) -> None:
         if len(self._values) + self._n_columns > MAX_VALUES:
             expected = f"at most {MAX_VALUES} values"
             raise FormatError.mismatch(f"{self._where}, line {line}", expected, "more", "cut it in pieces")
+        self._values.frombytes(np.array(row).tobytes())
+        self._lines.append(line)
 
     def _complete_row(self, text: str) -> list[float] | None:
         """Parse a row without blanks, twice as fast as `_numbers`; None if it needs a closer look."""

@@ -30,12 +30,13 @@ LOST = "\N{REPLACEMENT CHARACTER}"
 _FREE = re.compile("path|folder|directory|comment|note|remark|description|date|author|user|operator|software", re.I)
 """Keys whose values are free text: no program looks for a camera, joint or file by them."""
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
-_MARKS = (
-    (codecs.BOM_UTF32_LE, "utf-32"),  # begins as UTF-16's
-    (codecs.BOM_UTF32_BE, "utf-32"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
+BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF32_LE, "utf-32-le"),  # begins as UTF-16's
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
+"""First bytes of texts, and the encodings in which the mark is a character."""
 DOCUMENT_BYTES = 500_000
 """Size above which a document that people write is refused: a body of 20 parts takes 10 kB, a camera of a session 100
 bytes."""
@@ -196,9 +197,9 @@ def _encoding_of(start: bytes) -> str:
     Raises:
         ValueError: every second byte is zero, as in UTF-16 without a mark.
     """
-    for mark, encoding in _MARKS:
+    for mark, encoding in BYTE_ORDER_MARKS:
         if start.startswith(mark):
-            return encoding
+            return encoding[: len("utf-16")]  # without the order, by which the mark is left out
     if len(start) >= 4 and (start[0] == start[2] == 0 or start[1] == start[3] == 0) and any(start[:4]):
         raise ValueError("zero bytes, as in UTF-16 without a byte order mark: save it as UTF-8")
     return "utf-8-sig"

@@ -1,6 +1,5 @@
 """Replace numbers at their places in a text file, a table or JSON, and leave every other byte as it is."""
 
-import codecs
 import json
 import re
 from collections.abc import Mapping
@@ -8,16 +7,12 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any, TypeAlias
 
+from tracker.formats.text_files import BYTE_ORDER_MARKS
+
 Span: TypeAlias = tuple[int, int]
 """Begin and end of a place in a text."""
 CellValues: TypeAlias = Mapping[int, Mapping[int, float]]
 """Numbers of a table by row and column, both from 0; NaN leaves a cell empty."""
-_MARKS = (
-    (codecs.BOM_UTF32_LE, "utf-32-le"),  # begins as UTF-16's
-    (codecs.BOM_UTF32_BE, "utf-32-be"),
-    (codecs.BOM_UTF16_LE, "utf-16-le"),
-    (codecs.BOM_UTF16_BE, "utf-16-be"),
-)
 _CELL = re.compile(r'((?:"(?:[^"]|"")*"|[^,"])*)(?:,|$)')
 _TOKEN = re.compile(r'[ \t\n\r]*("(?:[^"\\]|\\.)*"|[\[\]{}:,]|[^\s"\[\]{}:,]+)', re.DOTALL)
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
@@ -41,7 +36,7 @@ class TextPatch:
 
     def __init__(self, data: bytes) -> None:
         """Decode a file; a mark of the byte order stays a character, bytes of no text become surrogates."""
-        self._encoding = next((name for mark, name in _MARKS if data.startswith(mark)), "utf-8")
+        self._encoding = next((name for mark, name in BYTE_ORDER_MARKS if data.startswith(mark)), "utf-8")
         self.text = data.decode(self._encoding, "surrogateescape")
         self._new: dict[Span, str] = {}
 

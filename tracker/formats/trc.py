@@ -1,4 +1,4 @@
-"""TRC files (OpenSim, Pose2Sim, Cortex): the tracks of named points in 3-D.
+"""TRC files (OpenSim, Pose2Sim, Cortex): the tracks of named points in 3-D, and the axes of such a file.
 
 Tab-separated: three lines of header, one of point names (each above its X, Y, Z), one of X1 Y1 Z1 ..., and rows of
 Frame#, Time and coordinates. Lengths are in the header's Units. Blank coordinates are missing points, written as empty
@@ -7,15 +7,15 @@ end of a row.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain
+from dataclasses import dataclass, replace
+from itertools import chain, permutations, product
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.errors import FormatError
+from tracker.errors import FormatError, Remedy
 from tracker.files import write_text_atomic
 from tracker.formats.number_rows import MAX_NAMES, MAX_TIME, NumberRows, not_a_number
 from tracker.formats.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
@@ -266,3 +266,47 @@ def patch_trc(path: Path, changes: Mapping[int, Array]) -> bytes:
     digits = 7 if scale < 10 else 4  # a tenth of a micrometre, as `write_trc` has it
     patch.replace_cells("\t", len(table.frames), new, digits)
     return patch.encoded()
+
+
+def remap_axes(table: MarkerTable, axes: str, may_mirror: bool = False) -> MarkerTable:
+    """Express a file's points in the session's axes.
+
+    Args:
+        table: the points in the file's axes.
+        axes: which of the file's axes are the session's x, y and z, e.g. `x,-z,y` for a file whose y points up.
+        may_mirror: whether axes that mirror the world are accepted: of a file in left-handed axes, whose points are
+            examined afterwards.
+
+    Raises:
+        FormatError: not three different axes, or they mirror the world.
+    """
+    if is_mirrored(axes) and not may_mirror:
+        raise FormatError(f"the axes {axes} would mirror the world, left to right", Remedy("turn_axis"))
+    return replace(table, points=table.points @ axes_matrix(axes).T)
+
+
+def axes_matrix(axes: str) -> Array:
+    """Return the matrix, (3, 3), that maps a file's coordinates to axes such as `x,-z,y`; it may mirror.
+
+    Raises:
+        FormatError: not three different axes.
+    """
+    matrix = np.zeros((3, 3))
+    words = [w.strip() for w in axes.split(",")]
+    for row, word in enumerate(words[:3]):
+        if word.lstrip("+-") in ("x", "y", "z"):
+            matrix[row, "xyz".index(word[-1])] = -1.0 if word.startswith("-") else 1.0
+    if len(words) != 3 or abs(np.linalg.det(matrix)) != 1:
+        raise FormatError(f"expected three different axes such as x,-z,y, found '{axes}'", Remedy("name_axes"))
+    return matrix
+
+
+def axis_conventions() -> Iterator[str]:
+    """Yield the 48 ways to map axes to axes as words such as `x,-z,y`; half of them mirror."""
+    for order, signs in product(permutations("xyz"), product(("", "-"), repeat=3)):
+        yield ",".join(f"{sign}{axis}" for sign, axis in zip(signs, order, strict=True))
+
+
+def is_mirrored(axes: str) -> bool:
+    """Return whether axes such as `x,z,y` mirror the world, left to right."""
+    return bool(np.linalg.det(axes_matrix(axes)) < 0)

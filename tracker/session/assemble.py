@@ -11,9 +11,9 @@ from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size
 from tracker.footage.video import Footage, open_footage
+from tracker.formats.anipose import CameraEntry, Units
 from tracker.formats.calibrations.convention_names import PoseConvention
 from tracker.formats.calibrations.reading import CalibratedCameras, read_cameras
-from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS

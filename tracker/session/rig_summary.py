@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import CalibrationError, Remedy
+from tracker.formats.anipose import MAX_OFFSET
 from tracker.formats.calibrations.pose_conventions import FITS_DEG
-from tracker.formats.camera_section import MAX_OFFSET
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import MIN_APART_M, axes_point

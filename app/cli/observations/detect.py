@@ -47,7 +47,7 @@ def command(arguments: Annotated[DetectArguments, tyro.conf.arg(name="")]) -> No
     --evidence both tracks by the key points and the contours.
     """
     from app.cli.observations.model_packages import fetch_models
-    from tracker.interchange.detection.model_files import LICENSE, default_folder
+    from tracker.interchange.detection.detectors import LICENSE, default_folder
 
     folder = arguments.models or default_folder()
     reporter = Reporter(silent=arguments.json)

@@ -81,7 +81,7 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
     from app.session.import_summary import import_summary
     from tracker.geometry.lengths import METRES_BY_WORD
     from tracker.interchange.observations.importing import store_import
-    from tracker.interchange.observations.request import ImportRequest
+    from tracker.interchange.observations.plans import ImportRequest
     from tracker.interchange.plausibility.examine import plan_examined_import
     from tracker.session.lock import SessionLock
     from tracker.session.session import load_session

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tracker.errors import TrackerError
 from tracker.files import write_bytes_atomic
-from tracker.interchange.detection.model_files import MODEL_FILES, TARBALL, WHEEL, model_file
+from tracker.interchange.detection.detectors import MODEL_FILES, TARBALL, WHEEL, model_file
 from tracker.interchange.observations.observed import checksum
 
 

@@ -23,12 +23,10 @@ from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
 from tracker.evaluation.judging.judge import judge
 from tracker.interchange.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
 from tracker.interchange.detection.detector import Detector
-from tracker.interchange.detection.detectors import load_detector
-from tracker.interchange.detection.model_files import default_folder
+from tracker.interchange.detection.detectors import default_folder, load_detector
 from tracker.interchange.observations.importing import store_import
 from tracker.interchange.observations.observed import ObservationSet
-from tracker.interchange.observations.plans import ImportPlan, MaskPlan
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportPlan, ImportRequest, MaskPlan
 from tracker.interchange.observations.stored import list_observations, load_observations
 from tracker.interchange.plausibility.examine import plan_examined_import
 from tracker.pipeline.chain import unplaced

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from quadrille import ExportFormat
 
 if TYPE_CHECKING:
-    from tracker.interchange.exports.motion import ExportedMotion
-    from tracker.interchange.exports.options import ExportOptions
+    from tracker.interchange.exports.motion import ExportedMotion, ExportOptions
 
 
 def write(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:

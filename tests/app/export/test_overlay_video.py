@@ -8,8 +8,7 @@ from stored_motions import distorted_cameras, random_poses
 from app.export import overlay_video
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.interchange.exports.motion import ExportedMotion, PersonMotion, StoredPose
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, PersonMotion, StoredPose
 from tracker.session.session import load_session
 from tracker.session.store.records import PoseRecord
 

@@ -16,9 +16,9 @@ from stored_motions import store_motion
 from app.server.export_routes import ExportRoutes
 from tracker.formats.trc import write_trc
 from tracker.interchange.exports import formats
-from tracker.interchange.exports.export_format import ExportFormat
+from tracker.interchange.exports.formats import ExportFormat
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.session.session import load_session
 
 

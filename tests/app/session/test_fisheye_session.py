@@ -19,8 +19,7 @@ from tracker.evidence.camera_exchange import find_exchange
 from tracker.evidence.observer import open_observer
 from tracker.footage.recording import Recording
 from tracker.footage.video import open_footage
-from tracker.interchange.exports.motion import ExportedMotion, PersonMotion, StoredPose
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, PersonMotion, StoredPose
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseRecord

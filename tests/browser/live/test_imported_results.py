@@ -13,7 +13,7 @@ from page_driver import command, handle_of, shows, to_client
 from program import SAMPLE, started, visited
 
 from tracker.evaluation.references import read_joints
-from tracker.formats.keypoints.openpose import read_openpose
+from tracker.formats.keypoints.detections import read_openpose
 from tracker.session.session import load_session
 
 pytestmark = pytest.mark.slow

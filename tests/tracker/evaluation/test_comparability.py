@@ -5,9 +5,8 @@ import pytest
 
 from app.remedies import command_line_text
 from tracker.evaluation.comparability import distance_note, length_note
-from tracker.formats.file_axes import axes_matrix
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.formats.trc import MarkerTable
+from tracker.formats.trc import MarkerTable, axes_matrix
 from tracker.geometry import rigid
 
 

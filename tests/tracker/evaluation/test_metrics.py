@@ -6,10 +6,9 @@ from bodies import set_deg
 
 from tracker.errors import FormatError
 from tracker.evaluation.metrics import Motion, best_rigid, evaluate_joints, evaluate_poses, joints_of_poses
-from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.model_toml import load_model
-from tracker.formats.trc import MarkerTable
+from tracker.formats.trc import MarkerTable, remap_axes
 from tracker.geometry import rigid
 
 

@@ -12,7 +12,7 @@ from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.pipeline import keypoint_evidence as module
 from tracker.pipeline.keypoint_evidence import (
     SEEN_BODIES,

@@ -38,8 +38,8 @@ from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.camera_rig import scaled_cameras
 from tracker.geometry.cameras import Camera
+from tracker.interchange.observations.checks import view_shifts
 from tracker.interchange.observations.observed import ObservationSet
-from tracker.interchange.observations.shifts import view_shifts
 
 
 def calibrate_by_person(

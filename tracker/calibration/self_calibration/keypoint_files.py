@@ -21,8 +21,7 @@ from tracker.formats.calibrations.reading import read_cameras
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lengths import check_heights
 from tracker.interchange.observations.importing import plan_import
-from tracker.interchange.observations.plans import ImportPlan, MaskPlan
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportPlan, ImportRequest, MaskPlan
 from tracker.interchange.plausibility.examine import examine_keypoints
 from tracker.session.matching import common_length
 from tracker.session.session import Session

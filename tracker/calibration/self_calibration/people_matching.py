@@ -12,9 +12,8 @@ from tracker.calibration.self_calibration.seen_joints import points_of_person
 from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.robust_triangulation import INLIER_M, Views, triangulate_points
-from tracker.interchange.observations.joints import side_pairs
-from tracker.interchange.observations.observed import ObservationSet
-from tracker.interchange.observations.shifts import point_rays
+from tracker.interchange.observations.checks import point_rays
+from tracker.interchange.observations.observed import ObservationSet, side_pairs
 
 
 class MatchedPeople(NamedTuple):

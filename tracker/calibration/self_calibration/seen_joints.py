@@ -9,8 +9,7 @@ from tracker.calibration.check.reprojection import Observations
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
 from tracker.geometry.robust_triangulation import Views
-from tracker.interchange.observations.joints import side_pairs
-from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.observed import ObservationSet, side_pairs
 from tracker.interchange.observations.sides import exchanged_sides, with_sides_exchanged
 
 

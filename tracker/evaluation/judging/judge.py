@@ -21,8 +21,7 @@ from tracker.formats.joint_maps import JointMap
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.interchange.plausibility.examine import contradictions
-from tracker.interchange.plausibility.posed_people import read_beside
-from tracker.interchange.plausibility.readings import Reading, ReadPoints
+from tracker.interchange.plausibility.readings import Reading, ReadPoints, read_beside
 from tracker.pipeline.chain import Sink
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import Session

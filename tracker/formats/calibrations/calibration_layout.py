@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from tracker.formats.anipose import Units
 from tracker.formats.calibrations.camera_words import Section
 from tracker.formats.calibrations.document import Document
-from tracker.formats.camera_section import Units
 
 OPENCV_POSES = "X_camera = R X_world + t"
 """Convention of poses that map world to camera."""

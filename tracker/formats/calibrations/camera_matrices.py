@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.formats.camera_section import FOUR_DIGITS
+from tracker.formats.anipose import FOUR_DIGITS
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.validation import ROUNDING

@@ -10,26 +10,21 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from tracker.errors import CalibrationError
-from tracker.formats.calibrations.camera_matrices import (
-    ProjectionError,
-    homogeneous,
-    is_projection,
-    lens_matrix,
-    plain_array,
-    reshaped,
-    rotation_of_quaternion,
-    split_projection,
-)
+from tracker.formats.calibrations import camera_matrices as matrices
 from tracker.formats.calibrations.document import Document, refuse
 from tracker.formats.calibrations.lens_words import (
     FISHEYE,
+    LISTS,
+    MEANINGS,
     UnknownLensError,
     is_fisheye,
+    is_known,
+    is_of,
     is_understood,
     is_unknown,
     names_lens,
+    spelled,
 )
-from tracker.formats.calibrations.words import LISTS, MEANINGS, is_known, is_of, spelled
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import USUAL_SIZES
@@ -107,7 +102,7 @@ def _by_suffix(data: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 def is_camera(group: Mapping[str, Any]) -> bool:
     """Return whether a group has the lens of a camera, or its projection."""
     known = known_values(group)
-    return bool({"matrix", "fx", "focal"} & known.keys()) or is_projection(known.get("projection"))
+    return bool({"matrix", "fx", "focal"} & known.keys()) or matrices.is_projection(known.get("projection"))
 
 
 def known_values(group: Mapping[str, Any]) -> dict[str, Any]:
@@ -121,7 +116,7 @@ def known_values(group: Mapping[str, Any]) -> dict[str, Any]:
             found[plain] = value
         elif (meaning := MEANINGS.get(plain)) is not None:
             if meaning == "matrix_R":
-                meaning = _FORMS.get(plain_array(value).size, meaning)
+                meaning = _FORMS.get(matrices.plain_array(value).size, meaning)
             found[meaning] = value
     return found
 
@@ -167,7 +162,7 @@ def unit_rotation(document: Document, camera: str, key: str, wxyz: Sequence[floa
     Raises:
         CalibrationError: its length is not 1.
     """
-    if (R := rotation_of_quaternion(wxyz)) is None:
+    if (R := matrices.rotation_of_quaternion(wxyz)) is None:
         found = f"a norm of {np.linalg.norm(wxyz):.3g}"
         raise refuse(document, camera, f"a unit quaternion as {key}", found, "export the file again")
     return R
@@ -232,7 +227,7 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
     if not fisheye and "k4" in known and not {"distortions", "p1", "p2", "k5", "k6"} & known.keys():
         found = "k1 to k4 alone, which are a fisheye's"
         raise refuse(document, camera, "k1, k2, p1 and p2 of a lens", found, "say `fisheye: true`, or add p1 and p2")
-    matrix = lens_matrix(known)
+    matrix = matrices.lens_matrix(known)
     if "projection" in known and not _POSE & known.keys():
         matrix, pose = _split(known, matrix, camera, document)
         known |= {} if pose is None else {"T_camera_world": pose}
@@ -298,14 +293,14 @@ def _split(known: Mapping[str, Any], matrix: Any, camera: str, document: Documen
     Raises:
         CalibrationError: it is the projection of no usable camera.
     """
-    if not is_projection(known["projection"]):
+    if not matrices.is_projection(known["projection"]):
         return matrix, None
     try:
-        K, T_camera_world = split_projection(known["projection"])
-    except ProjectionError as error:
+        K, T_camera_world = matrices.split_projection(known["projection"])
+    except matrices.ProjectionError as error:
         place, advice = f"{document.where}, camera {quoted(camera)}", "give K, R and t of the camera instead"
         raise CalibrationError(f"{place}: {error}; {advice}") from error
-    if matrix is not None and not np.allclose(plain_array(matrix), K, rtol=1e-3, atol=1e-3 * K[0, 0]):
+    if matrix is not None and not np.allclose(matrices.plain_array(matrix), K, rtol=1e-3, atol=1e-3 * K[0, 0]):
         return matrix, None  # that of rectified pictures, as ROS writes it
     return (K.tolist() if matrix is None else matrix), T_camera_world
 
@@ -316,7 +311,7 @@ def _check_focal(matrix: Any, camera: str, document: Document) -> None:
     Raises:
         CalibrationError: no lens has so short a one.
     """
-    K = plain_array(matrix)
+    K = matrices.plain_array(matrix)
     # The principal point lies near the middle; of pictures that are cut at a side it is up to twice as far.
     if K.shape == (3, 3) and 0 < K[0, 0] < USUAL_SIZES["focal length"].low * K[0, 2]:
         found = f"{K[0, 0]:.4g} of pictures that are some {2 * K[0, 2]:.0f} pixels wide, as in millimetres"
@@ -332,14 +327,14 @@ def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, docum
     """
     rotation = next((known[key] for key in ("matrix_R", "rodrigues", "quaternion") if key in known), None)
     if rotation is None:
-        named = rotation_of_quaternion([known.get(key) for key in ("qw", "qx", "qy", "qz")])
+        named = matrices.rotation_of_quaternion([known.get(key) for key in ("qw", "qx", "qy", "qz")])
         rotation = None if named is None else named.tolist()
     translation = known.get("translation")
     if translation is None and {"tx", "ty", "tz"} <= known.keys():
         translation = [known[key] for key in ("tx", "ty", "tz")]
     if rotation is None and translation is None:
         for key in ("T_camera_world", "T_world_camera"):
-            if (whole := homogeneous(known.get(key))) is not None:
+            if (whole := matrices.homogeneous(known.get(key))) is not None:
                 whole = whole if key == "T_camera_world" else rigid.inverse(whole)
                 return whole[:3, :3].tolist(), whole[:3, 3].tolist()
     if rotation is None or translation is None:
@@ -351,17 +346,18 @@ def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, docum
             expected = "its pose as R and t (X_camera = R X_world + t)"
             raise refuse(document, camera, expected, f"{', '.join(has)} alone", "rewrite the pose to R and t")
         return None, None
-    return reshaped(rotation, {3: (3,), 4: (4,), 9: (3, 3)}), reshaped(translation, {3: (3,)})
+    return matrices.reshaped(rotation, {3: (3,), 4: (4,), 9: (3, 3)}), matrices.reshaped(translation, {3: (3,)})
 
 
 def _distortions(known: Mapping[str, Any], fisheye: bool) -> Any:
     found = known.get("distortions")
     if found is None and "radial" in known:
-        radial, tangential = plain_array(known["radial"]).ravel(), plain_array(known.get("tangential", [0, 0])).ravel()
+        parts = (known["radial"], known.get("tangential", [0, 0]))
+        radial, tangential = (matrices.plain_array(part).ravel() for part in parts)
         found = [*radial[:2], *tangential, *radial[2:]]
     if found is None:
         found = [known.get(k, 0.0) for k in COEFFICIENTS[fisheye]] if "k1" in known else []
-    flat = reshaped(found, {n: (n,) for n in range(1, 15)})
+    flat = matrices.reshaped(found, {n: (n,) for n in range(1, 15)})
     # OpenCV writes 12 or 14 values; those of thin prisms and tilted sensors are usually 0.
     while not fisheye and isinstance(flat, list) and len(flat) in _SHORTER and not any(flat[_SHORTER[len(flat)] :]):
         flat = flat[: _SHORTER[len(flat)]]
@@ -374,4 +370,4 @@ def _size(known: Mapping[str, Any]) -> Any:
         known, size = known_values(size), None
     if size is None:
         return [known["width"], known["height"]] if {"width", "height"} <= known.keys() else None
-    return reshaped(size, {2: (2,)})
+    return matrices.reshaped(size, {2: (2,)})

@@ -7,7 +7,6 @@ from tracker.formats.calibrations import data_layouts as data
 from tracker.formats.calibrations import dataset_layouts as sets
 from tracker.formats.calibrations import motion_capture as mocap
 from tracker.formats.calibrations import text_layouts as text
-from tracker.formats.calibrations import toml_layouts as toml
 from tracker.formats.calibrations.calibration_layout import OPENCV_POSES, CalibrationLayout
 from tracker.formats.calibrations.document import Document, at_top, in_groups, in_rows
 
@@ -35,13 +34,13 @@ _OWN: tuple[CalibrationLayout, ...] = (
         None, data.is_easymocap, data.read_words, by_program=False, join=data.join_easymocap,
         halves=("intri.", "extri.")),
     CalibrationLayout("Caliscope (`camera_array.toml`)", "sections below `cameras`", OPENCV_POSES, None,
-        toml.is_caliscope, toml.read_caliscope),
+        data.is_caliscope, data.read_caliscope),
     CalibrationLayout("Caliscope before 0.5, pyxy3d (`config.toml`)", "sections with `port` or `cam_id` at the top",
-        OPENCV_POSES, None, toml.is_pyxy3d, toml.read_top_sections),
-    CalibrationLayout("FreeMoCap", "`charuco_...` in `metadata`", OPENCV_POSES, None, toml.is_freemocap,
-        toml.read_top_sections),
+        OPENCV_POSES, None, data.is_pyxy3d, data.read_top_sections),
+    CalibrationLayout("FreeMoCap", "`charuco_...` in `metadata`", OPENCV_POSES, None, data.is_freemocap,
+        data.read_top_sections),
     CalibrationLayout("anipose, Pose2Sim (`Calib.toml`)", "TOML sections with `matrix`, `rotation` and `translation`",
-        OPENCV_POSES, None, toml.is_anipose, toml.read_top_sections, by_program=False),
+        OPENCV_POSES, None, data.is_anipose, data.read_top_sections, by_program=False),
     CalibrationLayout("AIST++ and other lists of anipose's cameras", "a list with anipose's keys", OPENCV_POSES, None,
         data.is_aniposelib, data.read_words, by_program=False),
     CalibrationLayout("Qualisys (`.qca.txt`)", "XML `calibration` with `cameras`",

@@ -9,18 +9,24 @@ import numpy as np
 
 from tracker.errors import CalibrationError, Remedy
 from tracker.files import paths_in
+from tracker.formats.anipose import METRES, CameraEntry, Units, check_names, read_entry
+from tracker.formats.calibrations import pose_conventions
 from tracker.formats.calibrations.calibration_layout import CalibrationLayout
 from tracker.formats.calibrations.camera_matrices import is_transposed
 from tracker.formats.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.formats.calibrations.convention_names import CONVENTIONS, PoseConvention
-from tracker.formats.calibrations.document import Document, read_document, refuse
-from tracker.formats.calibrations.foreign import foreign, name_binary, named, refuse_program
+from tracker.formats.calibrations.data_layouts import board_square
+from tracker.formats.calibrations.document import (
+    Document,
+    foreign,
+    name_binary,
+    named,
+    read_document,
+    refuse,
+    refuse_program,
+)
 from tracker.formats.calibrations.layouts import find_layout
-from tracker.formats.calibrations.pose_conventions import check_convention, odd_camera, read_pose
-from tracker.formats.calibrations.rotation_forms import check_turned, refuse_angles, with_quaternions
-from tracker.formats.calibrations.toml_layouts import board_square
 from tracker.formats.calibrations.units import check_focal_lengths, check_units
-from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import METRES_BY_WORD
@@ -76,7 +82,7 @@ def read_cameras(
     left_out = {str(sections[key]["name"]): reason for key, reason in reasons.items()}
     if not usable:
         raise _nothing_usable(sections, documents[0][0])
-    usable = with_quaternions(usable, where, poses)
+    usable = pose_conventions.with_quaternions(usable, where, poses)
     stated = None if units else _stated_metres(usable, where)
     used: Units = units or (layout.unit if stated is None else None) or "m"
     metres = METRES[used] if stated is None else stated
@@ -288,10 +294,13 @@ def _with_convention(
     if poses is None:
         is_turned = not layout.has_opencv_poses
         words = (where, layout.poses_in_words, layout.by_program, is_turned)
-        refuse_angles(sections, stated, where)
-        odd, elsewhere = odd_camera(stated), "looks elsewhere than all others, which see one place"
+        pose_conventions.refuse_angles(sections, stated, where)
+        odd, elsewhere = pose_conventions.odd_camera(stated), "looks elsewhere than all others, which see one place"
         try:
-            notes = [check_convention(stated, *words), check_turned([entry.T_world_camera for entry in entries], where)]
+            notes = [
+                pose_conventions.check_convention(stated, *words),
+                pose_conventions.check_turned([entry.T_world_camera for entry in entries], where),
+            ]
         except CalibrationError:
             _refuse_placeholder(entries, stated, words)
             if odd is not None:
@@ -301,7 +310,7 @@ def _with_convention(
         if odd is not None:
             notes.append(f"Camera {quoted(entries[odd].name)} {elsewhere}: check its pose.")
         return entries, [note for note in notes if note is not None]
-    changed = [rigid.inverse(read_pose(T, poses)) for T in stated]
+    changed = [rigid.inverse(pose_conventions.read_pose(T, poses)) for T in stated]
     return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), []
 
 
@@ -330,7 +339,7 @@ def _refuse_placeholder(
     if not any(unturned) or len(others) < 2:
         return
     try:
-        check_convention(others, *words)
+        pose_conventions.check_convention(others, *words)
     except CalibrationError:
         return
     name = entries[unturned.index(True)].name

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker.errors import CalibrationError, Remedy
-from tracker.formats.camera_section import METRES, CameraEntry, Units
+from tracker.formats.anipose import METRES, CameraEntry, Units
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import MIN_APART_M, axes_point
 from tracker.geometry.cameras import MAX_PINHOLE_ANGLE

@@ -10,8 +10,7 @@ from itertools import islice, zip_longest
 from typing import TypeAlias
 
 from tracker.errors import FormatError
-from tracker.formats.delimited import Delimited, TableLine
-from tracker.formats.number_rows import MAX_NAMES
+from tracker.formats.number_rows import MAX_NAMES, Delimited, TableLine
 from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.validation import quoted
 

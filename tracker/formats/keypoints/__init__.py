@@ -12,8 +12,6 @@ __all__ = [
     "detections",
     "hand_labels",
     "hdf5",
-    "json_patching",
-    "openpose",
     "picture_names",
     "picture_table",
 ]

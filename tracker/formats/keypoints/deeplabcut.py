@@ -16,11 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import FormatError
-from tracker.formats.delimited import TableLine, read_delimited
 from tracker.formats.keypoints.picture_names import picture_names
-from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks, text_of
-from tracker.formats.keypoints.point_changes import Changes, PersonChanges, placed_points
-from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
+from tracker.formats.keypoints.picture_table import (
+    Changes,
+    PersonChanges,
+    PictureTable,
+    placed_points,
+    stack_tracks,
+    text_of,
+)
+from tracker.formats.number_rows import MAX_NAMES, NumberRows, TableLine, check_size, read_delimited
 from tracker.formats.text_patch import PIXEL_DECIMALS, TextPatch
 from tracker.geometry.arrays import Array, IntArray
 from tracker.validation import MAX_NUMBER, quoted

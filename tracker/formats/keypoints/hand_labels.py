@@ -10,8 +10,7 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.keypoints.coco_reading import CocoPicture, common_size, images_by_camera
-from tracker.formats.keypoints.detections import parse_numbers
-from tracker.formats.keypoints.openpose import MAX_PEOPLE
+from tracker.formats.keypoints.detections import MAX_PEOPLE, parse_numbers
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_people, text_of
 from tracker.formats.number_rows import MAX_NAMES, check_size
 from tracker.formats.plain_data import parse_xml

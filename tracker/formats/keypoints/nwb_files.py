@@ -13,9 +13,14 @@ from typing import Any
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
-from tracker.formats.keypoints.point_changes import Changes, placed_points, places_by_presence
-from tracker.formats.keypoints.sleap_patching import replace_dataset
+from tracker.formats.keypoints.picture_table import (
+    Changes,
+    PictureTable,
+    placed_points,
+    places_by_presence,
+    stack_tracks,
+)
+from tracker.formats.keypoints.sleap_files import replace_dataset
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray
 from tracker.validation import MAX_FRAMES, MAX_NUMBER

@@ -23,6 +23,10 @@ _MAGIC, _JSON_CHUNK, _BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 """Names in the binary container (glTF 2.0 Sect. 4.4)."""
 
 
+_OF_ANIMATION = ("channels", "samplers")
+_KINDS = ("nodes", "meshes", "materials", "accessors", "bufferViews", *_OF_ANIMATION)
+
+
 class ComponentType(IntEnum):
     """Types of components (glTF 2.0 Sect. 5.1.3)."""
 
@@ -54,21 +58,21 @@ class AnimatedBody:
 class _Document:
     """A file while it is put together."""
 
-    nodes: list[dict[str, Any]] = field(default_factory=list)
-    meshes: list[dict[str, Any]] = field(default_factory=list)
-    materials: list[dict[str, Any]] = field(default_factory=list)
-    channels: list[dict[str, Any]] = field(default_factory=list)
-    samplers: list[dict[str, Any]] = field(default_factory=list)
-    accessors: list[dict[str, Any]] = field(default_factory=list)
-    views: list[dict[str, Any]] = field(default_factory=list)
+    rows: dict[str, list[dict[str, Any]]] = field(default_factory=lambda: {kind: [] for kind in _KINDS})
+    """Content of each kind."""
     binary: bytearray = field(default_factory=bytearray)
+
+    def add(self, kind: str, **content: Any) -> int:
+        """Add something of a kind, and return its index."""
+        self.rows[kind].append(content)
+        return len(self.rows[kind]) - 1
 
     def add_node(self, parent: int | None, **content: Any) -> int:
         """Add a node below another one, and return its index."""
-        self.nodes.append(content)
+        node = self.add("nodes", **content)
         if parent is not None:
-            self.nodes[parent].setdefault("children", []).append(len(self.nodes) - 1)
-        return len(self.nodes) - 1
+            self.rows["nodes"][parent].setdefault("children", []).append(node)
+        return node
 
     def add_array(
         self, values: NDArray[Any], kind: str, target: BufferTarget | None = None, bounds: bool = False
@@ -84,18 +88,12 @@ class _Document:
         is_float = values.dtype.kind == "f"
         data = np.ascontiguousarray(values, np.float32 if is_float else np.uint32)
         component = ComponentType.FLOAT if is_float else ComponentType.UNSIGNED_INT
-        view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": data.nbytes}
-        self.views.append(view if target is None else view | {"target": target})
+        use = {} if target is None else {"target": target}
+        view = self.add("bufferViews", buffer=0, byteOffset=len(self.binary), byteLength=data.nbytes, **use)
         self.binary += data.tobytes()
-        accessor: dict[str, Any] = {
-            "bufferView": len(self.views) - 1, "componentType": component,
-            "count": len(data), "type": kind,
-        }  # fmt: skip
-        if bounds:
-            columns = data.reshape(len(data), -1)
-            accessor |= {"min": columns.min(axis=0).tolist(), "max": columns.max(axis=0).tolist()}
-        self.accessors.append(accessor)
-        return len(self.accessors) - 1
+        columns = data.reshape(len(data), -1)
+        limits = {"min": columns.min(axis=0).tolist(), "max": columns.max(axis=0).tolist()} if bounds else {}
+        return self.add("accessors", bufferView=view, componentType=component, count=len(data), type=kind, **limits)
 
     def animate(self, node: int, path: str, times: int, values: Array) -> None:
         """Animate a node: its `rotation`, (n, 4), x, y, z, w, or its `translation`, (n, 3).
@@ -107,8 +105,8 @@ class _Document:
             values: at these times.
         """
         output = self.add_array(values, "VEC4" if path == "rotation" else "VEC3")
-        self.channels.append({"sampler": len(self.samplers), "target": {"node": node, "path": path}})
-        self.samplers.append({"input": times, "interpolation": "LINEAR", "output": output})
+        sampler = self.add("samplers", input=times, interpolation="LINEAR", output=output)
+        self.add("channels", sampler=sampler, target={"node": node, "path": path})
 
 
 def write_glb(path: Path, title: str, bodies: Sequence[AnimatedBody], T_file_world: Array) -> None:
@@ -129,12 +127,8 @@ def write_glb(path: Path, title: str, bodies: Sequence[AnimatedBody], T_file_wor
         "asset": {"version": "2.0", "generator": "Quadrille"},
         "scene": 0,
         "scenes": [{"name": title, "nodes": roots}],
-        "nodes": document.nodes,
-        "meshes": document.meshes,
-        "materials": document.materials,
-        "animations": [{"name": title, "channels": document.channels, "samplers": document.samplers}],
-        "accessors": document.accessors,
-        "bufferViews": document.views,
+        **{kind: document.rows[kind] for kind in _KINDS if kind not in _OF_ANIMATION},
+        "animations": [{"name": title} | {kind: document.rows[kind] for kind in _OF_ANIMATION}],
         "buffers": [{"byteLength": len(document.binary)}],
     }
     chunks = _chunk(_JSON_CHUNK, json.dumps(content, allow_nan=False).encode(), b" ")
@@ -196,10 +190,10 @@ def _add_meshes(document: _Document, model: BodyModel, nodes: Sequence[int]) -> 
             "POSITION": document.add_array(points + model.centers_part[i], "VEC3", BufferTarget.VERTICES, bounds=True)
         }
         indices = document.add_array(triangles.ravel().astype(np.uint32), "SCALAR", BufferTarget.INDICES)
-        document.materials.append({"name": part.name, "pbrMetallicRoughness": _finish(part.color)})
-        primitive = {"attributes": attributes, "indices": indices, "material": len(document.materials) - 1}
-        document.meshes.append({"name": part.name, "primitives": [primitive]})
-        document.add_node(nodes[i], name=f"{part.name}_shape", mesh=len(document.meshes) - 1)
+        material = document.add("materials", name=part.name, pbrMetallicRoughness=_finish(part.color))
+        primitive = {"attributes": attributes, "indices": indices, "material": material}
+        mesh = document.add("meshes", name=part.name, primitives=[primitive])
+        document.add_node(nodes[i], name=f"{part.name}_shape", mesh=mesh)
 
 
 def _finish(color: str) -> dict[str, Any]:

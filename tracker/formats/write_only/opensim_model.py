@@ -13,12 +13,13 @@ interpolates by time.
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from tracker.body.model import BodyModel
+from tracker.body.parts import Joint
 from tracker.files import write_text_atomic
 from tracker.formats.file_names import identifier, identifiers
 from tracker.geometry import rigid
@@ -32,6 +33,8 @@ _DENSITY = 1000.0
 _FREE = 100.0
 """Half the range of a coordinate without limits, metres or rad: more than any room, and any number of turns."""
 _EULER: Order = "XYZ"
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""Axes of these angles in the frame of a joint."""
 _SETS = ("Body", "Joint", "Marker")
 
 
@@ -53,18 +56,21 @@ class CoordinateJoint:
 
 def coordinate_joints(model: BodyModel) -> list[CoordinateJoint]:
     """Return the coordinates of each joint of a body, in the order of its joints."""
-    names = iter(identifiers([n.replace(".", "_") for joint in _joint_names(model) for n in joint]))
-    out = []
-    for joint, wanted in zip(model.joints, _joint_names(model), strict=True):
-        found = tuple(next(names) for _ in wanted)
-        if _turns_by_euler(model, joint.name):
-            axes: tuple[tuple[float, float, float], ...] = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
-            ranges: tuple[tuple[float, float], ...] = ((-_FREE, _FREE),) * 3
-        else:
-            axes = tuple(a.direction for a in joint.axes)
-            ranges = tuple((max(a.limits[0], -_FREE), min(a.limits[1], _FREE)) for a in joint.axes)
-        out.append(CoordinateJoint(found, axes, ranges, joint.free, _turns_by_euler(model, joint.name)))
-    return out
+    found = [_coordinate_joint(joint) for joint in model.joints]
+    names = iter(identifiers([name.replace(".", "_") for joint in found for name in joint.names]))
+    return [replace(joint, names=tuple(next(names) for _ in joint.names)) for joint in found]
+
+
+def _coordinate_joint(joint: Joint) -> CoordinateJoint:
+    """Return the coordinates of a joint, with names that others may have too."""
+    directions = np.array([a.direction for a in joint.axes]).reshape(-1, 3)
+    is_dependent = len(directions) > 0 and np.linalg.matrix_rank(directions, tol=1e-3) < len(directions)
+    if joint.kind == "ball" or is_dependent:
+        names = (*joint.dof_names[: 3 * joint.free], *(f"{joint.name}.r{axis.lower()}" for axis in _EULER))
+        return CoordinateJoint(names, _AXES, ((-_FREE, _FREE),) * 3, joint.free, by_euler=True)
+    ranges = tuple((max(a.limits[0], -_FREE), min(a.limits[1], _FREE)) for a in joint.axes)
+    axes = tuple(a.direction for a in joint.axes)
+    return CoordinateJoint(tuple(joint.dof_names), axes, ranges, joint.free, by_euler=False)
 
 
 def coordinate_values(model: BodyModel, poses: Array) -> Array:
@@ -145,24 +151,6 @@ def _marker_place(model: BodyModel, point: int) -> tuple[int, Array]:
     on_joint = point < len(model.joints) and bool(model.joints[point].parent)
     at = np.array(model.joints[point].position) * model.height_m if on_joint else model.points_part[point]
     return part, at + offset
-
-
-def _joint_names(model: BodyModel) -> list[list[str]]:
-    """Return the names of the coordinates of each joint before they are made unique."""
-    out = []
-    for joint in model.joints:
-        names = list(joint.dof_names)
-        if _turns_by_euler(model, joint.name):
-            names = [*names[: 3 * joint.free], *(f"{joint.name}.r{axis.lower()}" for axis in _EULER)]
-        out.append(names)
-    return out
-
-
-def _turns_by_euler(model: BodyModel, name: str) -> bool:
-    """Return whether a joint's rotations must become Euler angles."""
-    joint = next(j for j in model.joints if j.name == name)
-    axes = np.array([a.direction for a in joint.axes]).reshape(-1, 3)
-    return joint.kind == "ball" or (len(axes) > 0 and np.linalg.matrix_rank(axes, tol=1e-3) < len(axes))
 
 
 def _body(bodies: ET.Element, model: BodyModel, i: int, name: str) -> None:

@@ -4,4 +4,4 @@ Imports `interchange.observations` of its wing. A network sees one picture; what
 each other is in `people_in_views`. Callers use `detectors.DETECTORS` and `detect.detect_people`.
 """
 
-__all__ = ["detect", "detector", "detectors", "model_files"]
+__all__ = ["detect", "detector", "detectors"]

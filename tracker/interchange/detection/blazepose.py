@@ -52,7 +52,7 @@ class BlazePose:
         """See `Detector.find`."""
         n = self._finder.size
         to_pixels = square.to_pixels(n)
-        crop = cv2.warpAffine(picture, to_pixels, (n, n), flags=cv2.INTER_AREA, borderMode=cv2.BORDER_CONSTANT)
+        crop = cv2.warpAffine(picture, to_pixels, (n, n))
         raw, logits = self._finder(crop / np.float32(127.5) - 1)
         keep = logits[:, 0] > 0
         raw, anchors, probability = raw[keep] / n, self._anchors[keep], expit(logits[keep, 0])
@@ -68,8 +68,7 @@ class BlazePose:
         """See `Detector.look`."""
         n = self._landmarks.size
         to_pixels = square.to_pixels(n)
-        flags = cv2.INTER_AREA if square.side_px > n else cv2.INTER_LINEAR
-        crop = cv2.warpAffine(picture, to_pixels, (n, n), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        crop = cv2.warpAffine(picture, to_pixels, (n, n), borderMode=cv2.BORDER_REPLICATE)
         marks, presence, logits, heat, _ = self._landmarks(crop / np.float32(255))
         if (present := float(presence.item())) < 1 - present:
             return None
@@ -152,7 +151,7 @@ def _refined(places: Array, heat: Array) -> Array:
 
 def _mask(logits: Array, back: Array) -> Callable[[tuple[int, int]], NDArray[np.float32]]:
     def probability(shape: tuple[int, int]) -> NDArray[np.float32]:
-        found = cv2.warpAffine(expit(logits).astype(np.float32), back, shape[::-1], flags=cv2.INTER_LINEAR)
+        found = cv2.warpAffine(expit(logits).astype(np.float32), back, shape[::-1])
         return np.asarray(found, dtype=np.float32)
 
     return probability

@@ -17,8 +17,7 @@ from tracker.geometry.ground_plane import floor_plane
 from tracker.interchange.detection.detector import Detector
 from tracker.interchange.detection.people_in_views import PeopleInViews, Seen, points_of
 from tracker.interchange.observations.identities import everybody
-from tracker.interchange.observations.joints import bones_of
-from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
+from tracker.interchange.observations.observed import ObservationSet, ObservedPoints, bones_of
 from tracker.interchange.observations.stored import list_observations, load_observations, new_folder, save_observations
 from tracker.interchange.observations.stored_masks import describe_masks, masks_folder, write_mask
 from tracker.session.session import Session

@@ -55,7 +55,7 @@ class DetectedPerson:
     mask: Callable[[tuple[int, int]], NDArray[np.float32]] | None = None
     """Returns the probability that each pixel of the picture, whose height and width it is given, shows the person."""
     colors: Array | None = None
-    """Of the clothes, (6,), see `tracker.interchange.detection.clothes`; a detector need not give them."""
+    """Of the clothes, (6,), see `tracker.interchange.detection.people_in_views`; a detector need not give them."""
 
 
 class Detector(Protocol):

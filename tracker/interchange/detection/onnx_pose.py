@@ -130,15 +130,7 @@ def _crop(picture: Image, square: PictureSquare, size: tuple[int, int]) -> _Crop
     height, width = size
     to_pixels = square.to_pixels(max(height, width))
     to_pixels[:, 2] += (width - max(height, width)) / 2, (height - max(height, width)) / 2
-    flags = cv2.INTER_AREA if square.side_px > max(height, width) else cv2.INTER_LINEAR
-    image = cv2.warpAffine(
-        picture,
-        to_pixels,
-        (width, height),
-        flags=flags,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=_COLORS[0].tolist(),
-    )
+    image = cv2.warpAffine(picture, to_pixels, (width, height), borderValue=_COLORS[0].tolist())
     return _Crop(np.asarray(image, np.uint8), np.asarray(cv2.invertAffineTransform(to_pixels), np.float64))
 
 

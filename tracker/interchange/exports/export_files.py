@@ -14,9 +14,8 @@ import msgspec
 
 from tracker.errors import Remedy, TrackerError
 from tracker.formats.file_names import identifiers
-from tracker.interchange.exports.export_format import ExportFormat
-from tracker.interchange.exports.motion import ExportedMotion
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.formats import ExportFormat
+from tracker.interchange.exports.motion import ExportedMotion, ExportOptions
 from tracker.interchange.exports.provenance import SIDE_FILE, write_provenance
 from tracker.session.holder import is_alive, read_holder, this_holder
 
@@ -57,7 +56,7 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
     Raises:
         TrackerError: the format has no such option, or a value is not allowed.
     """
-    from tracker.interchange.exports.options import load_character
+    from tracker.interchange.exports.motion import load_character
 
     values = {name: value for name, value in given.items() if value is not None}
     allowed = {name: get_args(kind) for name, kind in get_type_hints(ExportOptions).items()}

@@ -20,8 +20,7 @@ from tracker.footage.recording import Recording, read_mask
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, Image
 from tracker.interchange.exports.keypoints import project_through_lens
-from tracker.interchange.exports.motion import ExportedMotion, PersonMotion, read_motion
-from tracker.interchange.exports.options import FacesName
+from tracker.interchange.exports.motion import ExportedMotion, FacesName, PersonMotion, read_motion
 from tracker.interchange.observations.observed import ObservationSet
 from tracker.interchange.observations.stored import list_observations, load_observations
 from tracker.session.session import Session

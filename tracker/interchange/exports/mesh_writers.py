@@ -27,10 +27,9 @@ from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import floor_plane
 from tracker.geometry.surface_nets import surface_nets
-from tracker.interchange.exports.export_format import Tick
 from tracker.interchange.exports.faces import recording_of
-from tracker.interchange.exports.motion import ExportedMotion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.formats import Tick
+from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, file_from_world
 
 _DEPTH_M = 0.5
 """Distance of the picture from its camera in a scene, metres: less than that of anybody whom a camera films whole."""

@@ -19,11 +19,10 @@ from tracker.formats.file_names import identifier, identifiers
 from tracker.formats.write_only.optional_packages import require
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
-from tracker.interchange.exports.export_format import Tick
-from tracker.interchange.exports.frame_views import view_arrays
-from tracker.interchange.exports.motion import ExportedMotion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
-from tracker.interchange.exports.pose_arrays import PoseArrays, pose_arrays
+from tracker.interchange.exports.formats import Tick
+from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, file_from_world
+from tracker.interchange.exports.provenance import PoseArrays, pose_arrays
+from tracker.interchange.exports.views import view_arrays
 from tracker.session.store.edit_tree import program_version
 
 _SPACE = {

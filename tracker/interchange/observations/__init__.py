@@ -2,24 +2,20 @@
 
 Imports nothing of its wing. Callers use `observed.ObservedPoints`,
 `observed.ObservedJoints`, `stored.load_observations`, `stored.list_observations`, `importing.plan_import`,
-`importing.store_import`, `stored_masks.list_masks`, `joints.observed_joints` and `joints.triangulate_observations`.
+`importing.store_import`, `stored_masks.list_masks`, `observed.observed_joints` and `observed.triangulate_observations`.
 """
 
 __all__ = [
     "assignment",
     "body_points",
+    "checks",
     "identities",
     "importing",
-    "joints",
     "observed",
     "placing",
     "plans",
     "readers",
-    "request",
-    "shifts",
     "sides",
-    "space",
     "stored",
-    "stored_files",
     "stored_masks",
 ]

@@ -8,8 +8,7 @@ from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.robust_triangulation import Views
-from tracker.interchange.observations.joints import observed_joints, triangulate_observations
-from tracker.interchange.observations.observed import ObservationSet
+from tracker.interchange.observations.observed import ObservationSet, observed_joints, triangulate_observations
 
 
 def body_points(observations: ObservationSet, cameras: Sequence[Camera]) -> dict[str, BodyPoints]:
@@ -31,13 +30,9 @@ def body_points(observations: ObservationSet, cameras: Sequence[Camera]) -> dict
             for i, person in enumerate(observations.people)
         }
     found = triangulate_observations(observations, cameras)
+    joints_world, px, confidence = found.joints.joints_world, found.positions_px[..., at, :], found.confidence[..., at]
     return {
-        person: BodyPoints(
-            names,
-            found.joints.joints_world[:, i, at],
-            _normalized(cameras, found.positions_px[:, i][:, :, at]),
-            found.confidence[:, i][:, :, at],
-        )
+        person: BodyPoints(names, joints_world[:, i, at], _normalized(cameras, px[:, i]), confidence[:, i])
         for i, person in enumerate(observations.people)
     }
 

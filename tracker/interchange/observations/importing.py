@@ -1,7 +1,13 @@
-"""Import files of other programs: read them, place them at the frames of a session, check them, store them."""
+"""Import files of other programs: read them, place them at the frames of a session, check them, store them.
 
+Files of stored key points are read again to see where each frame and person stands in them.
+"""
+
+import json
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,10 +19,9 @@ from tracker.geometry.arrays import IntArray
 from tracker.interchange.observations.checks import agreement_problem, picture_problems, timing_problems
 from tracker.interchange.observations.masks import plan_masks
 from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
-from tracker.interchange.observations.placing import place_pictures, rescaled
-from tracker.interchange.observations.plans import ImportPlan, MaskPlan, ViewPreview
+from tracker.interchange.observations.placing import place_pictures, read_space, rescaled
+from tracker.interchange.observations.plans import ImportPlan, ImportRequest, MaskPlan, ViewPreview, refuse_choices
 from tracker.interchange.observations.readers import MASK_FORMATS, PICTURE_FORMATS, find_files
-from tracker.interchange.observations.request import ImportRequest, refuse_choices
 from tracker.interchange.observations.sources import (
     FileGroup,
     Found,
@@ -25,8 +30,7 @@ from tracker.interchange.observations.sources import (
     source_files,
     videos_of_footage,
 )
-from tracker.interchange.observations.space import read_space
-from tracker.interchange.observations.stored import new_folder, save_observations
+from tracker.interchange.observations.stored import files_folder, new_folder, save_observations, source_path
 from tracker.interchange.observations.stored_masks import store_masks
 from tracker.session.session import Session
 from tracker.validation import Name, check
@@ -245,3 +249,43 @@ def _plan_of_space(session: Session, request: ImportRequest, format_name: str, f
         frames = (int(with_points[0]), int(with_points[-1])) if len(with_points) else None
         views.append(ViewPreview(person, path, len(placed.row_frames[k]), frames, 1))
     return ImportPlan(observations, by_path, tuple(views), tuple(problems))
+
+
+class StoredPictures(NamedTuple):
+    """The files of one camera."""
+
+    camera: str
+    files: tuple[Path, ...]
+    """Within the session: one for each picture, or one for all."""
+    table: PictureTable
+    """Their content, in the pixels of the file."""
+    frames: IntArray
+    """Frame of the session of each picture, (n,)."""
+    part: int
+    """Number of this camera among those that the files hold."""
+
+
+def stored_pictures(session: Session, observations: ObservationSet) -> list[StoredPictures]:
+    """Read the files of key points again, and place them as they were when they were imported.
+
+    Raises:
+        FormatError: a file was changed meanwhile, so that it cannot be read.
+    """
+    of_path = {source_path(session, observations.name, s): s for s in observations.sources}
+    root = files_folder(session, observations.name)
+    groups = PICTURE_FORMATS[observations.format].read([(path, root) for path in of_path], session.camera_names)
+    is_own = videos_of_footage([g for g, _ in groups], {c.camera.name: c.footage for c in session.cameras})
+    pairs = zip(groups, is_own, strict=True)
+    labels = [g.labels if own and not of_path[g.files[0]].camera else () for (g, _), own in pairs]
+    matched = match_cameras([(n, g.place) for n, (g, _) in zip(labels, groups, strict=True)], session.camera_names, {})
+    cameras = [of_path[g.files[0]].camera or name for (g, _), name in zip(groups, matched, strict=True)]
+    tables = {name: table for name, (_, table) in zip(cameras, groups, strict=True) if name}
+    options = dict(observations.options)
+    first, late = options.get("first_frame"), json.loads(options.get("offsets", "{}"))
+    frames, _, _ = place_pictures(tables, session, None if first is None else int(first), late)
+    first_files = [group.files[0] for group, _ in groups]
+    return [
+        StoredPictures(name, group.files, table, frames[name], first_files[:i].count(group.files[0]))
+        for i, (name, (group, table)) in enumerate(zip(cameras, groups, strict=True))
+        if name
+    ]

@@ -12,20 +12,17 @@ from tracker.errors import FormatError
 from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import patch_c3d, read_c3d
-from tracker.formats.joint_tables.layouts import SCENES, Scenes, find_layout, read_joint_files
-from tracker.formats.joint_tables.patching import patch_table
+from tracker.formats.joint_tables.layouts import SCENES, Scenes, find_layout, patch_table, read_joint_files
 from tracker.formats.keypoints import detections, hand_labels
-from tracker.formats.keypoints.coco_reading import holds, is_alphapose, is_coco, read_coco
+from tracker.formats.keypoints.coco_reading import holds, is_alphapose, is_coco, patch_coco, patch_openpose, read_coco
 from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, check_mask_size, read_segmentations
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut, patch_deeplabcut_csv, read_deeplabcut_csv
+from tracker.formats.keypoints.detections import read_openpose
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
-from tracker.formats.keypoints.json_patching import patch_coco, patch_openpose
-from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable, table_of_files
-from tracker.formats.observation_layout import ObservationLayout, Sample
+from tracker.formats.observation_layout import ObservationLayout, Sample, unread
 from tracker.formats.text_files import TABLE_BYTES, TextKind, read_json
 from tracker.formats.trc import MarkerTable, patch_trc, read_trc
-from tracker.formats.unread import unread
 from tracker.interchange.observations.mask_files import MaskFiles
 from tracker.interchange.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
 from tracker.validation import quoted

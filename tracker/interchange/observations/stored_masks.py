@@ -18,14 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import SessionError, TrackerError
+from tracker.interchange.observations import stored
 from tracker.interchange.observations.observed import SourceFile, checksum
-from tracker.interchange.observations.stored import (
-    FOLDER,
-    Description,
-    appearing_folder,
-    read_description,
-    write_description,
-)
 from tracker.session.session import Session, save_camera_files
 from tracker.validation import FileStem
 
@@ -35,7 +29,7 @@ if TYPE_CHECKING:  # it decodes videos
 MASKS_FILE, _MASKS = "masks.toml", "masks"
 
 
-class _Content(Description, forbid_unknown_fields=True, kw_only=True):
+class _Content(stored.Description, forbid_unknown_fields=True, kw_only=True):
     cameras: dict[FileStem, int]
 
 
@@ -57,7 +51,7 @@ class StoredMasks:
 
 def masks_folder(session: Session, name: str) -> Path:
     """Return the folder of imported masks, which has a folder for each camera."""
-    return session.folder / FOLDER / name / _MASKS
+    return session.folder / stored.FOLDER / name / _MASKS
 
 
 def describe_masks(session: Session, name: str, format_name: str, options: Mapping[str, str]) -> None:
@@ -75,12 +69,12 @@ def describe_masks(session: Session, name: str, format_name: str, options: Mappi
     folder = masks_folder(session, name)
     cameras = {name: len(list((folder / name).glob("*.png"))) for name in session.camera_names}
     content = _Content(name=name, format=format_name, cameras=cameras, notes=(), options=dict(options), sources=())
-    write_description(folder.parent / MASKS_FILE, f"masks {name}", content)
+    stored.write_description(folder.parent / MASKS_FILE, f"masks {name}", content)
 
 
 def list_masks(session: Session) -> list[str]:
     """Return the names of the masks that were imported into a session, in order."""
-    found = (session.folder / FOLDER).glob(f"*/{MASKS_FILE}")
+    found = (session.folder / stored.FOLDER).glob(f"*/{MASKS_FILE}")
     return sorted(p.parent.name for p in found if not p.parent.name.startswith("."))
 
 
@@ -90,8 +84,8 @@ def load_masks(session: Session, name: str) -> StoredMasks:
     Raises:
         SessionError: the file is missing, damaged or newer.
     """
-    path = session.folder / FOLDER / name / MASKS_FILE
-    row = read_description(path, f"masks {path}", _Content)
+    path = session.folder / stored.FOLDER / name / MASKS_FILE
+    row = stored.read_description(path, f"masks {path}", _Content)
     folder = masks_folder(session, name)
     users = tuple(c.camera.name for c in session.cameras if c.masks is not None and c.masks.parent == folder)
     return StoredMasks(row.name, row.format, row.cameras, row.notes, row.sources, users)
@@ -109,7 +103,7 @@ def store_masks(session: Session, plan: "MaskPlan") -> Session:
     """
     if plan.problems:
         raise plan.problems[0]
-    with appearing_folder(session, plan.name) as temporary:
+    with stored.appearing_folder(session, plan.name) as temporary:
         for source in plan.sources:
             if checksum(plan.files[source.path].read_bytes()) != source.sha256:
                 raise SessionError(f"{plan.files[source.path]} has changed since it was read; import it again")
@@ -124,7 +118,7 @@ def store_masks(session: Session, plan: "MaskPlan") -> Session:
             options=dict(plan.options),
             sources=plan.sources,
         )
-        write_description(temporary / MASKS_FILE, f"masks {plan.name}", content)
+        stored.write_description(temporary / MASKS_FILE, f"masks {plan.name}", content)
     folder = masks_folder(session, plan.name)
     try:
         return save_camera_files(

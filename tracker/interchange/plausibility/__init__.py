@@ -4,4 +4,4 @@ One score in nats compares what a file says with other names, axes, units and fr
 `interchange.observations` of its wing. Callers use `examine.plan_examined_import` and `examine.examine_joints`.
 """
 
-__all__ = ["body_likelihood", "examine", "lags", "posed_people", "readings"]
+__all__ = ["body_likelihood", "examine", "lags", "readings"]

@@ -6,20 +6,17 @@ from dataclasses import replace
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
-from tracker.formats.file_axes import axes_matrix, is_mirrored
 from tracker.formats.joint_maps import JointMap, joint_maps_of_size
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
-from tracker.formats.trc import MarkerTable
+from tracker.formats.trc import MarkerTable, axes_matrix, is_mirrored
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import floor_plane
 from tracker.geometry.lengths import USUAL_SIZES
+from tracker.interchange.observations.checks import SAMPLES
 from tracker.interchange.observations.importing import plan_import
-from tracker.interchange.observations.joints import triangulate_observations
-from tracker.interchange.observations.observed import ObservationSet
-from tracker.interchange.observations.plans import ImportPlan, MaskPlan
-from tracker.interchange.observations.request import ImportRequest
-from tracker.interchange.observations.shifts import SAMPLES
+from tracker.interchange.observations.observed import ObservationSet, triangulate_observations
+from tracker.interchange.observations.plans import ImportPlan, ImportRequest, MaskPlan
 from tracker.interchange.plausibility.body_likelihood import PRIORS
 from tracker.interchange.plausibility.filmed_people import film_people
 from tracker.interchange.plausibility.readings import Reading, ReadPoints

@@ -8,7 +8,7 @@ import numpy as np
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS
 from tracker.estimation.fitting.keypoints import GROSS_SIGMAS
 from tracker.geometry.arrays import Array, Mask
-from tracker.interchange.observations.shifts import vertex
+from tracker.interchange.observations.checks import vertex
 
 
 class Lag(NamedTuple):

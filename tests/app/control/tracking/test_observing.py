@@ -15,7 +15,7 @@ from app.drawing import overlays
 from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.evaluation.judging.judge import Judgement, LimbVerdict
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.pipeline import chain
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import load_session

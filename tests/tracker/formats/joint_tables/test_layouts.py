@@ -10,8 +10,7 @@ from program_tables import joint_table
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.c3d import read_c3d
-from tracker.formats.joint_tables.layouts import LAYOUTS, NOT_READ, SCENES, find_layout, read_joint_files
-from tracker.formats.joint_tables.subjects import by_subject
+from tracker.formats.joint_tables.layouts import LAYOUTS, NOT_READ, SCENES, by_subject, find_layout, read_joint_files
 from tracker.formats.observation_layout import Sample
 from tracker.geometry.arrays import DAMAGED_ARRAYS
 from tracker.interchange.observations.readers import find_files

@@ -5,9 +5,8 @@ import pytest
 
 from tracker.footage.recording import Recording
 from tracker.interchange.detection.detect import DetectionPlan, detect_people
-from tracker.interchange.detection.detectors import load_detector
-from tracker.interchange.detection.model_files import MODEL_FILES, default_folder
-from tracker.interchange.observations.joints import triangulate_observations
+from tracker.interchange.detection.detectors import MODEL_FILES, default_folder, load_detector
+from tracker.interchange.observations.observed import triangulate_observations
 from tracker.interchange.observations.stored import load_observations
 
 

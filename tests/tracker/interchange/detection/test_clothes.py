@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from tracker.interchange.detection.clothes import clothes_colors
+from tracker.interchange.detection.people_in_views import clothes_colors
 
 TORSO = np.array([[60.0, 40.0], [40.0, 40.0], [57.0, 80.0], [43.0, 80.0]])
 KNEES = np.array([[57.0, 120.0], [43.0, 120.0]])

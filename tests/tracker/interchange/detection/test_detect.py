@@ -7,7 +7,7 @@ from observed_people import make_session, seen, standing_points, walking
 
 from tracker.errors import TrackerError
 from tracker.interchange.detection.detect import DetectionPlan, detect_people
-from tracker.interchange.observations.joints import triangulate_observations
+from tracker.interchange.observations.observed import triangulate_observations
 from tracker.interchange.observations.stored import list_observations, load_observations
 
 N = 12

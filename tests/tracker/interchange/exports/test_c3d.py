@@ -12,9 +12,8 @@ from stored_motions import store_motion
 from tracker.errors import FormatError, Remedy
 from tracker.formats.write_only import c3d, optional_packages
 from tracker.geometry import rigid
-from tracker.interchange.exports.array_writers import write_person_c3d
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.motion import ExportOptions, file_from_world, read_motion
+from tracker.interchange.exports.writers import write_person_c3d
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseChange
 

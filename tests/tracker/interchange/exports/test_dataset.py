@@ -17,8 +17,7 @@ from stored_motions import filmed, store_motion
 from tracker.errors import FormatError, Remedy
 from tracker.formats.calibrations.reading import read_cameras
 from tracker.interchange.exports.datasets.dataset import write_dataset
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportOptions, read_motion
 from tracker.interchange.exports.views import view_labels
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import MarkChange

@@ -12,11 +12,9 @@ from stored_motions import filmed, store_motion
 
 from tracker.errors import FormatError, RecordingError, SessionError, TrackerError
 from tracker.interchange.exports.datasets.card import format_card, shared_people
-from tracker.interchange.exports.datasets.dataset import export_dataset, plan_dataset
-from tracker.interchange.exports.datasets.labels import DatasetRecording
+from tracker.interchange.exports.datasets.dataset import DatasetRecording, export_dataset, plan_dataset
 from tracker.interchange.exports.datasets.splits import SPLITS, SplitChoice, divide, parse_splits, recording_names
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportOptions, read_motion
 from tracker.session.store.annotation_store import AnnotationStore
 
 

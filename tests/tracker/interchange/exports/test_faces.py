@@ -23,8 +23,7 @@ from tracker.interchange.exports import faces
 from tracker.interchange.exports.datasets.dataset import write_dataset
 from tracker.interchange.exports.faces import Circle, Heads, blurred, head_surface, recording_of
 from tracker.interchange.exports.keypoints import project_through_lens
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportOptions, read_motion
 from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
 from tracker.interchange.observations.stored import save_observations
 

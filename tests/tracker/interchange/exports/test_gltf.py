@@ -11,8 +11,7 @@ from stored_motions import FPS, store_motion
 
 from tracker.geometry import rigid
 from tracker.interchange.exports import writers
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.motion import ExportOptions, file_from_world, read_motion
 
 WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 

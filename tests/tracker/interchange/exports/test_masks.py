@@ -15,9 +15,8 @@ from tracker.errors import FormatError, Remedy
 from tracker.evidence.contours.label_image import part_labels
 from tracker.geometry import rigid
 from tracker.geometry.lens_tables import lens_of, undistortion_map
-from tracker.interchange.exports.mask_writers import write_masks
-from tracker.interchange.exports.motion import PersonMotion, read_motion
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.label_writers import write_masks
+from tracker.interchange.exports.motion import ExportOptions, PersonMotion, read_motion
 from tracker.interchange.exports.views import view_labels
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import MarkChange

@@ -12,8 +12,7 @@ import quadrille
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.interchange.exports.mesh_writers import write_bodies, write_scene
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.motion import ExportOptions, file_from_world, read_motion
 
 
 @pytest.fixture

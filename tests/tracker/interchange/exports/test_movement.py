@@ -13,9 +13,8 @@ from stored_motions import FPS, store_motion
 from tracker.errors import FormatError
 from tracker.formats.write_only import optional_packages
 from tracker.geometry import rigid
-from tracker.interchange.exports.array_writers import write_movement
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.motion import ExportOptions, file_from_world, read_motion
+from tracker.interchange.exports.writers import write_movement
 
 DIMENSIONS = ("time", "space", "keypoints", "individuals")
 """Of movement's schema (movement.validators.datasets.ValidPosesInputs)."""

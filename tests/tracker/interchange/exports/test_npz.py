@@ -11,9 +11,8 @@ from stored_motions import store_motion
 
 from tracker.formats.model_toml import parse_model
 from tracker.geometry import rigid
-from tracker.interchange.exports.array_writers import write_npz
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.motion import ExportOptions, file_from_world, read_motion
+from tracker.interchange.exports.writers import write_npz
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseChange
 

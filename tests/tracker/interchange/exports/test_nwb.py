@@ -11,9 +11,8 @@ from foreign import foreign, projected
 from stored_motions import FPS, store_motion
 
 from tracker.geometry import rigid
-from tracker.interchange.exports.motion import read_motion
+from tracker.interchange.exports.motion import ExportOptions, file_from_world, read_motion
 from tracker.interchange.exports.nwb_writer import write_poses_nwb
-from tracker.interchange.exports.options import ExportOptions, file_from_world
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseChange
 

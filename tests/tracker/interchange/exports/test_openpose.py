@@ -12,10 +12,9 @@ from stored_motions import K1, filmed, store_motion
 
 from tracker.errors import RecordingError
 from tracker.formats.anipose import read_calibration
-from tracker.formats.keypoints.openpose import read_openpose
+from tracker.formats.keypoints.detections import read_openpose
 from tracker.interchange.exports.label_writers import write_points
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportOptions, read_motion
 
 LIMBS = {
     "RElbow": "right_elbow",

@@ -10,8 +10,7 @@ from stored_motions import store_motion
 from tracker.formats.model_toml import parse_model
 from tracker.geometry import rigid
 from tracker.interchange.exports import writers
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.motion import ExportOptions, file_from_world, read_motion
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ import pytest
 from bodies import MODELS
 from stored_motions import store_motion
 
-from tracker.interchange.exports.point_origins import point_origins
+from tracker.interchange.exports.provenance import point_origins
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import SEEN, MarkChange, Pin, PoseChange
 

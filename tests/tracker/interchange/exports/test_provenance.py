@@ -14,10 +14,8 @@ from tracker.annotation import plan
 from tracker.body.limbs import limbs
 from tracker.errors import Remedy, SessionError
 from tracker.interchange.exports import writers
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions
-from tracker.interchange.exports.pose_arrays import pose_arrays
-from tracker.interchange.exports.provenance import pose_provenance, sources_of_points, write_provenance
+from tracker.interchange.exports.motion import ExportOptions, read_motion
+from tracker.interchange.exports.provenance import pose_arrays, pose_provenance, sources_of_points, write_provenance
 from tracker.pipeline.calibration_revisions import change_calibration
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore

@@ -7,13 +7,11 @@ from stored_motions import store_motion
 
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.interchange.exports.formats import FORMATS as EXPORTS
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportOptions, read_motion
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.joints import observed_joints
-from tracker.interchange.observations.observed import columns_of
+from tracker.interchange.observations.observed import columns_of, observed_joints
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.readers import FORMATS
-from tracker.interchange.observations.request import ImportRequest
 from tracker.interchange.observations.stored import load_observations
 
 N = 8

@@ -21,8 +21,7 @@ from tracker.geometry.camera_correction import N_CORRECTIONS
 from tracker.geometry.ground_plane import GroundPlane
 from tracker.interchange.exports import writers
 from tracker.interchange.exports.keypoints import keypoints_in_views, project_through_lens
-from tracker.interchange.exports.motion import read_motion
-from tracker.interchange.exports.options import ExportOptions, file_from_world
+from tracker.interchange.exports.motion import ExportOptions, file_from_world, read_motion
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore

@@ -8,12 +8,12 @@ from observed_people import BODY_25, make_session, seen, write_openpose
 
 from tracker.body.model import PosedBody
 from tracker.evaluation.judging import best_motion as judged
-from tracker.formats.keypoints.openpose import read_openpose
+from tracker.formats.keypoints.detections import read_openpose
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import write_trc
 from tracker.interchange.exports.like.sending import export_like
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations
 from tracker.pipeline.keypoint_evidence import assigned_observations, read_points
 from tracker.session.store.annotation_store import AnnotationStore

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints import hdf5_process
-from tracker.formats.keypoints.hdf5 import LIMITS
-from tracker.formats.keypoints.hdf5_process import check_datasets, read_hdf5
+from tracker.formats.keypoints import hdf5
+from tracker.formats.keypoints.hdf5 import LIMITS, check_datasets, read_hdf5
 
 h5py = pytest.importorskip("h5py")
 
@@ -79,7 +78,7 @@ def test_filters_of_plug_ins_are_refused(tmp_path):
 
 
 def allocate_beyond_the_limit():
-    hdf5_process.limit_memory(hdf5_process.LIMITS.memory_bytes)
+    hdf5.limit_memory(hdf5.LIMITS.memory_bytes)
     try:
         np.empty(LIMITS.memory_bytes, np.uint8)
     except MemoryError:

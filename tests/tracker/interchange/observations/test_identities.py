@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from observed_people import BODY_25, make_session, seen, standing_points, walking
 
-from tracker.interchange.observations.joints import triangulate_observations
-from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
+from tracker.interchange.observations.observed import ObservationSet, ObservedPoints, triangulate_observations
 from tracker.interchange.observations.stored import load_observations, save_observations
 
 N = 24

@@ -13,8 +13,8 @@ from tracker.formats.joint_maps import read_joint_map
 from tracker.formats.motion_csv import MotionRow, write_motion_csv
 from tracker.formats.trc import write_trc
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.joints import observed_joints, triangulate_observations
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.observed import observed_joints, triangulate_observations
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import list_observations, load_observations, source_path
 from tracker.interchange.plausibility.examine import plan_examined_import
 from tracker.session.session import load_session

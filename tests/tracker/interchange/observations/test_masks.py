@@ -14,7 +14,7 @@ from tracker.errors import FormatError, SessionError, TrackerError
 from tracker.footage.mask_image import UNKNOWN
 from tracker.footage.recording import read_mask
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored_masks import list_masks, load_masks, masks_folder
 from tracker.session.relink import Places, leave_masks, relink
 from tracker.session.session import load_session

@@ -20,14 +20,14 @@ from program_files import WRITERS
 from tracker.footage.recording import read_mask
 from tracker.formats.bvh import BvhFrame, write_bvh
 from tracker.formats.joint_tables.layouts import LAYOUTS, find_layout
-from tracker.formats.keypoints import hdf5, hdf5_process
+from tracker.formats.keypoints import hdf5
 from tracker.formats.observation_layout import Sample
 from tracker.formats.trc import write_trc
 from tracker.geometry import rigid
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.joints import observed_joints
+from tracker.interchange.observations.observed import observed_joints
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.readers import FORMATS
-from tracker.interchange.observations.request import ImportRequest
 from tracker.interchange.observations.stored import load_observations
 from tracker.interchange.observations.stored_masks import load_masks
 
@@ -127,7 +127,7 @@ def _unit(kind):
 def run_forked(words, **_):
     """Read a file in a fork of this process, which has loaded the libraries: a new one needs 2 to 7 s for that."""
     path, folder = map(Path, words[-2:])
-    child = multiprocessing.get_context("fork").Process(target=hdf5_process.main, args=(path, folder))
+    child = multiprocessing.get_context("fork").Process(target=hdf5.main, args=(path, folder))
     child.start()
     child.join(SECONDS)
     if child.is_alive():
@@ -173,7 +173,7 @@ def test_mutated_observations_are_imported_or_refused(kind, n, tmp_path, monkeyp
     path = write("openpose" if kind in ("stored text", "stored numbers") else kind, session, folder)
     if package in APART:
         assert not read(kind, session, path, 1)  # by a process of its own
-        hdf5_process.read_hdf5(folder / name)  # loads the libraries
+        hdf5.read_hdf5(folder / name)  # loads the libraries
         monkeypatch.setattr(hdf5.subprocess, "run", run_forked)
     if kind.startswith("stored"):
         store_import(session, plan_import(session, ImportRequest("mp", (path,), ("ann",))))

@@ -14,10 +14,10 @@ from tracker.errors import FormatError
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.detections import read_yolo
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.joints import observed_joints
+from tracker.interchange.observations.observed import observed_joints
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.readers import FORMATS as FORMATS_BY_NAME
 from tracker.interchange.observations.readers import PICTURE_FORMATS, UNREAD, find_files
-from tracker.interchange.observations.request import ImportRequest
 from tracker.interchange.observations.sources import match_cameras, numbered_groups
 
 N = 8

@@ -22,11 +22,11 @@ from tracker.formats.joint_tables.layouts import read_joint_files
 from tracker.formats.keypoints import hdf5
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
+from tracker.formats.keypoints.detections import read_openpose
 from tracker.formats.keypoints.hdf5 import read_hdf5_apart
-from tracker.formats.keypoints.openpose import read_openpose
 from tracker.interchange.observations.importing import plan_import
-from tracker.interchange.observations.joints import observed_joints
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.observed import observed_joints
+from tracker.interchange.observations.plans import ImportRequest
 
 N = 8
 TRUTH = walking(N)

@@ -8,12 +8,11 @@ from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.errors import FormatError, Remedy
 from tracker.interchange.exports.like.sending import export_like
-from tracker.interchange.observations.importing import plan_import, store_import
+from tracker.interchange.observations.checks import view_shifts
+from tracker.interchange.observations.importing import plan_import, store_import, stored_pictures
 from tracker.interchange.observations.observed import ObservedPoints
-from tracker.interchange.observations.request import ImportRequest
-from tracker.interchange.observations.shifts import view_shifts
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations
-from tracker.interchange.observations.stored_files import stored_pictures
 
 N, FPS = 48, 30.0
 NOISE_PX = 2.0

@@ -8,7 +8,7 @@ from observed_files import write_coco_images, write_deeplabcut, write_sleap
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.interchange.observations.importing import plan_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 
 N = 3
 MOTIONS = [walking(N), walking(N, start=(-0.5, 0.8, 0.0))]

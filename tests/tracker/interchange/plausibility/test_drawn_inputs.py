@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from simulated_joints import N_FRAMES, SKELETONS, WRONG_M, Case, detected, skeleton_points
 
-from tracker.formats.file_axes import axes_matrix, axis_conventions
 from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.formats.trc import axes_matrix, axis_conventions
 
 FIRST_SEED = int(os.environ.get("QUADRILLE_PEOPLE_SEED", "70000"))
 N_PEOPLE, N_DRAWS = 25, 16

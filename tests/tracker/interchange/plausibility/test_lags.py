@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from rigs import cameras, ring
 
-from tracker.interchange.plausibility.filmed_motion import MotionFinder
-from tracker.interchange.plausibility.filmed_people import FilmedPeople
+from tracker.interchange.plausibility.filmed_people import FilmedPeople, MotionFinder
 from tracker.interchange.plausibility.lags import Lag, combined_lag, find_lag
 
 N, MOST = 60, 12

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from simulated_joints import N_FRAMES, SKELETONS, WRONG_M, Case, detected, skeleton_points
 
-from tracker.formats.file_axes import axes_matrix, axis_conventions, is_mirrored
 from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.formats.trc import axes_matrix, axis_conventions, is_mirrored
 
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 40))]
 

@@ -3,4 +3,4 @@
 `dataset` plans and writes them.
 """
 
-__all__ = ["card", "dataset", "labels", "splits"]
+__all__ = ["card", "dataset", "splits"]

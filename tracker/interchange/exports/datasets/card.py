@@ -11,8 +11,7 @@ import numpy as np
 
 from tracker.compute.distribution import program_version
 from tracker.geometry.arrays import Array
-from tracker.interchange.exports.motion import ExportedMotion, frames_text
-from tracker.interchange.exports.options import ExportOptions
+from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, frames_text
 from tracker.interchange.exports.provenance import PoseProvenance, pose_provenance
 
 TO_FILL_IN = "TO BE FILLED IN"
@@ -22,6 +21,16 @@ _FACES = {
     "blurred": "heads are blurred where a pose, key points or a mask show them; look at the pictures all the same",
 }
 """Sentences on the faces in the pictures."""
+_VALUES = {
+    "status: {}": ("status", "not assessed"),
+    "source: {}": ("source", ""),
+    "annotator: {}": ("annotator", "not named"),
+    "verified by: {}": ("verified_by", ""),
+    "body: revision {}": ("body_revision", ""),
+}
+"""Properties of poses that are counted by value: the field of the provenance, and the word for an empty one."""
+_FLAGS = {"keyframes": "keyframe", "reviewed": "reviewed", "of an earlier calibration": "earlier_calibration"}
+"""Properties that poses have or not."""
 _TEMPLATE = resources.files("tracker").joinpath("interchange", "exports", "datasets", "card.md")
 
 
@@ -169,17 +178,9 @@ def _of_recordings(summaries: Sequence[RecordingSummary], splits: Mapping[str, S
 def _provenance_counts(found: list[PoseProvenance]) -> Counter[tuple[str, str]]:
     """Return the numbers of poses by what is known of them."""
     counts: Counter[tuple[str, str]] = Counter()
-    for what, values in (
-        ("status", [p.record.status or "not assessed" for p in found]),
-        ("source", [p.source for p in found]),
-        ("annotator", [p.record.author or "not named" for p in found]),
-        ("verified by", [p.verified_by for p in found if p.verified_by]),
-        ("body", [f"revision {p.record.model_revision}" for p in found]),
-        ("keyframes", ["" for p in found if p.record.keyframe]),
-        ("reviewed", ["" for p in found if p.is_reviewed]),
-        ("of an earlier calibration", ["" for p in found if p.is_earlier_calibration]),
-    ):
-        counts.update((what, value) for value in values)
+    for of_pose in (p.fields for p in found):
+        counts.update((what, str(of_pose[field] or empty)) for what, (field, empty) in _VALUES.items())
+        counts.update((what, "") for what, field in _FLAGS.items() if of_pose[field])
     return counts
 
 
@@ -189,12 +190,12 @@ def _provenance_rows(summaries: Sequence[RecordingSummary]) -> list[tuple[str, s
     for s in summaries:
         counts.update(s.provenance)
     rows = [
-        (f"{what}: {value}", str(n))
-        for of_kind in ("status", "source", "annotator", "verified by", "body")
+        (what.format(value), str(n))
+        for of_kind in _VALUES
         for (what, value), n in counts.most_common()
-        if what == of_kind
+        if what == of_kind and value
     ]
-    rows += [(what, str(counts[what, ""])) for what in ("keyframes", "reviewed", "of an earlier calibration")]
+    rows += [(what, str(counts[what, ""])) for what in _FLAGS]
     if n := sum(s.n_with_errors for s in summaries):
         error_mm = 1000 * float(np.median(np.concatenate([s.errors_m for s in summaries])))
         rows.append(("with expected errors", f"{n}, median {error_mm:.0f} mm for each joint"))

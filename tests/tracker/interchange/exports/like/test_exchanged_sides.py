@@ -8,7 +8,7 @@ from tracker.errors import FormatError
 from tracker.formats.trc import write_trc
 from tracker.interchange.exports.like.sending import export_like
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations
 
 N = 12

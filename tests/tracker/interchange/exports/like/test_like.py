@@ -16,16 +16,15 @@ from tracker.formats.c3d import read_c3d
 from tracker.formats.joint_tables.layouts import read_joint_files
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
+from tracker.formats.keypoints.detections import read_openpose
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
-from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import read_trc, write_trc
 from tracker.interchange.exports.keypoints import project_through_lens
 from tracker.interchange.exports.like.sending import export_like
-from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.importing import plan_import, store_import, stored_pictures
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations, source_path
-from tracker.interchange.observations.stored_files import stored_pictures
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseChange, PoseRecord
 

@@ -9,12 +9,11 @@ from observed_people import make_session
 
 from tracker.body.model import PosedBody
 from tracker.formats.bvh import UPRIGHT_Y, BvhFrame, write_bvh
-from tracker.formats.bvh_patching import patch_bvh
-from tracker.formats.bvh_reading import read_bvh
+from tracker.formats.bvh_reading import patch_bvh, read_bvh
 from tracker.formats.model_toml import format_model, load_model
 from tracker.interchange.exports.like.sending import export_like
 from tracker.interchange.observations.importing import plan_import, store_import
-from tracker.interchange.observations.request import ImportRequest
+from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import PoseChange, PoseRecord
