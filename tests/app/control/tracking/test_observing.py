@@ -104,10 +104,10 @@ def test_a_detection_that_is_stopped_keeps_what_it_found_and_goes_on(controller,
     outcome = at_rest(controller)
     assert outcome.message.startswith("Stopped; what was found is kept")
     (some,) = outcome.sets
-    assert 0 < some.n_frames < controller.session.n_frames
+    assert 0 < some.frames < controller.session.n_frames
     controller.observing.detect()
     (whole,) = at_rest(controller).sets
-    assert (whole.name, whole.n_frames) == ("detected", controller.session.n_frames)
+    assert (whole.name, whole.frames) == ("detected", controller.session.n_frames)
 
 
 def test_detected_people_are_shown_while_the_user_watches(controller, detector, monkeypatch):
