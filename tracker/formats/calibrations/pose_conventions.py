@@ -17,6 +17,7 @@ from tracker.formats.calibrations.convention_names import CONVENTIONS, PoseConve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.camera_rig import axes_point
+from tracker.validation import ROUNDING
 
 STATED: PoseConvention = "world-to-camera"
 _MEANING = {
@@ -112,7 +113,7 @@ def _roll(Ts_world_camera: Array) -> float:
     lengths = np.linalg.norm(normals, axis=1)
     verticals = np.concatenate([normals[lengths > 0.1] / lengths[lengths > 0.1, None], sides])
     across, along = verticals @ x.T, verticals @ y.T
-    rolls = np.abs((np.degrees(np.arctan2(across, along)) + 45.0) % 90.0 - 45.0)
+    rolls = np.abs((np.degrees(np.arctan2(across, along)) + 45) % 90 - 45)
     rolls = np.where(np.hypot(across, along) < LOOK_DOWN, _UNKNOWN_ROLL, rolls)
     return float(np.sqrt(np.mean(rolls**2, axis=1)).min())
 
@@ -194,7 +195,7 @@ def _distinct(conventions: Sequence[PoseConvention], Ts_stated: Sequence[Array])
     found: list[PoseConvention] = []
     for convention in conventions:
         rig = _from_first(Ts_stated, convention)
-        if not any(np.allclose(rig, _from_first(Ts_stated, c), atol=1e-6) for c in (STATED, *found)):
+        if not any(np.allclose(rig, _from_first(Ts_stated, c), atol=ROUNDING) for c in (STATED, *found)):
             found.append(convention)
     return found
 

@@ -19,7 +19,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.rigid import so3_exp
 from tracker.validation import ROUNDING, quoted
 
-_ORDERS = {"w, x, y, z": (0, 1, 2, 3), "x, y, z, w": (3, 0, 1, 2)}
+_ORDERS = {order: [order.split(", ").index(letter) for letter in "wxyz"] for order in ("w, x, y, z", "x, y, z, w")}
 """Places of w, x, y and z among the four numbers."""
 _ALONG = 0.02
 """Share of the length of a row by which rectified cameras stand beside it: their rows are exact but for rounding.
@@ -48,7 +48,7 @@ def with_quaternions(sections: Mapping[str, Section], where: str, poses: PoseCon
                 f"{np.linalg.norm(q):.4g}; rewrite the rotations as 3x3 matrices"
             )
     turned = {
-        words: {name: rigid.matrix_from_quaternion(q[list(places)]) for name, q in quaternions.items()}
+        words: {name: rigid.matrix_from_quaternion(q[places]) for name, q in quaternions.items()}
         for words, places in _ORDERS.items()
     }
     rigs = {words: _rig(sections, rotations) for words, rotations in turned.items()}
