@@ -8,7 +8,7 @@ import pytest
 from architecture import FILES, ROOT, nodes, trees
 from code_counts import code_lines, git, numbers, private_names, unexplained_rises
 
-MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 991, 224, 0
+MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 838, 200, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
 MAX_CODE_LINES = {"tracker": 49969, "app": 21190, "js": 14598, "css": 4189, "tests": 66707}

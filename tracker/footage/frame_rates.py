@@ -3,7 +3,13 @@
 RATE_TOLERANCE = 5e-4
 """Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much,
 and 23.98 differs from 24000/1001 by a third."""
-_CAMERA_RATES = (24000 / 1001, 24.0, 25.0, 30000 / 1001, 30.0, 50.0, 60000 / 1001, 60.0, 100.0, 120.0, 200.0, 240.0)
+DROP = 1.001
+"""Whole rates over those of television: 30 for 30000/1001 per second."""
+LONG_INTERVAL = 1.5
+"""Interval between frames, in usual ones, above which a frame may be missing in it."""
+_TELEVISION_RATES = (24.0, 30.0, 60.0)
+"""Whole frame rates by which television's go, 1/s."""
+_CAMERA_RATES = (*_TELEVISION_RATES, *(r / DROP for r in _TELEVISION_RATES), 25.0, 50.0, 100.0, 120.0, 200.0, 240.0)
 """Frame rates of cameras and of television, 1/s."""
 
 
@@ -14,9 +20,9 @@ def same_rate(rate: float, other: float) -> bool:
 
 def nominal_rate(rate: float) -> float:
     """Return the whole rate by which television's rate goes, 1/s: 30 for 30000/1001; other rates as they are."""
-    whole = round(rate * 1.001)
+    whole = round(rate * DROP)
     is_of_television = whole > 0 and (whole % 24 == 0 or whole % 30 == 0)
-    return float(whole) if is_of_television and abs(rate * 1.001 / whole - 1) <= RATE_TOLERANCE else rate
+    return float(whole) if is_of_television and abs(rate * DROP / whole - 1) <= RATE_TOLERANCE else rate
 
 
 def same_clock(rate: float, other: float) -> bool:

@@ -12,6 +12,7 @@ from av.video.stream import VideoStream
 
 from tracker.errors import RecordingError
 from tracker.footage.frame_index import Index
+from tracker.footage.frame_rates import LONG_INTERVAL
 from tracker.footage.video_decoder import VideoDecoder
 
 _CHECKED_FRAMES = 16
@@ -44,7 +45,7 @@ class TimeStamps(NamedTuple):
     """Largest distance of a stamp from the straight line through all, as a share of the interval between frames; 0
     where it is below a tick."""
     n_gaps: int
-    """Number of intervals in which a frame may be missing: those longer than 1.5 usual ones."""
+    """Number of intervals in which a frame may be missing: those longer than `LONG_INTERVAL`."""
     usual_rate: float
     """Frame rate without these gaps, 1/s; 0 of fewer than three frames."""
 
@@ -151,8 +152,8 @@ def time_stamps_of(index: Index, tick_s: float) -> TimeStamps:
     apart = float(np.abs(ticks - (slope * k + ahead)).max())
     # Of intervals that alternate, the median may be the shorter; the mean over all is drawn out by gaps.
     usual = max(np.median(intervals), intervals.mean())
-    usual = intervals[intervals <= 1.5 * usual].mean()
-    n_gaps = int((intervals > 1.5 * usual).sum())
+    usual = intervals[intervals <= LONG_INTERVAL * usual].mean()
+    n_gaps = int((intervals > LONG_INTERVAL * usual).sum())
     return TimeStamps(start_s, apart / slope if apart > 1 else 0.0, n_gaps, float(1 / (usual * tick_s)))
 
 
@@ -172,4 +173,4 @@ def _promises_more(container: InputContainer, stream: VideoStream, end: int) -> 
     if container.duration is None or len(container.streams) > 1:
         return False  # the file's duration may be that of its sound
     missing_s = container.duration / av.time_base - end * float(stream.time_base or 0)
-    return missing_s > 1.5 / float(stream.average_rate or 1)
+    return missing_s > LONG_INTERVAL / float(stream.average_rate or 1)

@@ -19,8 +19,9 @@ from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_unchange
 from tracker.footage.video import open_footage
 from tracker.geometry.arrays import Image
 
-DEFAULT_CACHE_BYTES = 256 * 2**20
-"""Memory of decoded frames of all cameras, bytes: 72 frames of four cameras of 640x480."""
+DEFAULT_CACHE_BYTES = 2 * passed_frames.MAX_BYTES
+"""Memory of decoded frames of all cameras, bytes: 72 frames of four cameras of 640x480, in RGB twice as large as those
+that a decoder passed."""
 _Key = tuple[int, int, int]
 """Camera, version of its footage, frame of the footage."""
 

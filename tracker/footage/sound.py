@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.errors import RecordingError
-from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.arrays import TINY, Array, FloatArray
 
 
 @dataclass(frozen=True)
@@ -124,11 +124,11 @@ def _peak(one: FloatArray, other: FloatArray, settings: SoundSettings) -> tuple[
     hz = np.fft.rfftfreq(n, 1 / settings.rate)
     size = np.abs(spectrum)
     is_used = (hz >= settings.band_hz[0]) & (hz <= settings.band_hz[1]) & (size > 0)
-    delays: Array = np.fft.irfft(np.where(is_used, spectrum / np.maximum(size, 1e-30), 0.0), n)
+    delays: Array = np.fft.irfft(np.where(is_used, spectrum / np.maximum(size, TINY), 0.0), n)
     best = int(np.argmax(delays))
     before, at, after = delays[best - 1], delays[best], delays[(best + 1) % n]
     bend = before - 2 * at + after
     exact = best + (0.5 * (before - after) / bend if bend < 0 else 0.0)
     around = (np.arange(n) - best + n // 2) % n - n // 2
     elsewhere = delays[np.abs(around) > settings.width_s * settings.rate].max()
-    return float(exact if exact <= len(other) else exact - n), float(at / max(elsewhere, 1e-30))
+    return float(exact if exact <= len(other) else exact - n), float(at / max(elsewhere, TINY))

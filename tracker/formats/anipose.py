@@ -25,7 +25,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lengths import METRES_BY_WORD
 from tracker.geometry.lenses import coefficient_counts, count_words
-from tracker.validation import MAX_NUMBER, MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
+from tracker.validation import MAX_NUMBER, MAX_SIDE_PX, ROUNDING, FileStem, Number, Vector, check, quoted
 
 Units = Literal["m", "cm", "mm"]
 METRES = {unit: METRES_BY_WORD[unit] for unit in get_args(Units)}
@@ -33,7 +33,7 @@ METRES = {unit: METRES_BY_WORD[unit] for unit in get_args(Units)}
 
 FOUR_DIGITS = 1e-3
 """Error of a rotation matrix or a unit quaternion that is printed with four digits."""
-_MAX_TURN_RAD = 2 * np.pi + 1e-6
+_MAX_TURN_RAD = 2 * np.pi + ROUNDING
 """Longest Rodrigues vector: programs write at most half a turn, and optimizers stay within one."""
 MAX_OFFSET = 0.25
 """Distance of a principal point from the middle, as a share of the side of the picture: lenses are mounted in the

@@ -5,6 +5,7 @@ none. See `tracker/body/models/gavrila22.toml` for an example.
 """
 
 import fnmatch
+import math
 import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -40,13 +41,18 @@ _LOWEST_M, _HIGHEST_M = HEIGHT_LIMITS_M
 _Height: TypeAlias = Annotated[
     float, Meta(ge=_LOWEST_M, le=_HIGHEST_M, description=f"a height of {_LOWEST_M:g} to {_HIGHEST_M:g} metres")
 ]
-_Fraction: TypeAlias = Annotated[float, Meta(ge=-10, le=10)]
+_LARGEST = 10
+"""Largest position and half-axis, fractions of the height."""
+_WIDEST_TAPER = 0.9
+"""Tapers are smaller: 1 is a point."""
+_HALF_TURN_DEG = math.degrees(math.pi)
+_Fraction: TypeAlias = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
 _Position: TypeAlias = Annotated[
     tuple[_Fraction, _Fraction, _Fraction], Meta(description="3 finite numbers, fractions of the height,")
 ]
-_HalfAxis: TypeAlias = Annotated[float, Meta(ge=1e-4, le=10)]
+_HalfAxis: TypeAlias = Annotated[float, Meta(ge=1e-4, le=_LARGEST)]
 _Exponent: TypeAlias = Annotated[float, Meta(ge=0.05, le=1)]
-_Taper: TypeAlias = Annotated[float, Meta(gt=-0.9, lt=0.9, description="a taper within 0.9")]
+_Taper: TypeAlias = Annotated[float, Meta(gt=-_WIDEST_TAPER, lt=_WIDEST_TAPER, description="a taper within 0.9")]
 _TAPERS: dict[str, Any] = {
     "superquadric": Annotated[tuple[_Taper, _Taper], Meta(description="2 tapers within 0.9")],
     "cone": _Taper,
@@ -60,7 +66,7 @@ _Parent: TypeAlias = Annotated[
 _Source: TypeAlias = Annotated[
     str, Meta(pattern=rf"^[^{UNPRINTABLE}]{{0,500}}\Z", description="a source of at most 500 characters,")
 ]
-_Turn: TypeAlias = Annotated[float, Meta(ge=0, le=180, description="an angle of 0 to 180 degrees")]
+_Turn: TypeAlias = Annotated[float, Meta(ge=0, le=_HALF_TURN_DEG, description="an angle of 0 to 180 degrees")]
 
 
 class _Row(msgspec.Struct, forbid_unknown_fields=True):
@@ -100,8 +106,8 @@ class _JointRow(_CenteredRow):
     kind: Literal["revolute", "ball"] = "revolute"
     axes: Annotated[list[_AxisRow], Meta(max_length=6, description="at most 6 axes")] = []
     free: bool = False
-    cone_deg: _Turn = 180.0
-    twist_deg: _Turn = 180.0
+    cone_deg: _Turn = _HALF_TURN_DEG
+    twist_deg: _Turn = _HALF_TURN_DEG
 
     def __post_init__(self) -> None:
         super().__post_init__()

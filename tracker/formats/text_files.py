@@ -234,7 +234,7 @@ def _reading(path: Path, kind: TextKind) -> Generator[None, None, None]:
 def _check_size(n_bytes: int, path: Path, kind: TextKind) -> None:
     if n_bytes > kind.max_bytes:
         raise kind.error(
-            f"{kind.name} {path}: expected at most {kind.max_bytes / 1e6:g} MB, found more; check that it is the "
+            f"{kind.name} {path}: expected at most {kind.max_bytes / 10**6:g} MB, found more; check that it is the "
             "right file"
         )
 

@@ -120,7 +120,7 @@ def write_trc(
     frames = np.arange(len(points)) if frames is None else np.asarray(frames)
     assert points.shape == (len(frames), len(names), 3)
     first = int(frames[0]) + 1 if len(frames) else 1
-    scale, digits = (1.0, 7) if units == "m" else (1000.0, 4)
+    scale, digits = 1 / METRES_BY_WORD[units], 7 if units == "m" else 4
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
         "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",

@@ -6,24 +6,33 @@ focal lengths become e^(s+a) fx and e^(s-a) fy, with the skew like fx. Principal
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
-from tracker.geometry.lenses import fisheye_limit
+from tracker.geometry.lenses import fisheye_limit, fisheye_radii
 
-ROTATION, SHIFT = slice(0, 3), slice(3, 6)
+
+def consecutive(**sizes: int) -> dict[str, slice]:
+    """Return columns that follow one another by their names, from how many each name has."""
+    return {name: slice(end - sizes[name], end) for name, end in zip(sizes, accumulate(sizes.values()), strict=True)}
+
+
+_COLUMNS = consecutive(rotation=3, shift=3, focal=1, aspect=1, principal=2)
+"""Columns of a camera's correction before those of its distortion."""
+ROTATION, SHIFT = _COLUMNS["rotation"], _COLUMNS["shift"]
 """Columns of the correction of a pose: rotation vector w, rad, and shift t of the centre, metres."""
-POSE = slice(0, 6)
+POSE = slice(0, SHIFT.stop)
 """Both."""
-FOCAL, ASPECT = 6, 7
+FOCAL, ASPECT = _COLUMNS["focal"].start, _COLUMNS["aspect"].start
 """Columns of the logarithms of the focal length (s) and of the root of fx / fy (a)."""
-PRINCIPAL = slice(8, 10)
+PRINCIPAL = _COLUMNS["principal"]
 """Columns of the principal point, px."""
-DISTORTION = slice(10, None)
+DISTORTION = slice(PRINCIPAL.stop, None)
 """Columns of the distortion, in OpenCV's order."""
 N_BEFORE_DISTORTION = DISTORTION.start
 
@@ -130,15 +139,13 @@ def _brown_conrady(points: Array, distortion: Array) -> tuple[Array, Array, Arra
 
 def _fisheye(points: Array, distortion: Array) -> tuple[Array, Array, Array]:
     """Return the same of the equidistant model."""
-    k1, k2, k3, k4 = np.pad(distortion, (0, 4 - distortion.size))
     across = np.linalg.norm(points[:, :2], axis=1)
     angle = np.arctan2(across, points[:, 2])
     angle = np.where(angle <= fisheye_limit(distortion), angle, np.nan)
     a2 = angle * angle
-    radius = angle * (1 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
-    by_angle = 1 + a2 * (3 * k1 + a2 * (5 * k2 + a2 * (7 * k3 + a2 * 9 * k4)))
+    radius, by_angle = fisheye_radii(angle, distortion)
     # On the axis the direction across is undetermined, and the model is that of a pinhole.
-    tiny = across < 1e-12 * np.maximum(np.abs(points[:, 2]), 1e-12)
+    tiny = across < TINY * np.maximum(np.abs(points[:, 2]), TINY)
     safe = np.where(tiny, 1.0, across)
     unit = np.where(tiny[:, None], (1.0, 0.0), points[:, :2] / safe[:, None])
     side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)

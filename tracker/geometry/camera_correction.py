@@ -10,16 +10,11 @@ from types import MappingProxyType
 import numpy as np
 
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_columns import moved_camera, n_columns
+from tracker.geometry.camera_columns import consecutive, moved_camera, n_columns
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import so3_exp, so3_log
 
-KINDS = MappingProxyType(
-    {
-        "rotation": slice(0, 3), "position": slice(3, 6), "focal": slice(6, 7), "time": slice(7, 8),
-        "drift": slice(8, 9),
-    }
-)  # fmt: skip
+KINDS = MappingProxyType(consecutive(rotation=3, position=3, focal=1, time=1, drift=1))
 """Columns of a correction, (9,): w in rad and t in metres, both along the axes of the camera, s, d in seconds, and r in
 seconds per second."""
 ROTATION, POSITION, FOCAL, TIME = KINDS["rotation"], KINDS["position"], KINDS["focal"].start, KINDS["time"].start

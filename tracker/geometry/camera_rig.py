@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.geometry import rigid
 from tracker.geometry.arrays import TINY, Array
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import Camera, across_lines
 
 MIN_APART_M = 0.02
 """Least distance of two cameras, metres: no stereo camera for people is narrower."""
@@ -50,9 +50,8 @@ def axes_point(Ts_world_camera: Sequence[Array] | Array) -> AxesPoint:
     Ts = np.asarray(Ts_world_camera)
     centers, axes = Ts[:, :3, 3], Ts[:, :3, 2]
     middle = centers.mean(axis=0)
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     # For parallel axes, the solution of minimum norm lies beside the cameras.
-    offset = np.linalg.lstsq(across.sum(axis=0), (across @ (centers - middle)[..., None]).sum(axis=0)[:, 0], rcond=TINY)
+    offset = np.linalg.lstsq(*across_lines(centers - middle, axes), rcond=TINY)
     toward = middle + offset[0] - centers
     distances = np.linalg.norm(toward, axis=1)
     cosines = (axes * toward).sum(axis=1) / np.maximum(distances, TINY)

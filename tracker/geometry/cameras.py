@@ -119,7 +119,7 @@ class Camera:
         return self if self.is_pinhole else replace(self, distortion=np.zeros(0))
 
     def _fisheye_pinhole(self) -> "Camera":
-        xy = self._px_to_slopes(_border(self.size))
+        xy = self._px_to_slopes(border(self.size))
         directions = fisheye_directions(xy, self.distortion)
         angles = np.arctan2(np.linalg.norm(directions[:, :2], axis=-1), directions[:, 2])
         widest = min(MAX_PINHOLE_ANGLE, fisheye_limit(self.distortion))
@@ -293,9 +293,9 @@ class Camera:
         return np.stack([x, y], axis=-1)
 
 
-def _border(size: tuple[int, int]) -> Array:
-    """Return points along the border of an image, (n, 2), px."""
-    low, (right, bottom) = -0.5, np.array(size) - 0.5
+def border(size: tuple[int, int], beyond_px: float = 0.5) -> Array:
+    """Return points along the border of an image, or beyond the centres of its outermost pixels by more, (n, 2), px."""
+    low, (right, bottom) = -beyond_px, np.array(size) - 1 + beyond_px
     u, v = np.linspace(low, right, BORDER_SAMPLES), np.linspace(low, bottom, BORDER_SAMPLES)
     sides = ((u, low), (u, bottom), (low, v), (right, v))
     return np.concatenate([np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in sides])
@@ -329,12 +329,21 @@ def viewed_point(cameras: Sequence[Camera]) -> Array:
 
     For one camera, or parallel ones, the depth is undetermined; the point is then 4 m in front of the first.
     """
-    axes = np.stack([c.T_world_camera[:3, 2] for c in cameras])
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    centers = np.stack([c.center_world for c in cameras])
+    axes, centers = np.stack([c.T_world_camera[:3, 2] for c in cameras]), np.stack([c.center_world for c in cameras])
+    A, b = across_lines(centers, axes)
     front = centers[0] + 4.0 * axes[0]
-    A = across.sum(axis=0) + 1e-3 * np.eye(3)
-    return np.linalg.solve(A, (across @ centers[..., None]).sum(axis=0)[:, 0] + 1e-3 * front)
+    return np.linalg.solve(A + 1e-3 * np.eye(3), b + 1e-3 * front)
+
+
+def across_lines(points: Array, directions: Array) -> tuple[Array, Array]:
+    """Return A, (3, 3), and b, (3,), with A x = b for the point x nearest to lines in the least squares sense.
+
+    Args:
+        points: one of each line, (n, 3).
+        directions: unit vectors along them, (n, 3).
+    """
+    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    return across.sum(axis=0), (across @ points[..., None]).sum(axis=0)[:, 0]
 
 
 def epipolar_segment(source: Camera, target: Camera, point_px: Array) -> Array | None:
@@ -365,7 +374,7 @@ def epipolar_segment(source: Camera, target: Camera, point_px: Array) -> Array |
     P = target.K @ np.stack([origin, direction], axis=1)  # (3, 2): homogeneous pixel as P @ (1, t)
     ends = np.stack([P @ (1.0, t_low), P[:, 1] if np.isinf(t_high) else P @ (1.0, t_high)])
     if abs(ends[1, 2]) < TINY:  # the ray runs parallel to the image: go far enough to leave it
-        ends[1] = P @ (1.0, t_low + 1e6)
+        ends[1] = P @ (1.0, t_low + 1 / TINY)
     return _clip_segment(ends[:, :2] / ends[:, 2:], target.size)
 
 

@@ -67,7 +67,7 @@ def nearest_axis(normal: Array) -> str:
 
 
 UP_ROTATIONS = {
-    "z": np.eye(3),
+    "z": np.diag([1.0, 1.0, 1.0]),
     "-z": np.diag([1.0, -1.0, -1.0]),
     "y": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
     "-y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),

@@ -61,7 +61,7 @@ def fisheye_project(directions: Array, distortion: Array) -> Array:
     across = np.linalg.norm(directions[..., :2], axis=-1)
     angles = np.arctan2(across, directions[..., 2])
     angles = np.where(angles <= fisheye_limit(distortion), angles, np.nan)
-    radii, _ = _radii(angles, distortion)
+    radii, _ = fisheye_radii(angles, distortion)
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(across > 0, radii / across, np.where(angles == 0, 0.0, np.nan))
     return np.asarray(directions[..., :2] * shares[..., None])
@@ -72,17 +72,17 @@ def fisheye_directions(xy: Array, distortion: Array) -> Array:
     radii = np.linalg.norm(xy, axis=-1)
     limit = fisheye_limit(distortion)
     table = np.linspace(0.0, limit, _TABLE_SIZE)
-    angles = np.interp(radii, _radii(table, distortion)[0], table, right=np.nan)
+    angles = np.interp(radii, fisheye_radii(table, distortion)[0], table, right=np.nan)
     for _ in range(_NEWTON_STEPS):
-        found, slopes = _radii(angles, distortion)
+        found, slopes = fisheye_radii(angles, distortion)
         # At the limit the polynomial is flat, and the interpolation is as good as it gets.
-        angles = np.clip(angles - (found - radii) / np.maximum(slopes, 1e-6), 0.0, limit)
+        angles = np.clip(angles - (found - radii) / np.maximum(slopes, TINY), 0.0, limit)
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(radii > 0, np.sin(angles) / radii, 1.0)
     return np.concatenate([xy * shares[..., None], np.cos(angles)[..., None]], axis=-1)
 
 
-def _radii(angles: Array, distortion: Array) -> tuple[Array, Array]:
+def fisheye_radii(angles: Array, distortion: Array) -> tuple[Array, Array]:
     """Return the distances from the axis at angles from it, rad, and their derivatives by the angles."""
     k1, k2, k3, k4 = _padded(distortion)
     a2 = angles * angles

@@ -29,8 +29,8 @@ def so3_exp(rotvec: Array) -> Array:
     # Taylor series below 1e-4 rad, where sin(x)/x and (1-cos x)/x^2 lose digits.
     small = theta < 1e-4
     safe = np.where(small, 1.0, theta)
-    a = np.where(small, 1.0 - theta2 / 6.0, np.sin(safe) / safe)
-    b = np.where(small, 0.5 - theta2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    a = np.where(small, 1.0 - theta2 / 6, np.sin(safe) / safe)
+    b = np.where(small, 0.5 - theta2 / 24, (1.0 - np.cos(safe)) / safe**2)
     K = skew(rotvec)
     return np.eye(3) + a * K + b * (K @ K)
 
@@ -77,7 +77,7 @@ def quaternion_log(wxyz: Array) -> Array:
     q = np.where(q[..., :1] < 0, -q, q)
     s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(s, q[..., :1])
-    small = s < 1e-8
+    small = s < TINY
     factor = np.where(small, 2.0, angle / np.where(small, 1.0, s))
     return factor * q[..., 1:]
 

@@ -73,7 +73,7 @@ class Views:
         length = np.linalg.norm(across, axis=-1)
         with np.errstate(divide="ignore", invalid="ignore"):
             apart = np.abs(across @ (self.centers[b] - self.centers[a])) / length
-        return np.where(length > 1e-6, apart, np.nan)
+        return np.where(length > TINY, apart, np.nan)
 
     def project(self, points_world: Array) -> tuple[Array, Array]:
         """Project points, (..., 3), into all views: undistorted px, (..., n_views, 2), and depths, (..., n_views)."""
@@ -170,7 +170,7 @@ def triangulate_points(views: Views, points_px: Array, confidence: Array) -> Tri
     points, information, sigma = _refine(views, start, flat_px, weights)
     points[~has_point] = np.nan
     px, _ = views.errors(points, flat_px)
-    inverse = np.linalg.inv(information + 1e-12 * np.eye(3))
+    inverse = np.linalg.inv(information + TINY * np.eye(3))
     covariances = np.where(has_point[:, None, None], sigma**2 * inverse, np.nan)
     return Triangulated(
         points.reshape(n_frames, n_points, 3),
@@ -274,7 +274,7 @@ def _gauss_newton(views: Views, points: Array, points_px: Array, weights: Array)
         J = (views.P[None, :, :2, :3] - projected[..., None] * views.P[None, :, 2:, :3]) / z[..., None]
         information = np.einsum("nv,nvki,nvkj->nij", scale, J, J)
         gradient = np.einsum("nv,nvki,nvk->ni", scale, J, projected - observed)
-        points = points - np.linalg.solve(information + 1e-9 * np.eye(3), gradient[..., None])[..., 0]
+        points = points - np.linalg.solve(information + TINY * np.eye(3), gradient[..., None])[..., 0]
     return points, information
 
 
@@ -290,4 +290,4 @@ def _sigma(views: Views, points: Array, points_px: Array, weights: Array) -> flo
         return 0.0
     # Of two coordinates in n views, the point takes three: the residuals are smaller than the errors by that share.
     n_views = np.broadcast_to(np.maximum(counts.sum(axis=-1, keepdims=True), 2), counts.shape)[counts]
-    return float(np.median(angles / np.sqrt(1 - 1.5 / n_views))) / float(np.sqrt(2 * np.log(2)))
+    return float(np.median(angles / np.sqrt(1 - 3 / (2 * n_views)))) / float(np.sqrt(2 * np.log(2)))

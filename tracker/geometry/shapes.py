@@ -16,6 +16,8 @@ from tracker.geometry.arrays import Array
 
 _N_RINGS, _N_SECTORS = 24, 32
 """Latitudes and longitudes of a mesh."""
+AXIS_SHARE = 0.8
+"""Share of a half-axis up to which points on the axis of a part stand for it: beyond, they may lie in the next part."""
 _FLAT = 1e-6
 """Component away from the axis of the normal of a flat end: almost 0, so that its slope is finite."""
 

@@ -1,5 +1,7 @@
 """Polygonise an implicit surface by naive surface nets (S. Gibson 1998, MERL TR-98-16)."""
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,7 +9,7 @@ from tracker.geometry.arrays import Array, IntArray
 
 _CORNERS = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 """Corners of a cell, in cells."""
-_EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1]
+_EDGES = [(a, b) for a, b in combinations(range(len(_CORNERS)), 2) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1]
 """Its edges, as pairs of corners."""
 
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import NEAR_PLANE_M, Camera, project_with_jacobian
+from tracker.geometry.arrays import TINY, Array
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera, across_lines, project_with_jacobian
 
 _SIGMA_SHARE = 0.001
 """Standard deviation of a pin as a share of the longer side of the image: 0.64 px of 640. The true error of a hand is
@@ -67,9 +67,8 @@ def triangulate(cameras: Sequence[Camera], positions_px: Array) -> Triangulation
     sines = np.linalg.norm(np.cross(rays[:, None], rays[None]), axis=-1)
     if sines.max() < np.sin(MIN_ANGLE_RAD):
         return _nowhere(views, "the lines of sight are almost parallel: pin the joint in a view from another side")
-    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
-    centers = np.stack([c.center_world for c in views])
-    point = np.linalg.solve(across.sum(axis=0), (across @ centers[..., None]).sum(axis=0)[:, 0])
+    A, b = across_lines(np.stack([c.center_world for c in views]), rays)
+    point = np.asarray(np.linalg.solve(A, b), np.float64)
     point = _nearest_in_the_images(views, positions_px, np.array([sigma_px(c) for c in cameras]), point)
     behind = [c.name for c in views if c.depths(point) < NEAR_PLANE_M]
     if behind:
@@ -103,6 +102,6 @@ def _nearest_in_the_images(views: Sequence[Camera], positions_px: Array, sigmas_
         if np.sum((there[0] * weights) ** 2) >= np.sum((r * weights) ** 2):
             break
         point, (r, J) = point + step, there
-        if np.linalg.norm(step) < 1e-7:
+        if np.linalg.norm(step) < TINY:
             break
     return point

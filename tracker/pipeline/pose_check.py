@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
+from tracker.body.motion.prediction import HISTORY_FRAMES
 from tracker.compute.progress import Report, mapped, result_of, unreported
 from tracker.errors import TrackerError
 from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.runs.frame_hypotheses import Proposal
 from tracker.estimation.runs.path_assessment import RunPose
 from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
-from tracker.estimation.tracking.person_memory import HISTORY_FRAMES
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from tracker.body.motion.prediction import HISTORY_FRAMES
 from tracker.errors import Remedy, SessionError
 from tracker.estimation.runs.run_estimate import poses_beside
 from tracker.estimation.tracking.confidence import Status, status_named
 from tracker.estimation.tracking.estimate import TrackedFrame
-from tracker.estimation.tracking.person_memory import HISTORY_FRAMES
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
 from tracker.estimation.trajectory.solve import even_blocks

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.body.motion.prediction import HISTORY_FRAMES
 from tracker.body.motion.velocity import NEAR, moving_bodies
 from tracker.compute.progress import mapped
 from tracker.estimation.runs.frame_hypotheses import Proposal
@@ -15,7 +16,6 @@ from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
 from tracker.estimation.search.chamfer_cost import frame_cost
 from tracker.estimation.tracking.confidence import Status, status_named
 from tracker.estimation.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
-from tracker.estimation.tracking.person_memory import HISTORY_FRAMES
 from tracker.estimation.tracking.subjects import Subjects
 from tracker.estimation.tracking.tracker import Tracker, TrackingRun
 from tracker.estimation.trajectory.solve import even_blocks

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
-from tracker.footage.frame_rates import RATE_TOLERANCE, nominal_rate, same_clock, usual_rate
+from tracker.footage.frame_rates import DROP, LONG_INTERVAL, RATE_TOLERANCE, nominal_rate, same_clock, usual_rate
 from tracker.formats.number_rows import MAX_VALUES
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array, IntArray
@@ -102,7 +102,7 @@ def _stamped_rates(table: MarkerTable) -> list[float]:
     """
     numbers, seconds = table.frames - table.frames[0], table.times - table.times[0]
     nominal = nominal_rate(table.rate)
-    rates = sorted({r for r in (table.rate, nominal, nominal / 1.001) if same_clock(r, table.rate)})
+    rates = sorted({r for r in (table.rate, nominal, nominal / DROP) if same_clock(r, table.rate)})
     if len(seconds) > 1 and not seconds.any():
         return rates
     apart = {r: float(np.abs(seconds - numbers / r).max()) for r in rates}
@@ -272,7 +272,7 @@ def _interpolated(rows: Array, points: Array, frames: IntArray) -> Array:
     weight[np.abs(frames - rows[before]) <= _EXACT] = 0.0
     weight[np.abs(frames - rows[after]) <= _EXACT] = 1.0
     usual = float(np.median(np.diff(rows))) if len(rows) > 1 else 1.0
-    is_gap = (span > 1.5 * usual) & (weight > 0) & (weight < 1)
+    is_gap = (span > LONG_INTERVAL * usual) & (weight > 0) & (weight < 1)
     weight, first, second = weight[:, None, None], points[before], points[after]
     times = np.where(weight <= 0, first, np.where(weight >= 1, second, first + weight * (second - first)))
     times[is_gap] = np.nan

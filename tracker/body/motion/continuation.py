@@ -20,6 +20,9 @@ from tracker.geometry.arrays import TINY, Array, IntArray, Mask
 
 Bones: TypeAlias = Sequence[tuple[Sequence[int], Sequence[int]]]
 """Indices of the left and of the right point at both ends of each bone."""
+SAME_PERSON_M = 0.4
+"""Largest distance, metres, from where somebody was some frames before, or is by another observation, of what is seen
+of the same person: a person is as wide."""
 
 
 class PersonPath(NamedTuple):
@@ -192,7 +195,7 @@ def _filled(points: Array) -> Array:
 
 
 def _positive(step_m: float) -> float:
-    return max(step_m, 1e-6) if np.isfinite(step_m) else 1.0
+    return max(step_m, TINY) if np.isfinite(step_m) else 1.0
 
 
 def _apart(one: Array, other: Array) -> Array:

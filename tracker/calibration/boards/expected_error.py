@@ -11,8 +11,8 @@ from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.camera_columns import project_with_columns
 from tracker.geometry.cameras import Camera
 
-_QUANTILES = (0.05, 0.5, 0.95)
-"""Bounds and middle of the 90% interval."""
+_OUTSIDE = 0.05
+"""Probability beyond either bound of the 90% interval."""
 _DRAWS = 4000
 """Errors that are drawn for the quantiles: their own error is then some 2%."""
 MAX_POINTS = 300
@@ -81,5 +81,5 @@ def expected_error(
     factor = field @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     variances = np.linalg.eigvalsh(factor.T @ factor / len(points))
     normals = np.random.default_rng(0).normal(size=(_DRAWS, len(variances)))
-    low, median, high = np.quantile(np.sqrt(normals**2 @ np.maximum(variances, 0.0)), _QUANTILES)
+    low, median, high = np.quantile(np.sqrt(normals**2 @ np.maximum(variances, 0.0)), (_OUTSIDE, 0.5, 1 - _OUTSIDE))
     return VolumeError(float(median), float(low), float(high))

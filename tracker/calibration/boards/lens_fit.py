@@ -12,7 +12,7 @@ from tracker.calibration.boards.pose_choice import best_poses, board_poses
 from tracker.calibration.check.lens_priors import UNKNOWN_LENS, prior_sigmas
 from tracker.calibration.check.reprojection import Prior, Rig, RigFit, fit_rig
 from tracker.compute.sampling import spread_indices
-from tracker.estimation.fitting.bundle import solve_bundle
+from tracker.estimation.fitting.bundle import ROUGH, solve_bundle
 from tracker.geometry.arrays import TINY, IntArray
 from tracker.geometry.cameras import Camera
 
@@ -22,9 +22,8 @@ degrees, in steps from which the fit falls to the same minimum."""
 _RADIAL_STARTS = (-0.3, 0.0)
 """First radial coefficients from which it is fitted: without the barrel distortion of a wide lens, the fit can end at a
 focal length 20% too short (camera 0 of `board_real`)."""
-_TRIAL_STEPS, _TRIAL_VIEWS, _TRIAL_GAIN = 12, 20, 1e-2
-"""Steps and views of the fit from each of them before the best one goes on, and the relative decrease of the cost at
-which it ends."""
+_TRIAL_STEPS, _TRIAL_VIEWS = 12, 20
+"""Steps and views of the fit from each of them before the best one goes on."""
 _START_SIGMA_PX = 1.0
 """Standard deviation of corners before it is measured, px: errors of good starts then keep their influence."""
 _CHOICES = 2
@@ -82,7 +81,7 @@ def fit_lens(board: Board, seen: SeenCorners, blank: Camera, frames: IntArray) -
     found = []
     for camera in _first_lenses(blank):
         own = best_poses(trials, [camera], board_poses(board, chosen, camera))
-        found.append(solve_bundle(trials, Rig((camera,), own), _TRIAL_STEPS, _TRIAL_GAIN))
+        found.append(solve_bundle(trials, Rig((camera,), own), _TRIAL_STEPS, ROUGH))
     camera = min(found, key=lambda trial: trial.cost).state.cameras[0]
 
     def fitted(problem: BoardProblem, camera: Camera) -> RigFit:

@@ -9,19 +9,16 @@ from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_problem import BoardProblem, SeenCorners
 from tracker.calibration.boards.view_choice import posed_views
 from tracker.calibration.check.reprojection import Prior, Rig
-from tracker.estimation.fitting.bundle import solve_bundle
+from tracker.estimation.fitting.bundle import ROUGH, solve_bundle
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import MAX_LENS_RADIUS, Camera
 
 Poses = Mapping[tuple[int, int], Sequence[Array]]
 """Poses of the board in front of cameras, `T_camera_board`, by camera and frame."""
 
-_STEPS, _TOLERANCE = 6, 1e-2
-"""Steps by which each pose is refined before it is compared, and the relative decrease of all costs at which it ends:
-Gauss-Newton on six unknowns converges within them."""
-_MAX_SLOPE = 20.0
-"""Largest slope of a ray to a corner, 87 degrees from the axis: farther aside a pinhole cannot show it."""
+_STEPS = 6
+"""Steps by which each pose is refined before it is compared: Gauss-Newton on six unknowns converges within them."""
 _BESIDE = rigid.transform(None, np.array([0.0, 0.0, 1.0]))
 """Pose of a board whose corners determine none, from which no fit starts well: a metre in front of the camera."""
 
@@ -43,7 +40,7 @@ def board_poses(board: Board, seen: SeenCorners, *cameras: Camera) -> dict[tuple
 def _planar_poses(corners: Array, camera: Camera, px: Array) -> list[Array]:
     """Return the poses of a flat board in front of a camera; none if the camera does not show all corners."""
     rays = camera.rays(px) @ camera.T_world_camera[:3, :3]
-    slopes = rays[:, :2] / np.maximum(rays[:, 2:], 1 / _MAX_SLOPE)
+    slopes = rays[:, :2] / np.maximum(rays[:, 2:], 1 / MAX_LENS_RADIUS)  # farther aside a pinhole shows no corner
     if not np.isfinite(slopes).all():
         return []
     _, turns, shifts, _ = cv2.solvePnPGeneric(corners, slopes, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
@@ -76,7 +73,7 @@ def best_poses(problem: BoardProblem, cameras: Sequence[Camera], poses: Poses, n
     trials = [] if now is None else [now]
     trials += [np.stack([c[min(n, len(c) - 1)] for c in candidates]) for n in range(max(map(len, candidates)))]
     for trial in trials:
-        rig = solve_bundle(still, Rig(tuple(cameras), trial), _STEPS, _TOLERANCE).state
+        rig = solve_bundle(still, Rig(tuple(cameras), trial), _STEPS, ROUGH).state
         costs = still.group_costs(rig)
         own[costs < best] = rig.own[costs < best]
         best = np.minimum(best, costs)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.calibration.check.lens_priors import CALIBRATED
 from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
 from tracker.compute.threads import one_blas_thread
 from tracker.estimation.acquisition.contour_bundle import ContourBundle, RigState
@@ -25,7 +26,7 @@ class _Prior(NamedTuple):
     drift: float
 
 
-PRIOR = _Prior(rotation_rad=float(np.radians(1.0)), position_m=0.05, focal=0.01, time_frames=1.0, drift=0.01)
+PRIOR = _Prior(CALIBRATED.rotation_rad, CALIBRATED.shift_m, CALIBRATED.focal, time_frames=1.0, drift=0.01)
 """A tripod that is knocked, a zoom that is touched, a camera that starts a frame late or loses one frame in a hundred.
 It fixes the gauge where several cameras are corrected; of one camera, contours say a hundred times as much."""
 WORTH_NATS = 4.0

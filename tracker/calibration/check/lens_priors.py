@@ -30,7 +30,7 @@ UNKNOWN_LENS = CameraPrior(np.inf, np.inf, 0.5, 0.003, 0.015, 0.3, 0.005)
 """A camera of which only the size of the picture is known. Focal lengths of 0.6 to 1.6 times the longer side cover
 horizontal fields of view from 35 to 80 degrees. Sensors have square pixels to some thousandths. The four lenses of
 `board_real` have coefficients of up to 0.34 and 0.013, and principal points up to 0.02 sides off."""
-CALIBRATED = CameraPrior(np.radians(1.0), 0.05, 0.01, 0.001, 0.005, 0.02, 0.001)
+CALIBRATED = CameraPrior(float(np.radians(1.0)), 0.05, 0.01, 0.001, 0.005, 0.02, 0.001)
 """A camera that was calibrated once and may have been moved since: by a degree, 5 cm and 1% of its focal length."""
 
 NEWS = 0.5

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.calibration.check.lens_priors import CALIBRATED
-from tracker.estimation.fitting.bundle import ArrowEquations, solve_bundle
+from tracker.estimation.fitting.bundle import ROUGH, ArrowEquations, solve_bundle
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.camera_columns import (
     FOCAL,
@@ -37,9 +37,9 @@ _ROUNDS = 12
 """Most fits with noise measured again in between. It settles to 1% within three to six."""
 _SETTLED = 0.01
 """Largest relative change of the noise at which it has settled: 1% of all intervals."""
-_STEPS, _ROUGH, _FINAL = 2, 1e-2, 1e-6
-"""Most steps before the noise is measured again, and relative decreases of the cost at which a fit ends: before the
-noise has settled, and after."""
+_STEPS, _FINAL = 2, 1e-6
+"""Most steps before the noise is measured again, and the relative decrease of the cost at which a fit ends once the
+noise has settled."""
 _LARGE, _FALL = 0.95, 4.0
 """Quantile of the errors that the noise begins at, and the factor by which it falls at most from fit to fit."""
 _NOT_SHOWN_PX = 1e4
@@ -358,7 +358,7 @@ def fit_rig(problem: ReprojectionProblem, rig: Rig) -> RigFit:
     """
     problem = problem.with_sigmas(problem.scaled_sigmas_px(rig, _LARGE))
     for _ in range(_ROUNDS):
-        rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
+        rig = solve_bundle(problem, rig, _STEPS, ROUGH).state
         sigmas = problem.scaled_sigmas_px(rig, 0.5)
         is_settled = bool(np.all(sigmas > (1 - _SETTLED) * problem.sigmas_px))
         problem = problem.with_sigmas(np.maximum(sigmas, problem.sigmas_px / _FALL))
@@ -371,7 +371,7 @@ def fit_rig(problem: ReprojectionProblem, rig: Rig) -> RigFit:
             problem = problem.with_sigmas(sigmas)
             if is_settled:
                 break
-            rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
+            rig = solve_bundle(problem, rig, _STEPS, ROUGH).state
     rig = solve_bundle(problem, rig, tolerance=_FINAL).state
     return _result(problem, rig)
 

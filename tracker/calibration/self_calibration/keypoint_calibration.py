@@ -41,6 +41,9 @@ from tracker.geometry.cameras import Camera
 from tracker.interchange.observations.checks import view_shifts
 from tracker.interchange.observations.observed import ObservationSet
 
+LEAST_FPS = 25.0
+"""Frame rate of footage that states none, such as folders of images, 1/s."""
+
 
 def calibrate_by_person(
     observations: ObservationSet,
@@ -48,7 +51,7 @@ def calibrate_by_person(
     statures_m: Statures = None,
     has_lenses: bool = False,
     report: Report = unreported,
-    fps: float = 25.0,
+    fps: float = LEAST_FPS,
 ) -> PersonCalibration:
     """Calibrate cameras by key points of people who move before them.
 

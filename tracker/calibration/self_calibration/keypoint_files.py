@@ -9,7 +9,7 @@ from tracker.calibration.boards.footage_calibration import footage_paths
 from tracker.calibration.boards.lens_fit import blank_camera
 from tracker.calibration.check.solvable import solvable
 from tracker.calibration.self_calibration.identification import Statures
-from tracker.calibration.self_calibration.keypoint_calibration import calibrate_by_person
+from tracker.calibration.self_calibration.keypoint_calibration import LEAST_FPS, calibrate_by_person
 from tracker.calibration.self_calibration.person_calibration import PersonCalibration
 from tracker.calibration.self_calibration.silhouette_calibration import calibrate_by_silhouettes
 from tracker.calibration.self_calibration.silhouette_files import silhouettes_in_footage, silhouettes_in_masks
@@ -82,7 +82,7 @@ def _calibrate(filmed: FilmedPerson, report: Report) -> PersonCalibration:
                 f"expected key points in pictures, found points in space in {filmed.keypoints}; name the files of a "
                 "pose detector"
             )
-        fps = max(session.fps, 25.0)  # folders of images state none
+        fps = max(session.fps, LEAST_FPS)  # folders of images state none
         result = calibrate_by_person(plan.observations, cameras, filmed.stature_m, has_lenses, report, fps)
         if doubts := examine_keypoints(plan.observations, result.world.cameras, session.fps):
             raise doubts[0]

@@ -38,6 +38,7 @@ from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.compute.sampling import spread_indices
 from tracker.compute.threads import one_blas_thread
 from tracker.errors import CalibrationError
+from tracker.evidence.voxels.figure_masks import STRAY
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import scaled_cameras
@@ -129,7 +130,7 @@ def under_floor_notes(points_world: Array) -> tuple[str, ...]:
     """
     z = points_world[..., 2][np.isfinite(points_world[..., 2])]
     # One point in fifty may be wrong; a step or a wrong floor is not as deep.
-    lowest_m = float(np.quantile(z, 0.02)) if z.size else 0.0
+    lowest_m = float(np.quantile(z, STRAY)) if z.size else 0.0
     if lowest_m > -0.25:
         return ()
     return (

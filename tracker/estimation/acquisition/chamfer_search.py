@@ -16,6 +16,7 @@ from tracker.body.model import ahead, parts_of
 from tracker.estimation.acquisition.back_projection import MIN_POINTS, back_project_contours
 from tracker.estimation.acquisition.size_fit import SightedPerson
 from tracker.estimation.acquisition.size_parameters import SizeParameters
+from tracker.estimation.fitting.keypoints import GROSS_SIGMAS
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
 from tracker.geometry.arrays import TINY, Array
@@ -35,7 +36,7 @@ _PIECE_PX = 1.0
 class ChamferSearchSettings:
     """Settings of the search."""
 
-    range_sigmas: float = 3.0
+    range_sigmas: float = GROSS_SIGMAS
     """Half the range of each parameter, in standard deviations of `SizePriors`; girths vary with the build too."""
     levels: int = 5
     """Number of step sizes, each half of the one before; the first is half of half the range."""

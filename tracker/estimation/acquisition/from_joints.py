@@ -9,14 +9,13 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.segment_lengths import segment_lengths
 from tracker.estimation.fitting.gauss_newton import JOINT_M, PointTargets, fit_to_points
+from tracker.estimation.fitting.keypoints import GROSS_SIGMAS
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 
 _CREDIBLE = (0.6, 1.6)
 """A measured segment outside this range of the model's length is an error in the joints."""
-_MISFIT = 3.0
-"""Frames whose joints fit the body worse than this many times the median are left out."""
 
 
 class JointFrames(NamedTuple):
@@ -81,6 +80,6 @@ def pose_at_joints(model: BodyModel, joints: MarkerTable, frames: Sequence[int])
         found = model.points_world(poses[frame])[targets.points]
         misfits[frame] = float(np.linalg.norm(found - targets.targets_world, axis=1).mean())
         placed[frame] = targets
-    most = _MISFIT * float(np.median(list(misfits.values()) or [0.0]))
+    most = GROSS_SIGMAS * float(np.median(list(misfits.values()) or [0.0]))
     usual = [k for k, misfit in misfits.items() if misfit <= most]
     return JointFrames({k: (PosedBody(model, poses[k]),) for k in usual}, {k: placed[k] for k in usual})

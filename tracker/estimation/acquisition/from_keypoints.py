@@ -29,8 +29,6 @@ from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.triangulation import sigma_px
 
-_LEAST = 1e-3
-"""Smallest confidence that counts."""
 _ROUNDS = 3
 """Fits to the key points, each with the offsets learnt from the one before."""
 
@@ -107,7 +105,7 @@ class SeenBody(NamedTuple):
             cameras: of the session, in its order; none: all points are as certain as their confidence says.
         """
         parts, places = _places(model, seen, self.offsets_part)
-        sigmas = self.sigmas / np.sqrt(np.maximum(seen.confidence, _LEAST))
+        sigmas = self.sigmas / np.sqrt(np.maximum(seen.confidence, TINY))
         apart = np.array([_errors(X, own, cameras) for X, own in zip(seen.joints_world, seen.seen, strict=True)])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # a point that no view shows

@@ -78,8 +78,6 @@ class SizeFitSettings:
     """Standard deviation of the initial angles, rad."""
     trust_m: float = 0.1
     """Standard deviation of the initial position, metres."""
-    tolerance: float = 1e-4
-    """Smallest relative decrease of the cost for another iteration."""
     frame_correlation: float = 0.3
     """Correlation between frames of the mean error of a part's contours: clothes and wrong shapes stay the same. It is
     0.22 to 0.65 on seven simulated people, 0.29 in the median. It widens the covariance of the sizes."""
@@ -141,10 +139,8 @@ def fit_sizes_to_contours(
         body = parameters.body(state.sizes[0])
         seen = [_seen(f, body, p, settings) for f, p in zip(frames, state.poses, strict=True)]
         problem = ContourBundle(seen, [parameters], still, None, _EVERY_KIND, settings.match, step.reach)
-        found = solve_bundle(
-            problem.with_free_sizes(*step.kinds), state, step.iterations, settings.tolerance,
-            partial(_report_iteration, report, done, planned),
-        )  # fmt: skip
+        show = partial(_report_iteration, report, done, planned)
+        found = solve_bundle(problem.with_free_sizes(*step.kinds), state, step.iterations, report=show)
         done += step.iterations
         state, cost = found.state, found.cost
         n_evaluations += found.evaluations

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
+from tracker.geometry.shapes import AXIS_SHARE
 
 ALONG = 7
 """Samples along the axis of each part."""
@@ -63,7 +64,7 @@ def occludes(ray: Array, x: float, y: float, z: float) -> bool:
 @njit(**NO_REFCOUNT)
 def axis_sample(shape: Array, sample: int) -> float:
     """Return the position of a sample along the axis of a part, from its centre, metres."""
-    return shape[5] * 0.8 * (2.0 * sample / (ALONG - 1) - 1.0)
+    return shape[5] * AXIS_SHARE * (2.0 * sample / (ALONG - 1) - 1.0)
 
 
 @njit(**NO_REFCOUNT)
@@ -78,7 +79,7 @@ def project_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> N
     x, y, z = axis[0, 0], axis[0, 1], axis[0, 2]
     ax, ay, az = T[0, 2], T[1, 2], T[2, 2]
     sx, sy, sz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
-    norm = np.sqrt(sx * sx + sy * sy + sz * sz) + 1e-9
+    norm = np.sqrt(sx * sx + sy * sy + sz * sz) + TINY
     for i in range(3):
         axis[1, i] = P[i, 0] * (x + eye[0]) + P[i, 1] * (y + eye[1]) + P[i, 2] * (z + eye[2]) + P[i, 3]
         axis[2, i] = P[i, 0] * ax + P[i, 1] * ay + P[i, 2] * az

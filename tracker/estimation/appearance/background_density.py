@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.compute.quantiles import MAD_TO_SIGMA
-from tracker.estimation.appearance.color_shares import log_density
+from tracker.estimation.appearance.color_shares import VOLUME, log_density
 from tracker.estimation.appearance.region_cells import CellView
 from tracker.evidence.images.background_subtraction import MAX_HUE_SHIFT, MIN_SHADE, exposure_gain, has_usable_exposure
 from tracker.evidence.images.change import NOISE_SIGMAS
@@ -77,7 +77,8 @@ def learn_background(
     if empty is not None:
         mean[:] = empty[: shape[0], : shape[1]]
     noise = np.full(shape, 0.0 if empty is None else 2 * _MIN_NOISE, np.float32)
-    rough = BackgroundDensity(mean, noise, *_rates(shape, 0.1, 0.1), np.full(BINS**3, 256.0**-3, np.float32))
+    rates, uniform = np.full(shape, 0.1, np.float32), np.full(BINS**3, 1 / (VOLUME * BINS**3), np.float32)
+    rough = BackgroundDensity(mean, noise, rates, rates, uniform)
     if empty is None:
         rough = _with_medians(rough, views, occupied, [np.ones(3, np.float32)] * len(views))
     gains = [rough.gain(v, ~o) for v, o in zip(views, occupied, strict=True)]
@@ -223,16 +224,12 @@ def _log_density(
             if sigma > 0.0:
                 apart, shade, aside = _compare(colors, v, u, mean, gain)
                 usual = 1.0 - outlier[v, u] - shadow[v, u]
-                p += usual * np.exp(-0.5 * apart / sigma**2) / (15.7496 * sigma**3)  # (2 pi)^1.5
+                p += usual * np.exp(-0.5 * apart / sigma**2) / (np.sqrt(2 * np.pi) * sigma) ** 3
                 if MIN_SHADE < shade < 1.0:
                     s = max(sigma, _HUE_NOISE)
                     length = np.sqrt(mean[v, u, 0] ** 2 + mean[v, u, 1] ** 2 + mean[v, u, 2] ** 2) + 1.0
-                    p += shadow[v, u] * np.exp(-0.5 * aside / s**2) / (6.2832 * s**2 * (1.0 - MIN_SHADE) * length)
+                    p += shadow[v, u] * np.exp(-0.5 * aside / s**2) / (2 * np.pi * s**2 * (1.0 - MIN_SHADE) * length)
             out[v, u] = np.log(p + 1e-30)
-
-
-def _rates(shape: tuple[int, int], outlier: float, shadow: float) -> tuple[FloatArray, FloatArray]:
-    return np.full(shape, outlier, np.float32), np.full(shape, shadow, np.float32)
 
 
 def _box(view: CellView) -> tuple[slice, slice]:

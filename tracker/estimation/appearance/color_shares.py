@@ -5,7 +5,7 @@ import numpy as np
 from tracker.evidence.images.color_histogram import BINS
 from tracker.geometry.arrays import TINY, Array
 
-VOLUME = (256 / BINS) ** 3
+VOLUME = ((np.iinfo(np.uint8).max + 1) / BINS) ** 3
 """Volume of a bin, cubic gray levels."""
 DOUBT = 0.02
 """Share of arbitrary pixels under a part: a colour that was never seen there is not impossible. With half

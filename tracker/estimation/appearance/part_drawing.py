@@ -6,7 +6,7 @@ hundreds of poses of a limb are drawn.
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import cv2
 import numpy as np
@@ -31,6 +31,10 @@ class Meshes(NamedTuple):
     """Corners in the coordinates of their part, (P, 3, n), metres."""
     faces: NDArray[np.int32]
     """Indices of the corners of each triangle within a part, counter-clockwise seen from outside, (F, 3)."""
+
+
+_Face: TypeAlias = tuple[np.float32, ...]
+"""Column, row and nearness of the first corner, from there to the second and the third one, and 1 / twice the area."""
 
 
 class Canvas(NamedTuple):
@@ -93,30 +97,49 @@ def _draw(
         if not project_mesh(points[part], to_px[part], image):
             continue
         for f in range(faces.shape[0]):
-            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-            ua, va, na = image[a, 0], image[a, 1], image[a, 2]
-            ub, vb, nb = image[b, 0] - ua, image[b, 1] - va, image[b, 2] - na
-            uc, vc, nc = image[c, 0] - ua, image[c, 1] - va, image[c, 2] - na
-            area = ub * vc - uc * vb
-            if area >= 0.0:  # seen from behind: v points down
-                continue
-            top = max(0.0, np.ceil(va + min(0.0, vb, vc)))
-            bottom = min(height - 1.0, np.floor(va + max(0.0, vb, vc)))
-            left = max(0.0, np.ceil(ua + min(0.0, ub, uc)))
-            right = min(width - 1.0, np.floor(ua + max(0.0, ub, uc)))
-            if top > bottom or left > right:
-                continue
-            share = np.float32(1.0) / area
-            for v in range(int(top), int(bottom) + 1):
-                y = np.float32(v) - va
-                for u in range(int(left), int(right) + 1):
-                    x = np.float32(u) - ua
-                    in_b, in_c = (x * vc - uc * y) * share, (ub * y - x * vb) * share
-                    if in_b >= 0.0 and in_c >= 0.0 and in_b + in_c <= 1.0:
-                        near = na + in_b * nb + in_c * nc
-                        if near > nearness[v, u]:
-                            nearness[v, u] = near
-                            labels[v, u] = part + 1
+            face, (top, bottom, left, right) = face_in_image(image, faces[f], width, height)
+            for v in range(top, bottom):
+                for u in range(left, right):
+                    near = nearness_at(face, u, v)
+                    if near > nearness[v, u]:
+                        nearness[v, u] = near
+                        labels[v, u] = part + 1
+
+
+@njit(inline="always", **NO_REFCOUNT)
+def face_in_image(
+    image: FloatArray, corners: NDArray[np.int32], width: int, height: int
+) -> tuple[_Face, tuple[int, int, int, int]]:
+    """Return a face in an image, and the cells around it: first row and column, and those after the last.
+
+    Args:
+        image: columns, rows and 1 / depths of the corners of a part, (n, 3).
+        corners: indices of those of the face, (3,).
+        width: of the image.
+        height: of the image.
+    """
+    ua, va, na = image[corners[0], 0], image[corners[0], 1], image[corners[0], 2]
+    ub, vb, nb = image[corners[1], 0] - ua, image[corners[1], 1] - va, image[corners[1], 2] - na
+    uc, vc, nc = image[corners[2], 0] - ua, image[corners[2], 1] - va, image[corners[2], 2] - na
+    area = ub * vc - uc * vb
+    if area >= 0.0:  # seen from behind: v points down
+        return (ua, va, na, ub, vb, nb, uc, vc, nc, area), (0, 0, 0, 0)
+    top = max(0.0, np.ceil(va + min(0.0, vb, vc)))
+    bottom = min(height - 1.0, np.floor(va + max(0.0, vb, vc)))
+    left = max(0.0, np.ceil(ua + min(0.0, ub, uc)))
+    right = min(width - 1.0, np.floor(ua + max(0.0, ub, uc)))
+    box = int(top), int(bottom) + 1, int(left), int(right) + 1
+    return (ua, va, na, ub, vb, nb, uc, vc, nc, np.float32(1.0) / area), box
+
+
+@njit(inline="always", **NO_REFCOUNT)
+def nearness_at(face: _Face, u: int, v: int) -> np.float32:
+    """Return the nearness of a face of an image at a cell; 0 beside it."""
+    ua, va, na, ub, vb, nb, uc, vc, nc, share = face
+    x, y = np.float32(u) - ua, np.float32(v) - va
+    in_b, in_c = (x * vc - uc * y) * share, (ub * y - x * vb) * share
+    is_within = in_b >= 0.0 and in_c >= 0.0 and in_b + in_c <= 1.0
+    return na + in_b * nb + in_c * nc if is_within else np.float32(0.0)
 
 
 @njit(**NO_REFCOUNT)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
-from tracker.estimation.appearance.part_drawing import Canvas, project_mesh
+from tracker.estimation.appearance.part_drawing import Canvas, face_in_image, nearness_at, project_mesh
 from tracker.evidence.images.color_histogram import bin_of
 from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
 
@@ -183,28 +183,10 @@ def add_limb_scores(
             if not project_mesh(points[part], to_px[c, part], corners):
                 continue
             for f in range(faces.shape[0]):
-                ia, ib, ic = faces[f, 0], faces[f, 1], faces[f, 2]
-                ua, va, na = corners[ia, 0], corners[ia, 1], corners[ia, 2]
-                ub, vb, nb = corners[ib, 0] - ua, corners[ib, 1] - va, corners[ib, 2] - na
-                uc, vc, nc = corners[ic, 0] - ua, corners[ic, 1] - va, corners[ic, 2] - na
-                area = ub * vc - uc * vb
-                if area >= 0.0:  # seen from behind: v points down
-                    continue
-                top = max(0.0, np.ceil(va + min(0.0, vb, vc)))
-                bottom = min(height - 1.0, np.floor(va + max(0.0, vb, vc)))
-                left = max(0.0, np.ceil(ua + min(0.0, ub, uc)))
-                right = min(width - 1.0, np.floor(ua + max(0.0, ub, uc)))
-                if top > bottom or left > right:
-                    continue
-                inverse = np.float32(1.0) / area
-                for v in range(int(top), int(bottom) + 1):
-                    y = np.float32(v) - va
-                    for u in range(int(left), int(right) + 1):
-                        x = np.float32(u) - ua
-                        in_b, in_c = (x * vc - uc * y) * inverse, (ub * y - x * vb) * inverse
-                        if in_b < 0.0 or in_c < 0.0 or in_b + in_c > 1.0:
-                            continue
-                        near = na + in_b * nb + in_c * nc
+                face, (top, bottom, left, right) = face_in_image(corners, faces[f], width, height)
+                for v in range(top, bottom):
+                    for u in range(left, right):
+                        near = nearness_at(face, u, v)
                         if near <= hidden[v, u]:
                             continue
                         if drawn[v, u] != c + 1:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+from tracker.body.motion.prediction import HISTORY_FRAMES
 from tracker.estimation.tracking.method import Option
 
 
@@ -28,10 +29,9 @@ ORDER = Option(
 WINDOW = Option(
     "window", "Past poses", "number of poses from which the motion is predicted", "3 by default, 8 in the paper's mode",
     "whole", lambda s: s.predict.window,
-    lambda s, value: replace(s, predict=replace(s.predict, window=int(value))), limits=(1, 8),
+    lambda s, value: replace(s, predict=replace(s.predict, window=int(value))), limits=(1, HISTORY_FRAMES),
 )  # fmt: skip
-"""More than 8 poses, a quarter of a second, fit no polynomial of a person's motion. A memory keeps as many
-(`person_memory`, which is not imported here: it loads kernels)."""
+"""More poses, over a quarter of a second, fit no polynomial of a person's motion. A memory keeps as many."""
 RECOVER = Option(
     "recover", "Search lost limbs", "search for a limb that is not where edges and colours are", "", "switch",
     lambda s: s.recover is not None, _with_recovery,

@@ -11,6 +11,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.prediction import PredictSettings
 from tracker.estimation.fitting.contour_residuals import MatchSettings
 from tracker.estimation.fitting.gauss_newton import CLOSE_ENOUGH, PosePrior, ResidualBlock
+from tracker.estimation.fitting.hypothesis import BEAM_WIDTH
 from tracker.estimation.fitting.interpenetration import SelfPenetration
 from tracker.estimation.search.chamfer_cost import ChamferCost, Outliers
 from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
@@ -42,7 +43,7 @@ class RecoverSettings:
     """Their standard deviation, rad, round by round."""
     n_limb_refined: int = 10
     """Proposals whose limb is refined alone."""
-    beam_width: int = 3
+    beam_width: int = BEAM_WIDTH
     """Proposals that are refined with the whole body, and poses that are kept while the next limb is searched."""
     colors: float = 0.2
     """Weight of the colours against edges. Neighbouring pixels are correlated, so it is well below 1."""

@@ -7,11 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from tracker.body.motion.prediction import PredictSettings
+from tracker.body.motion.prediction import HISTORY_FRAMES, PredictSettings
 from tracker.estimation.chamfer.constants import PAPER_BODY
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.search.best_first import SearchSettings
-from tracker.estimation.tracking.person_memory import HISTORY_FRAMES
 from tracker.estimation.tracking.subjects import require_body
 from tracker.evidence.view_evidence import EdgeSettings
 from tracker.geometry.shapes import TaperedSuperquadric

@@ -17,6 +17,8 @@ from tracker.estimation.fitting.gauss_newton import DAMPING, MAX_ITERATIONS, Nor
 from tracker.geometry.arrays import Array
 
 S = TypeVar("S")
+ROUGH, USUAL = 1e-2, 1e-4
+"""Relative decreases of the cost at which fits end: fits that are compared or go on, and fits whose state is used."""
 
 
 class ArrowEquations(NamedTuple):
@@ -141,7 +143,7 @@ def solve_bundle(
     problem: BundleProblem[S],
     state: S,
     max_iterations: int = MAX_ITERATIONS,
-    tolerance: float = 1e-4,
+    tolerance: float = USUAL,
     report: Callable[[int], None] = lambda iteration: None,
     least_gain: float = 0.0,
     known: ArrowEquations | None = None,

@@ -30,9 +30,11 @@ class _Damping(NamedTuple):
     """Beyond it no step lowers the cost."""
     least_again: float
     """Smallest after a refused step; less would hardly change the step."""
+    floor: float
+    """Share of the mean diagonal that is added to it, for degrees of freedom that nothing shows."""
 
 
-DAMPING = _Damping(first=1e-3, least=1e-9, most=1e8, least_again=1e-2)
+DAMPING = _Damping(first=1e-3, least=1e-9, most=1e8, least_again=1e-2, floor=1e-6)
 """It grows tenfold after a refused step, and falls to a tenth after one that is taken."""
 UNKNOWN = 1.0
 """Standard deviation of a degree of freedom that nothing shows, such as the twist of a straight arm, rad or m."""
@@ -215,7 +217,7 @@ def iterate(
             return
         g, H = here.gradient[active], here.hessian[active[:, None], active]
         # Damping by the diagonal is independent of units; the floor keeps unobserved dofs well conditioned.
-        scale = np.diag(H) + 1e-6 * max(1e-12, float(np.trace(H)) / len(H))
+        scale = np.diag(H) + DAMPING.floor * max(TINY, float(np.trace(H)) / len(H))
         while True:
             step = damped_step(H, g, damping * scale)
             worth = -(g + 0.5 * H @ step) @ step > gain

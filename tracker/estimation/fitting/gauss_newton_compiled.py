@@ -236,7 +236,7 @@ def _damped_step(gradient: Array, hessian: Array, active: IntArray, damping: flo
     m, trace = active.shape[0], 0.0
     for i in range(m):
         trace += hessian[active[i], active[i]]
-    floor = 1e-6 * max(1e-12, trace / m)
+    floor = DAMPING.floor * max(TINY, trace / m)
     if _factor(hessian, active, damping, floor, L):
         _substitute(L, gradient, active, step)
     else:

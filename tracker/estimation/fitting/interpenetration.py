@@ -17,7 +17,7 @@ from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.jit import njit
 from tracker.estimation.fitting.gauss_newton import NormalEquations
 from tracker.evidence.contours.surfaces import surfaces_of
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import TINY, Array, IntArray
 
 _SAMPLES = 5
 """Sample points along the axis of each part that are tested against other parts."""
@@ -168,13 +168,13 @@ def _list_contacts(bodies: PenetrationTerm) -> int:
                         local[i] += Ts[other, k, i] * (X[k] - Ts[other, k, 3])
                 if abs(local[2]) > a3:
                     continue
-                from_axis = max(1e-6, np.sqrt(local[0] ** 2 + local[1] ** 2))
-                rho = max(1e-6, np.sqrt((local[0] / a1) ** 2 + (local[1] / a2) ** 2))
+                from_axis = max(TINY, np.sqrt(local[0] ** 2 + local[1] ** 2))
+                rho = max(TINY, np.sqrt((local[0] / a1) ** 2 + (local[1] / a2) ** 2))
                 depth = radius - (from_axis - from_axis / rho) - (1.0 - softness) * min(a1, a2)
                 if depth <= 0.0:
                     continue
                 nx, ny = local[0] / from_axis, local[1] / from_axis
-                if from_axis <= 1e-6:
+                if from_axis <= TINY:
                     nx, ny = 1.0, 0.0
                 rows[n, 0] = depth
                 for i in range(3):

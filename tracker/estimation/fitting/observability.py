@@ -123,7 +123,7 @@ class Observability:
     def _eigenvalues(self) -> Array:
         n = self.model.n_dofs
         total = self.information.matrices[:, :n, :n].sum(axis=0)
-        scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
+        scale = np.sqrt(np.maximum(np.diag(total), np.finfo(np.float64).tiny))
         return np.linalg.eigvalsh(total / np.outer(scale, scale))
 
 

@@ -5,6 +5,8 @@ lines of sight graze it (B). B moves the point within the tangent plane, which h
 therefore moves along the contour and not across it.
 """
 
+import numpy as np
+
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import Array
@@ -15,7 +17,7 @@ where the two rulings of a cone meet, its speed has no bound."""
 _ON_SIDE = 0.999
 """Largest height of a point on the curved surface, in half its length. Points beyond lie on the rim of an end, which is
 fixed to the part."""
-_TINY = 1e-300
+_TINY = float(np.finfo(np.float64).tiny)
 """Least divisor where a slope and its bound are 0."""
 
 

@@ -25,7 +25,7 @@ from tracker.estimation.initialization.start_fit import StartFitter, StartTrack,
 from tracker.estimation.tracking.confidence import Status, worst
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.evidence.voxels.figure_masks import figure_masks
+from tracker.evidence.voxels.figure_masks import STRAY, figure_masks
 from tracker.evidence.voxels.visual_hull import VisualHull, carve_people
 from tracker.formats.model_toml import has_preset_sizes
 from tracker.geometry.arrays import Array
@@ -34,9 +34,6 @@ from tracker.session.session import Session
 
 _HEIGHTS_AGREE = 2 * np.sqrt(2) * HEIGHT_SIGMA
 """Largest difference of the logarithms of two heights that agree: 95% of pairs of one person do."""
-_LARGER = 0.02
-"""Share by which some silhouette grows with what looks like shadows, above which it is worth another start."""
-
 Silhouettes: TypeAlias = Callable[[int, int], Sequence[ViewSilhouette]]
 """Returns the silhouettes of all views by frame and by index of the person whose masks are used."""
 
@@ -145,8 +142,9 @@ def pose_on_frame(
 
 
 def _are_larger(silhouettes: Sequence[ViewSilhouette], before: Sequence[ViewSilhouette]) -> bool:
+    """Return whether some silhouette grows by more than stray pixels, so that it is worth another start."""
     areas, areas_before = (np.array([np.count_nonzero(s.mask) for s in own]) for own in (silhouettes, before))
-    return bool(np.any(areas > (1 + _LARGER) * areas_before))
+    return bool(np.any(areas > (1 + STRAY) * areas_before))
 
 
 def _on_frame(

@@ -5,14 +5,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tracker.body.model import PosedBody
+from tracker.body.motion.continuation import SAME_PERSON_M
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.voxels.visual_hull import VisualHull
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.session.session import Session
 from tracker.session.store.stored_poses import read_stored_poses
 
-OWN_M = 0.4
-"""A figure that is closer to the trunk of a person, or to where it was some frames before, is that person, metres."""
 _MAX_HULL_M3 = 0.25
 """Largest volume of the visual hull of one person, cubic metres: three times that of a large man."""
 
@@ -73,4 +72,4 @@ def own_figure(session: Session, person: int, hull: VisualHull, others: Sequence
 
 def _is_in(figure: Voxels, body: PosedBody) -> bool:
     trunk = body.points_world.mean(axis=0)
-    return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < OWN_M)
+    return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < SAME_PERSON_M)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.body.motion.continuation import SAME_PERSON_M
 from tracker.errors import TrackerError
 from tracker.estimation.initialization.generators.person_scene import PersonScene
 from tracker.estimation.initialization.generators.stature import upright_height
-from tracker.estimation.initialization.own_figure import OWN_M
 from tracker.geometry.arrays import Array
 
 _STEP = 6
@@ -62,7 +62,7 @@ class StandingHeights:
         for frame in frames:
             found = self._on_frame(frame, person)
             away = [float(np.linalg.norm(m.center - center)) for m in found]
-            if len(found) < self._n_people or min(away) > OWN_M:
+            if len(found) < self._n_people or min(away) > SAME_PERSON_M:
                 return
             center, height_m = found[int(np.argmin(away))]
             yield height_m

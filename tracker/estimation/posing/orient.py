@@ -48,4 +48,4 @@ def orient(
     own = own if active_dofs is None else own & active_dofs
     if not np.any(own):
         return np.array(pose)
-    return solve(model, pose, [_OrientationTarget(part, R_world_target)], active_dofs=own, tolerance=1e-7).pose
+    return solve(model, pose, [_OrientationTarget(part, R_world_target)], active_dofs=own).pose

@@ -64,7 +64,7 @@ def point_on_part(body: PosedBody, camera: Camera, part: int, pointer_px: Array)
     ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(ray, ac)
     det = np.einsum("ij,ij->i", ab, across)
-    det = np.where(np.abs(det) < 1e-15, np.inf, det)
+    det = np.where(np.abs(det) < TINY**2, np.inf, det)
     from_a = start - corners[:, 0]
     turned = np.cross(from_a, ab)
     s, t = np.einsum("ij,ij->i", from_a, across) / det, turned @ ray / det

@@ -12,6 +12,7 @@ from tracker.body.kinematics import Kinematics
 from tracker.body.limbs import BENT_RAD, limbs
 from tracker.body.model import BodyModel
 from tracker.estimation.fitting.gauss_newton import (
+    CLOSE_ENOUGH,
     Fit,
     NormalEquations,
     PosePrior,
@@ -76,7 +77,7 @@ _STRETCHED = 0.999
 """Share of the full length of a chain from which it counts as stretched; an elbow then bends by 5 degrees."""
 QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
 """Solver settings of a move: dozens a second, each from the result of the last one."""
-_BENT: _Solving = {"max_iterations": 6, "tolerance": 1e-3}
+_BENT: _Solving = {"max_iterations": 6, "tolerance": CLOSE_ENOUGH}
 """Solver settings of a test whether a bent limb, or its other side, comes nearer."""
 
 

@@ -25,14 +25,14 @@ from tracker.geometry.arrays import TINY, Array
 class SearchSettings:
     """Bounds and steps of the lattice. The defaults are those of GD96 Sect. 5, with finer passes added."""
 
-    bound_rad: float = float(np.radians(15))
-    """Largest change of an angle from the prediction, rad."""
-    bound_m: float = 0.10
-    """Largest change of a position from the prediction, metres."""
     step_rad: float = float(np.radians(5))
     """Spacing of the lattice along an angle, rad."""
     step_m: float = 0.05
     """Spacing of the lattice along a position, metres."""
+    bound_rad: float = float(np.radians(15))
+    """Largest change of an angle from the prediction, rad."""
+    bound_m: float = 2 * step_m
+    """Largest change of a position from the prediction, metres."""
     bounds: dict[str, float] = field(default_factory=dict)
     """Bounds of single degrees of freedom by name where they differ, rad or metres."""
     steps: dict[str, float] = field(default_factory=dict)

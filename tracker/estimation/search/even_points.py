@@ -6,6 +6,9 @@ import numpy as np
 
 from tracker.geometry.arrays import Array
 
+_TAIL = 0.002
+"""Probability that is left out at either end of a normal distribution: it lies nearly three deviations away."""
+
 
 @lru_cache(maxsize=16)
 def even_points(n: int, dims: int) -> tuple[Array, Array]:
@@ -15,4 +18,4 @@ def even_points(n: int, dims: int) -> tuple[Array, Array]:
     from scipy.stats import qmc
 
     even = np.asarray(qmc.Sobol(dims, seed=7).random(n))
-    return even, np.asarray(ndtri(0.002 + 0.996 * even))
+    return even, np.asarray(ndtri(_TAIL + (1 - 2 * _TAIL) * even))

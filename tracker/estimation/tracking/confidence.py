@@ -241,7 +241,7 @@ def views_of_limbs(body: PosedBody, costs: PartCosts, views: Sequence[ViewEviden
 def _beside_px(body: PosedBody, views: Sequence[ViewEvidence]) -> Array:
     """Return the length of each part's contour seen from the side, (n_parts,), working px."""
     half_axes_m = np.array([s.half_axes[2] for s in body.model.shapes])
-    return np.asarray(4.0 * px_per_m([v.camera for v in views], body) * half_axes_m)
+    return np.asarray(4 * px_per_m([v.camera for v in views], body) * half_axes_m)
 
 
 def _shows(costs: PartCosts, beside_px: Array, parts: IntArray) -> Mask:

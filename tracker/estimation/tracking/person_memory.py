@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import Limb, limbs, movable
 from tracker.body.model import BodyModel
-from tracker.body.motion.prediction import PredictSettings, predict
+from tracker.body.motion.prediction import HISTORY_FRAMES, PredictSettings, predict
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.fitting.gauss_newton import with_locked_dofs
 from tracker.estimation.tracking.confidence import PoseQuality, Status
@@ -20,10 +20,6 @@ _LEARN_FRAMES = 3
 """The colours of the parts are updated every so many frames."""
 _TRACKED_SHARE, _KEYFRAME_SHARE = 0.15, 0.5
 """Weight of a tracked frame, and of a keyframe, against the colours learnt before."""
-HISTORY_FRAMES = 8
-"""Number of poses that are kept: the longest window of a prediction, T of GD96 Sect. 4.2, which is not stated there. A
-parabola through fewer poses amplifies the noise of a lattice of 5 degrees: the variance of the prediction is 2 times
-that of a pose with 8 poses, and 19 times with 3."""
 
 
 class PersonMemory:

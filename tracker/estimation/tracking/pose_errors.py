@@ -81,7 +81,8 @@ def mass_odds(masses: Array) -> Array:
     elsewhere, (n_limbs,)."""
     from scipy.special import logit  # imported lazily, as above
 
-    odds = np.asarray(logit(np.clip(masses, 1e-12, 1 - 1e-12)))
+    least = np.finfo(np.float64).eps
+    odds = np.asarray(logit(np.clip(masses, least, 1 - least)))
     return odds[:, None] + (0.0, -LOST_NATS)
 
 

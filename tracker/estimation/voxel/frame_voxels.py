@@ -12,10 +12,11 @@ from tracker.evidence.voxels.carving import Carver
 from tracker.evidence.voxels.voxel_grid import VoxelGrid, Voxels
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M
+from tracker.geometry.shapes import AXIS_SHARE
 
 _REACH_M = 0.35
 """Distance from the prediction to which voxels are carved, metres: how far a limb may be from where it is predicted."""
-AXIS = np.linspace(-0.8, 0.8, 9)
+AXIS = AXIS_SHARE * np.linspace(-1, 1, 9)
 """Places along the axis of a part that are looked up, in half sizes."""
 _MIN_SHARE, _MIN_OTHERS = 0.4, 0.7
 """A view whose silhouette holds less of the figures than the first, while that of the second best holds more than the

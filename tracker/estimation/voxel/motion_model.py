@@ -97,12 +97,9 @@ def right_jacobian(turns: Array) -> Array:
 
     exp(a + b) = exp(a) exp(J b) to first order in b.
     """
-    angle2 = np.sum(turns**2, axis=-1)[..., None, None]
-    angle = np.sqrt(angle2)
-    small = angle < 1e-4  # Taylor series, where the quotients lose digits
-    safe = np.where(small, 1.0, angle)
-    a = np.where(small, 0.5 - angle2 / 24, (1 - np.cos(safe)) / safe**2)
-    b = np.where(small, 1 / 6 - angle2 / 120, (safe - np.sin(safe)) / safe**3)
+    angle = np.linalg.norm(turns, axis=-1)[..., None, None]
+    a = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    b = (1 - np.sinc(angle / np.pi)) / np.maximum(angle, TINY) ** 2  # near 0 the square of K outweighs lost digits
     K = rigid.skew(turns)
     return np.asarray(np.eye(3) - a * K + b * (K @ K))
 
@@ -112,10 +109,4 @@ def left_jacobian_inverse(turns: Array) -> Array:
 
     log(exp(b) exp(a)) = a + J^-1 b to first order in b.
     """
-    angle2 = np.sum(turns**2, axis=-1)[..., None, None]
-    angle = np.sqrt(angle2)
-    small = angle < 1e-3
-    safe = np.where(small, 1.0, angle)
-    c = np.where(small, 1 / 12 + angle2 / 720, (1 - safe * np.cos(safe / 2) / (2 * np.sin(safe / 2))) / safe**2)
-    K = rigid.skew(turns)
-    return np.asarray(np.eye(3) - 0.5 * K + c * (K @ K))
+    return np.asarray(np.linalg.inv(right_jacobian(-turns)), np.float64)

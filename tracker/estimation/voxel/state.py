@@ -15,7 +15,7 @@ from tracker.estimation.voxel.figure import N_PARTS, PARENTS, TORSO, FigureJoint
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 
-_COLUMNS = 3 * np.arange(N_PARTS)[:, None] + np.arange(3)
+_COLUMNS = np.arange(N_PARTS * 3).reshape(N_PARTS, -1)
 """Columns of the error state that belong to each part, from the first of their kind, (10, 3)."""
 _ON_CHAIN = np.diag([float(part != TORSO) for part in range(N_PARTS)])
 """Whether each part lies on the way from the torso to a part, (10, 10); the torso itself does not."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracker.body.model import PosedBody
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
-from tracker.evidence.contours.generator import grid_generator, revolved_generator
+from tracker.evidence.contours.generator import MAX_POINTS, grid_generator, revolved_generator
 from tracker.evidence.contours.pieces import (
     PIECE_PX,
     Pieces,
@@ -35,6 +35,8 @@ MAX_PIECES = 6000
 """Room for the pieces of one view. A 22-DOF body that fills a 640x480 image has some 600."""
 _SAG_PX = 0.2
 """Largest distance of a chord around a part from its arc, px. The grid of other parts is as coarse."""
+_MIN_TURN = 4 * np.pi / MAX_POINTS
+"""Smallest angle between points around a part, rad: two circles then fill half of the room for a generator."""
 
 
 class Contour(NamedTuple):
@@ -159,7 +161,7 @@ def trace_part(
         n_profile = surfaces.profile_sizes[part]
         if n_profile > 0:
             radius = max(half_axes[part, 0], half_axes[part, 1])
-            turn = np.float32(min(max(np.sqrt(8 * _SAG_PX * depth / (radius * focal)), 0.05), 0.6))
+            turn = np.float32(min(max(np.sqrt(8 * _SAG_PX * depth / (radius * focal)), _MIN_TURN), 0.6))
             n_points = revolved_generator(part, n_profile, surfaces.profiles, unit_eye, turn, out.half, generator)
         else:
             n_points = grid_generator(part, unit_eye, surfaces, out.f, generator)

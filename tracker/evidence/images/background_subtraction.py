@@ -20,8 +20,8 @@ MAX_HUE_SHIFT = 7.0
 """Largest deviation of a channel from the darkened background within a shadow, gray levels."""
 MAX_HIGHLIGHT = 1.3
 """Brightness of the brightest highlight, as a share of the unlit background."""
-_RELIABLE = (20.0, 235.0)
-"""Gray levels between which a ratio of colours is reliable."""
+_UNRELIABLE = 20.0
+"""Distance from either end of the gray levels up to which a ratio of colours is not reliable."""
 _MIN_SAMPLES = 50
 """Fewest usable samples whose median gives a gain."""
 
@@ -45,7 +45,7 @@ def has_usable_exposure(empty_colors: NDArray[np.float32]) -> Mask:
     Args:
         empty_colors: smoothed colours of the samples, (n, 3).
     """
-    dark, bright = _RELIABLE
+    dark, bright = _UNRELIABLE, np.iinfo(np.uint8).max - _UNRELIABLE
     return np.asarray(np.all((empty_colors > dark) & (empty_colors < bright), axis=-1))
 
 

@@ -170,7 +170,7 @@ def _chain(
             while True:
                 left[v, u] = 0
                 gu, gv = np.float32(gradients[0, v - 1, u - 1]), np.float32(gradients[1, v - 1, u - 1])
-                inverse = np.float32(1.0) / np.sqrt(max(gu * gu + gv * gv, np.float32(1e-6)))
+                inverse = np.float32(1.0) / np.sqrt(max(gu * gu + gv * gv, ONE))
                 points[n, 0], points[n, 1] = u - 1, v - 1
                 normals[n, 0], normals[n, 1] = gu * inverse, gv * inverse
                 n += 1

@@ -123,7 +123,7 @@ def _decide(
     x = np.float32(origin[0] + i * size_m) + half
     y = np.float32(origin[1] + j * size_m) + half
     z = np.float32(origin[2] + k * size_m) + half
-    radius = np.float32(1.7320508) * half
+    radius = np.sqrt(np.float32(3)) * half
     n_maybe, n_maybe_outside, decided = n_inside, n_outside, 2
     for v in range(views.sizes.shape[0]):
         if settled >> v & 1:

@@ -11,8 +11,9 @@ from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
 
-_OVERLAP = 0.02
-"""Share of a figure's silhouette that others may also cover, in a view in which they stand apart."""
+STRAY = 0.02
+"""Share of a figure, or of its silhouette, that is no part of it: hair, rims and stray voxels. Others may cover as much
+in a view in which they stand apart."""
 _MARGIN = 1.0
 """Margin around projected voxels, in voxels: limbs that a view has lost are not in the hull."""
 
@@ -84,7 +85,7 @@ def figure_masks(
         for other in others:
             covered |= _painted(other, silhouette, _MARGIN)
         n = np.count_nonzero(mask)
-        found.append(FigureMask(mask, bool(np.count_nonzero(mask & covered) <= _OVERLAP * n)))
+        found.append(FigureMask(mask, bool(np.count_nonzero(mask & covered) <= STRAY * n)))
     return tuple(found)
 
 

@@ -10,9 +10,15 @@ import numpy as np
 
 from tracker.geometry.arrays import Array
 
-ELLIPSOID = np.sqrt(5.0)
+
+def _half_axis(dimension: int) -> float:
+    """Return the radius of a solid uniform ball in that many dimensions, in standard deviations along an axis."""
+    return float(np.sqrt(dimension + 2))
+
+
+ELLIPSOID = _half_axis(3)
 """Half-axis of a solid ellipsoid in standard deviations, along all axes."""
-CYLINDER = np.array([2.0, 2.0, np.sqrt(3.0)])
+CYLINDER = np.array([_half_axis(2), _half_axis(2), _half_axis(1)])
 """Half-axes of a solid elliptical cylinder in standard deviations, twice across and once along its axis, (3,)."""
 
 

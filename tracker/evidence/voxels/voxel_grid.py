@@ -40,7 +40,7 @@ class VoxelGrid(NamedTuple):
         counts = np.maximum(np.ceil(high / size_m - 0.5) - first + 1, 1)
         if counts.prod() > MAX_VOXELS:
             raise TrackerError(
-                f"expected at most {MAX_VOXELS // 10**6} million voxels, found {counts.prod() / 1e6:.0f} million of "
+                f"expected at most {MAX_VOXELS // 10**6} million voxels, found {counts.prod() / 10**6:.0f} million of "
                 f"{1000 * size_m:g} mm; use larger voxels"
             )
         return cls(first * size_m, size_m, (int(counts[0]), int(counts[1]), int(counts[2])))

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from tracker.errors import CalibrationError
+from tracker.formats.anipose import FOUR_DIGITS
 from tracker.formats.calibrations import camera_matrices as matrices
 from tracker.formats.calibrations.document import Document, refuse
 from tracker.formats.calibrations.lens_words import (
@@ -40,8 +41,10 @@ _POSE = {"matrix_R", "rodrigues", "quaternion", "qw", "translation", "tx", "T_ca
 _FORMS = {3: "rodrigues", 4: "quaternion"}
 """Meanings of a rotation by the count of its numbers, where that is not 9: EasyMocap has both a vector R and a matrix
 Rot, which are equal."""
-_SHORTER = {14: 12, 12: 8, 8: 5}
-"""Counts of OpenCV's coefficients, and to how many they are cut where the others are 0."""
+_COUNTS = (5, 8, 12, 14)
+"""Counts of OpenCV's coefficients."""
+_SHORTER = dict(zip(_COUNTS[1:], _COUNTS, strict=False))
+"""By count, to how many they are cut where the others are 0."""
 _REWRITE = "rewrite the camera to K, distortion, R and t of OpenCV's model, or remove the key if it says nothing"
 
 
@@ -300,7 +303,9 @@ def _split(known: Mapping[str, Any], matrix: Any, camera: str, document: Documen
     except matrices.ProjectionError as error:
         place, advice = f"{document.where}, camera {quoted(camera)}", "give K, R and t of the camera instead"
         raise CalibrationError(f"{place}: {error}; {advice}") from error
-    if matrix is not None and not np.allclose(matrices.plain_array(matrix), K, rtol=1e-3, atol=1e-3 * K[0, 0]):
+    if matrix is not None and not np.allclose(
+        matrices.plain_array(matrix), K, rtol=FOUR_DIGITS, atol=FOUR_DIGITS * K[0, 0]
+    ):
         return matrix, None  # that of rectified pictures, as ROS writes it
     return (K.tolist() if matrix is None else matrix), T_camera_world
 

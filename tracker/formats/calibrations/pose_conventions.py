@@ -120,7 +120,7 @@ def _roll(Ts_world_camera: Array) -> float:
     lengths = np.linalg.norm(normals, axis=1)
     verticals = np.concatenate([normals[lengths > 0.1] / lengths[lengths > 0.1, None], sides])
     across, along = verticals @ x.T, verticals @ y.T
-    rolls = np.abs((np.degrees(np.arctan2(across, along)) + 45.0) % 90.0 - 45.0)
+    rolls = np.abs((np.degrees(np.arctan2(across, along)) + 45) % 90 - 45)
     rolls = np.where(np.hypot(across, along) < LOOK_DOWN, _UNKNOWN_ROLL, rolls)
     return float(np.sqrt(np.mean(rolls**2, axis=1)).min())
 
@@ -202,7 +202,7 @@ def _distinct(conventions: Sequence[PoseConvention], Ts_stated: Sequence[Array])
     found: list[PoseConvention] = []
     for convention in conventions:
         rig = _from_first(Ts_stated, convention)
-        if not any(np.allclose(rig, _from_first(Ts_stated, c), atol=1e-6) for c in (STATED, *found)):
+        if not any(np.allclose(rig, _from_first(Ts_stated, c), atol=ROUNDING) for c in (STATED, *found)):
             found.append(convention)
     return found
 
@@ -226,7 +226,7 @@ def _rewrite(convention: PoseConvention) -> str:
     return _REWRITE[kind] + (", then negate the last two rows of R' and t'" if kind != convention else "")
 
 
-_ORDERS = {"w, x, y, z": (0, 1, 2, 3), "x, y, z, w": (3, 0, 1, 2)}
+_ORDERS = {order: [order.split(", ").index(letter) for letter in "wxyz"] for order in ("w, x, y, z", "x, y, z, w")}
 """Places of w, x, y and z among the four numbers."""
 _ALONG = 0.02
 """Share of the length of a row by which rectified cameras stand beside it: their rows are exact but for rounding.
@@ -255,7 +255,7 @@ def with_quaternions(sections: Mapping[str, Section], where: str, poses: PoseCon
                 f"{np.linalg.norm(q):.4g}; rewrite the rotations as 3x3 matrices"
             )
     turned = {
-        words: {name: rigid.matrix_from_quaternion(q[list(places)]) for name, q in quaternions.items()}
+        words: {name: rigid.matrix_from_quaternion(q[places]) for name, q in quaternions.items()}
         for words, places in _ORDERS.items()
     }
     rigs = {words: _rig(sections, rotations) for words, rotations in turned.items()}

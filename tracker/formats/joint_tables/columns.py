@@ -88,7 +88,7 @@ def named_columns(table: Delimited) -> Columns:
     time, unit = next(((i, m["unit"]) for c, i in others.items() if (m := _TIME.fullmatch(c))), (None, None))
     frame, person = (next((others[c] for c in names if c in others), None) for names in (_FRAMES, _PEOPLE))
     groups = tuple(others[c] for c in _GROUPS if c in others and name is not None)
-    second = 1000.0 ** -_SECONDS.index(unit) if unit else None
+    second = 1000 ** -_SECONDS.index(unit) if unit else None
     begun = next(table.rows, None)  # perhaps a row of units
     below = {cell.lower().strip("()[]") for i, cell in enumerate(begun.cells if begun else ()) if i in dict(found)}
     if below < {*METRES_BY_WORD} and len(below) == 1:

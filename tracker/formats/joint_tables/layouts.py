@@ -167,8 +167,8 @@ def _timed(frames: IntArray, times: Array, second: float | None, rate: float, wh
         return frames / rate, rate
     if np.isnan(times).any():
         raise FormatError(f"{where}: expected a time in each row, found rows without one; leave the column empty")
-    power = next((k for k in (3, 2, 1) if np.abs(times).max() > 10.0 ** (8 + 3 * k)), 0)
-    times = times * (second or 1000.0**-power)
+    power = next((k for k in (3, 2, 1) if np.abs(times).max() > 10 ** (8 + 3 * k)), 0)
+    times = times * (second or 1000**-power)
     spans = np.diff(times) / np.diff(frames)
     if not len(spans) or not (spans > 0).all():
         return times, rate

@@ -23,11 +23,18 @@ PERSON_KEYPOINTS = (
     *(f"{side}_{part}" for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in _SIDES),
 )
 """The 17 keypoints of COCO's category `person`."""
-PERSON_SKELETON = (
-    (16, 14), (14, 12), (17, 15), (15, 13), (12, 13), (6, 12), (7, 13), (6, 7), (6, 8), (7, 9), (8, 10), (9, 11),
-    (2, 3), (1, 2), (1, 3), (2, 4), (3, 5), (4, 6), (5, 7),
+_LINES = (
+    "left_ankle left_knee", "left_knee left_hip", "right_ankle right_knee", "right_knee right_hip",
+    "left_hip right_hip", "left_shoulder left_hip", "right_shoulder right_hip", "left_shoulder right_shoulder",
+    "left_shoulder left_elbow", "right_shoulder right_elbow", "left_elbow left_wrist", "right_elbow right_wrist",
+    "left_eye right_eye", "nose left_eye", "nose right_eye", "left_eye left_ear", "right_eye right_ear",
+    "left_ear left_shoulder", "right_ear right_shoulder",
 )  # fmt: skip
-"""COCO's own lines between them, counted from 1."""
+"""COCO's own lines between them, in its order."""
+PERSON_SKELETON = tuple(
+    (PERSON_KEYPOINTS.index(one) + 1, PERSON_KEYPOINTS.index(other) + 1) for one, other in map(str.split, _LINES)
+)
+"""The same lines by the numbers of their points, counted from 1."""
 
 
 class CocoCategory(msgspec.Struct, frozen=True):

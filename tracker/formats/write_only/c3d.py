@@ -9,6 +9,7 @@ import numpy as np
 from tracker.errors import FormatError, Remedy
 from tracker.formats.write_only.optional_packages import require
 from tracker.geometry.arrays import Array
+from tracker.geometry.lengths import METRES_BY_WORD
 
 MAX_FRAME = np.iinfo(np.uint16).max
 """Highest frame number of a C3D file, which stores the first and last one in 16 bits (C3D user guide, header)."""
@@ -44,7 +45,7 @@ def write_c3d(
     if first_frame + n > MAX_FRAME:
         expected = f"frame numbers up to {MAX_FRAME:,}, as C3D has"
         raise FormatError.mismatch("", expected, f"{first_frame + n:,}", Remedy("fewer_frames"))
-    scale = 1000.0 if units == "mm" else 1.0
+    scale = 1 / METRES_BY_WORD[units]
     values = np.full((4, len(names), n), 1.0)
     values[:3] = scale * points.transpose(2, 1, 0)
     missing = np.isnan(values).any(axis=0)

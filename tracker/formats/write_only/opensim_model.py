@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.constants import g
 
 from tracker.body.model import BodyModel
 from tracker.body.parts import Joint
@@ -26,8 +27,6 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.euler import Order, continuous_euler_angles
 
-GRAVITY = 9.80665
-"""Standard gravity, m/s^2."""
 _DENSITY = 1000.0
 """Density of a body, kg/m^3: about that of water, in which people just float."""
 _FREE = 100.0
@@ -102,7 +101,7 @@ def write_osim(path: str | Path, model: BodyModel, name: str, T_ground_world: Ar
         up: unit vector against gravity, in the ground.
     """
     document = ET.Element("OpenSimDocument", Version="40000")
-    gravity = _vector(-GRAVITY * np.asarray(up))
+    gravity = _vector(-g * np.asarray(up))
     top = _add(document, "Model", identifier(name), gravity=gravity, length_units="meters", force_units="N")
     part_names, joint_names = identifiers([p.name for p in model.parts]), identifiers([j.name for j in model.joints])
     bodies, joints, markers = (_add(_add(top, f"{kind}Set", f"{kind.lower()}set"), "objects") for kind in _SETS)

@@ -9,13 +9,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tracker.body.motion.continuation import Bones, PersonPath, who_is_who
+from tracker.body.motion.continuation import SAME_PERSON_M, Bones, PersonPath, who_is_who
 from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.robust_triangulation import INLIER_M, Views, triangulate_points
-
-SAME_PERSON_M = 0.4
-"""Largest median distance, metres, of a detection's points from a person's a frame before: a person is as wide."""
 
 
 @dataclass(eq=False)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.estimation.initialization.generators.standing_body import typical_person
+from tracker.evidence.voxels.figure_masks import STRAY
 from tracker.evidence.voxels.paths import VoxelGraph, path_lengths
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
@@ -40,8 +41,6 @@ _MIN_UPPER_SCORE = 0.4
 """Smallest score of a head at the upper end of a figure."""
 _ADULT_M3 = 0.10
 """Volume of the visual hull of a typical adult, cubic metres."""
-STRAY = 0.02
-"""Largest share of a figure's voxels that is no part of it: hair and stray voxels."""
 
 
 class Head(NamedTuple):
