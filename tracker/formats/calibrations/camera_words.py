@@ -303,9 +303,8 @@ def _split(known: Mapping[str, Any], matrix: Any, camera: str, document: Documen
     except matrices.ProjectionError as error:
         place, advice = f"{document.where}, camera {quoted(camera)}", "give K, R and t of the camera instead"
         raise CalibrationError(f"{place}: {error}; {advice}") from error
-    if matrix is not None and not np.allclose(
-        matrices.plain_array(matrix), K, rtol=FOUR_DIGITS, atol=FOUR_DIGITS * K[0, 0]
-    ):
+    four_digits = {"rtol": FOUR_DIGITS, "atol": FOUR_DIGITS * K[0, 0]}
+    if matrix is not None and not np.allclose(matrices.plain_array(matrix), K, **four_digits):
         return matrix, None  # that of rectified pictures, as ROS writes it
     return (K.tolist() if matrix is None else matrix), T_camera_world
 
