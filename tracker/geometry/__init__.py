@@ -18,6 +18,7 @@ __all__ = [
     "lenses",
     "rigid",
     "robust_triangulation",
+    "same_place",
     "segment_distance",
     "shapes",
     "surface_nets",

@@ -14,11 +14,9 @@ import numpy as np
 
 from tracker.geometry.arrays import TINY, Array, IntArray, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
+from tracker.geometry.same_place import INLIER_M
 from tracker.geometry.triangulation import MIN_ANGLE_RAD
 
-INLIER_M = 0.10
-"""Distance from a point, metres, within which a view's observation is of it. Poses that differ by no more are the same
-pose elsewhere (`tracker.estimation.fitting.hypothesis`): a limb is about as thick."""
 _STEPS = 5
 """Number of Gauss-Newton steps; from the nearest point of two rays, the last ones move it by less than a micrometre."""
 _ROBUST_ROUNDS = 3
@@ -34,8 +32,6 @@ class Triangulated(NamedTuple):
     """Positions, (n_frames, n_points, 3), metres; NaN where fewer than two views agree."""
     covariances: Array
     """Covariance of each, (n_frames, n_points, 3, 3), m^2; NaN where absent."""
-    residuals_px: Array
-    """Distance of each observation from its point, undistorted px, (n_frames, n_views, n_points); NaN where absent."""
     is_inlier: Mask
     """Whether a view agrees with the point, (n_frames, n_views, n_points)."""
 
@@ -157,8 +153,7 @@ def triangulate_points(views: Views, points_px: Array, confidence: Array) -> Tri
     flat_confidence = np.swapaxes(confidence, 1, 2).reshape(-1, n_views)
     if n_views < 2 or not n_frames:
         nothing = np.full((n_frames, n_points, 3), np.nan)
-        nowhere = np.full(confidence.shape, np.nan)
-        return Triangulated(nothing, np.full((*nothing.shape, 3), np.nan), nowhere, np.zeros(confidence.shape, bool))
+        return Triangulated(nothing, np.full((*nothing.shape, 3), np.nan), np.zeros(confidence.shape, bool))
     found = pair_hypotheses(views, flat_px, flat_confidence)
     chosen = _smooth_choice(found, n_frames, n_points)
     rows = np.arange(len(chosen))
@@ -169,13 +164,11 @@ def triangulate_points(views: Views, points_px: Array, confidence: Array) -> Tri
     weights = np.where(is_inlier, flat_confidence, 0.0)
     points, information, sigma = _refine(views, start, flat_px, weights)
     points[~has_point] = np.nan
-    px, _ = views.errors(points, flat_px)
     inverse = np.linalg.inv(information + TINY * np.eye(3))
     covariances = np.where(has_point[:, None, None], sigma**2 * inverse, np.nan)
     return Triangulated(
         points.reshape(n_frames, n_points, 3),
         covariances.reshape(n_frames, n_points, 3, 3),
-        np.swapaxes(px.reshape(n_frames, n_points, n_views), 1, 2),
         np.swapaxes(is_inlier.reshape(n_frames, n_points, n_views), 1, 2),
     )
 

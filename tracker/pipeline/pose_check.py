@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.body.motion.prediction import HISTORY_FRAMES
+from tracker.body.motion.history import HISTORY_FRAMES
 from tracker.compute.progress import Report, mapped, result_of, unreported
 from tracker.errors import TrackerError
 from tracker.estimation.by_frame.settings import EstimationSettings

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.body.motion.prediction import HISTORY_FRAMES
+from tracker.body.motion.history import HISTORY_FRAMES
 from tracker.errors import Remedy, SessionError
 from tracker.estimation.runs.run_estimate import poses_beside
 from tracker.estimation.tracking.confidence import Status, status_named

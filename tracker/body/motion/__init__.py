@@ -9,6 +9,7 @@ __all__ = [
     "consistency",
     "continuation",
     "floor_from_feet",
+    "history",
     "interpolation",
     "keyframe_doubts",
     "pose_path",

@@ -11,7 +11,8 @@ import numpy as np
 from tracker.calibration.self_calibration.seen_joints import points_of_person
 from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.geometry.robust_triangulation import INLIER_M, Views, triangulate_points
+from tracker.geometry.robust_triangulation import Views, triangulate_points
+from tracker.geometry.same_place import INLIER_M
 from tracker.interchange.observations.checks import point_rays
 from tracker.interchange.observations.observed import ObservationSet, side_pairs
 

@@ -26,7 +26,7 @@ from tracker.errors import CalibrationError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import IntArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.robust_triangulation import INLIER_M
+from tracker.geometry.same_place import INLIER_M
 
 
 class Identified(NamedTuple):

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from tracker.body.motion.prediction import HISTORY_FRAMES
+from tracker.body.motion.history import HISTORY_FRAMES
 from tracker.estimation.tracking.method import Option
 
 

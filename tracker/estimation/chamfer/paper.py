@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from tracker.body.motion.prediction import HISTORY_FRAMES, PredictSettings
+from tracker.body.motion.history import HISTORY_FRAMES
+from tracker.body.motion.prediction import PredictSettings
 from tracker.estimation.chamfer.constants import PAPER_BODY
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.search.best_first import SearchSettings

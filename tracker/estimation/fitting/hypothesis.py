@@ -14,7 +14,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.jit import njit
 from tracker.estimation.fitting.gauss_newton import Fit
 from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.robust_triangulation import INLIER_M
+from tracker.geometry.same_place import INLIER_M
 
 SAME_POSE_M = INLIER_M
 """Two poses are the same if no point of the body is farther apart, metres: the width of a limb. Contours nearer than

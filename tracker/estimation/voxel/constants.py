@@ -1,6 +1,6 @@
 """Constants that the descriptor of the voxel tracker shares with its heavier modules."""
 
-from tracker.geometry.robust_triangulation import INLIER_M
+from tracker.geometry.same_place import INLIER_M
 
 PAPER_BODY = "mikic10"
 """Body of ten parts on ball joints (MTHC01 Fig. 5)."""

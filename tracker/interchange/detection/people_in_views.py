@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from tracker.footage.mask_image import ANYONE, UNKNOWN
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
-from tracker.geometry.robust_triangulation import INLIER_M, Views
+from tracker.geometry.robust_triangulation import Views
+from tracker.geometry.same_place import INLIER_M
 from tracker.interchange.detection.detector import ADULT, DetectedPerson, Detector, PictureSquare
 from tracker.interchange.observations.identities import SAME_PERSON_M, PersonTrack, follow_people, track_distance
 from tracker.interchange.observations.observed import ObservationSet

@@ -16,7 +16,8 @@ from tracker.footage.camera_source import CameraSource
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
-from tracker.geometry.robust_triangulation import INLIER_M, Views
+from tracker.geometry.robust_triangulation import Views
+from tracker.geometry.same_place import INLIER_M
 from tracker.interchange.observations.observed import ObservedPoints
 
 SAMPLES = 60

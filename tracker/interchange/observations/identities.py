@@ -12,7 +12,8 @@ import numpy as np
 from tracker.body.motion.continuation import SAME_PERSON_M, Bones, PersonPath, who_is_who
 from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.geometry.robust_triangulation import INLIER_M, Views, triangulate_points
+from tracker.geometry.robust_triangulation import Views, triangulate_points
+from tracker.geometry.same_place import INLIER_M
 
 
 @dataclass(eq=False)

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.geometry.robust_triangulation import INLIER_M, Views, cheapest_path, leaps, pair_hypotheses, usual_step
+from tracker.geometry.robust_triangulation import Views, cheapest_path, leaps, pair_hypotheses, usual_step
+from tracker.geometry.same_place import INLIER_M
 
 _EXCHANGE = 0.5
 """Price of an exchanged view, in confidences of disagreeing points: half a point that disagrees everywhere. Without it,

@@ -18,7 +18,7 @@ from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, Image, IntArray, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
-from tracker.geometry.robust_triangulation import INLIER_M
+from tracker.geometry.same_place import INLIER_M
 from tracker.interchange.plausibility.body_likelihood import Places
 from tracker.session.session import Session
 

@@ -17,7 +17,7 @@ from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.formats.trc import axes_matrix, axis_conventions
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.lengths import METRES_BY_WORD, USUAL_SIZES
-from tracker.geometry.robust_triangulation import INLIER_M
+from tracker.geometry.same_place import INLIER_M
 from tracker.interchange.observations.checks import SAMPLES
 from tracker.interchange.plausibility.body_likelihood import (
     PRIORS,
