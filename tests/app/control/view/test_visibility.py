@@ -93,7 +93,7 @@ def test_a_search_of_others_takes_the_place_of_the_one_that_stands(couple):
     couple.search.set_settings(QUICK)
     for done, person in enumerate((None, ANN, ANN), 1):
         couple.search.step(person)
-        wait_for(lambda n=done: sum(len(r.steps) for r in couple.replay.runs()) == n)
+        wait_for(lambda n=done: sum(len(r.steps) for r in couple.replay.runs()) == n and not couple.search.running)
     first, second = couple.replay.runs()
     assert (first.over, {s.person for s in first.stages}) == (True, {ANN, BOB})
     assert (second.over, len(second.steps), {s.person for s in second.stages}) == (False, 2, {ANN})
