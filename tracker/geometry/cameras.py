@@ -119,7 +119,7 @@ class Camera:
         return self if self.is_pinhole else replace(self, distortion=np.zeros(0))
 
     def _fisheye_pinhole(self) -> "Camera":
-        xy = self._px_to_slopes(border(self.size))
+        xy = self._px_to_slopes(_border(self.size))
         directions = fisheye_directions(xy, self.distortion)
         angles = np.arctan2(np.linalg.norm(directions[:, :2], axis=-1), directions[:, 2])
         widest = min(MAX_PINHOLE_ANGLE, fisheye_limit(self.distortion))
@@ -293,9 +293,9 @@ class Camera:
         return np.stack([x, y], axis=-1)
 
 
-def border(size: tuple[int, int], beyond_px: float = 0.5) -> Array:
-    """Return points along the border of an image, or beyond the centres of its outermost pixels by more, (n, 2), px."""
-    low, (right, bottom) = -beyond_px, np.array(size) - 1 + beyond_px
+def _border(size: tuple[int, int]) -> Array:
+    """Return points along the border of an image, (n, 2), px."""
+    low, (right, bottom) = -0.5, np.array(size) - 0.5
     u, v = np.linspace(low, right, BORDER_SAMPLES), np.linspace(low, bottom, BORDER_SAMPLES)
     sides = ((u, low), (u, bottom), (low, v), (right, v))
     return np.concatenate([np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in sides])

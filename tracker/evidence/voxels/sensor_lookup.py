@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import BEYOND_PX, Camera, border
+from tracker.geometry.cameras import BEYOND_PX, Camera
 from tracker.geometry.lens_tables import Lens
 
 _STEPS_PER_PX = 2
 """Entries of the table per raw pixel along each axis."""
 _MAX_ENTRIES = 4096
 """Largest number of entries along each axis. Wide lenses have long borders."""
+_BORDER_SAMPLES = 64
+"""Points along each side of the image whose rays bound the table; a border bends little between two of them."""
 _ROWS_AT_ONCE = 64
 """Rows of the table that are filled at a time: all rows of a wide lens would take gigabytes."""
 
@@ -40,10 +42,7 @@ class SensorLookup(NamedTuple):
 def lookup_of_lens(lens: Lens) -> SensorLookup:
     """Return the table of all cameras with a lens, cached. It covers the image and half a pixel around it."""
     camera = lens.camera
-    seen = camera.pinhole if camera.fisheye else camera  # of a fisheye the image as undistorted
-    rays = seen.rays(border(seen.size, 1.0))
-    xy = rays[:, :2] / rays[:, 2:]
-    low, high = xy.min(axis=0), xy.max(axis=0)
+    low, high = _border(camera)
     step = max(1 / (_STEPS_PER_PX * max(camera.K[0, 0], camera.K[1, 1])), float((high - low).max()) / _MAX_ENTRIES)
     n_columns, n_rows = (int(np.ceil(n)) + 1 for n in (high - low) / step)
     x, rows = low[0] + step * np.arange(n_columns), low[1] + step * np.arange(n_rows)
@@ -59,6 +58,17 @@ def _exact_pixels(camera: Camera, x: Array, y: Array) -> Array:
     # Beyond the lens the polynomial bends back: nothing is seen there.
     exact[~camera.within_lens(camera.pinhole.project(points)) | np.isnan(exact).any(axis=-1)] = BEYOND_PX
     return exact.reshape(len(y), len(x), 2)
+
+
+def _border(camera: Camera) -> tuple[Array, Array]:
+    """Return the lowest and highest sensor coordinates of the image, (2,) each; of a fisheye's, as undistorted."""
+    seen = camera.pinhole if camera.fisheye else camera
+    width, height = seen.size
+    u, v = np.linspace(-1, width, _BORDER_SAMPLES), np.linspace(-1, height, _BORDER_SAMPLES)
+    sides = [np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in ((u, -1), (u, height), (-1, v), (width, v))]
+    rays = seen.rays(np.concatenate(sides))
+    xy = rays[:, :2] / rays[:, 2:]
+    return xy.min(axis=0), xy.max(axis=0)
 
 
 def _steepest(pixels: Array) -> float:
