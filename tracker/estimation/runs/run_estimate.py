@@ -101,7 +101,8 @@ class _RunEstimate:
         self._places = {k: i for i, k in enumerate(self._frames)}
         self._views: dict[int, tuple[ViewEvidence, ...]] = {}
         self._found: dict[int, dict[int, RunPose]] = {i: {} for i in run.subjects.tracked}
-        self._facing, self._learnt = dict.fromkeys(run.subjects.tracked, KNOWN), list[RegionModel]()
+        self._facing = dict.fromkeys(run.subjects.tracked, KNOWN)
+        self._colors: RegionModel | None = None
 
     def steps(self) -> Generator[Progress, None, dict[int, dict[int, RunPose]]]:
         """Do the work, block by block."""
@@ -126,7 +127,7 @@ class _RunEstimate:
             if k not in self._views:
                 self._views[k] = self._observe(k, [(i, p.pose) for i in people for p in proposals[k, i]])
             yield 2 * done
-        colors = self._colors()
+        colors = self._colors = self._colors or self._learn_colors()
         evidence = {k: self._evidence(k, colors) for k in used}
         done, searches = 2 * n, dict[int, PathSearch]()
         for turn in range(n_turns):
@@ -195,25 +196,22 @@ class _RunEstimate:
         views = self._views[frame]
         return FrameEvidence(views, colors, colors.frame(views, self._bodies(frame)))
 
-    def _colors(self) -> RegionModel:
-        """Return the appearance of the people and places of the run. It is learnt once, from people who face the way
-        that contours say."""
-        if not self._learnt:
-            observer, at = self._run.observer, learning_frames(self._frames)
-            nats, seen = {i: list[float]() for i in self._found if self._is_free(i)}, list[tuple[ViewEvidence, ...]]()
-            for k in at:
-                views = self._views.get(k) or self._observe(k)
-                for i, of_person in nats.items():
-                    of_person.append(turning_nats(views, self._bodies(k), i, self._run.settings))
-                seen.append(tuple(map(with_colors_only, views)))
-            self._facing |= {i: Facing.of(of_person) for i, of_person in nats.items()}
-            for i in (i for i, facing in self._facing.items() if facing.is_turned):
-                model = self._run.subjects.models[i]
-                turned = [turned_round(PosedBody(model, self._poses[k][i])) for k in self._frames]
-                self._take(self._frames, i, np.array(turned))
-            frames = [LearningFrame(views, self._bodies(k)) for k, views in zip(at, seen, strict=True)]
-            self._learnt.append(learn_regions(frames, observer.working_cameras, observer.empty_scenes()))
-        return self._learnt[0]
+    def _learn_colors(self) -> RegionModel:
+        """Return the appearance of the people and places of the run, by people who face the way that contours say."""
+        observer, at = self._run.observer, learning_frames(self._frames)
+        nats, seen = {i: list[float]() for i in self._found if self._is_free(i)}, list[tuple[ViewEvidence, ...]]()
+        for k in at:
+            views = self._views.get(k) or self._observe(k)
+            for i, of_person in nats.items():
+                of_person.append(turning_nats(views, self._bodies(k), i, self._run.settings))
+            seen.append(tuple(map(with_colors_only, views)))
+        self._facing |= {i: Facing.of(of_person) for i, of_person in nats.items()}
+        for i in (i for i, facing in self._facing.items() if facing.is_turned):
+            model = self._run.subjects.models[i]
+            turned = [turned_round(PosedBody(model, self._poses[k][i])) for k in self._frames]
+            self._take(self._frames, i, np.array(turned))
+        frames = [LearningFrame(views, self._bodies(k)) for k, views in zip(at, seen, strict=True)]
+        return learn_regions(frames, observer.working_cameras, observer.empty_scenes())
 
     def _is_free(self, person: int) -> bool:
         """Return whether nothing says which way a person faces: neither a keyframe nor a pose beside the run."""

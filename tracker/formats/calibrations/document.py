@@ -1,4 +1,4 @@
-"""Read a calibration file to plain data; its syntax is told by its content, never by its name.
+"""Read a calibration file to plain data; its content shows the syntax, never its name.
 
 Files of other programs that are not read as calibrations are named, with advice.
 """

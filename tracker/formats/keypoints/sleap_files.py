@@ -84,7 +84,7 @@ _Rows = NDArray[np.void]
 
 
 class _By(IntEnum):
-    """Who set an instance."""
+    """The source of an instance."""
 
     HAND = 0
     NETWORK = 1
