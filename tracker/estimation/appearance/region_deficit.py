@@ -40,14 +40,15 @@ def elsewhere_nats(nats: Array, models: Sequence[BodyModel]) -> Array:
 
     Where a part is, its evidence on a frame is normal around its usual, as widely as over the run. Elsewhere it is
     normal around 0, as widely. This is the log ratio of both. A part that looks like its surroundings, and one that is
-    often hidden, therefore say little.
+    often hidden, therefore say little. Each side varies around its own: a leg that is lost in all frames lies below the
+    other one, which does not make either vary.
 
     Args:
         nats: see `part_deficits`.
         models: all people.
     """
-    best, both = usual(nats, models), np.concatenate([nats, nats[:, counterparts(models)]])
-    low, high = np.percentile(both, _QUARTILES, axis=0)
+    best, below = usual(nats, models), nats - np.percentile(nats, _QUARTILES[1], axis=0)
+    low, high = np.percentile(np.concatenate([below, below[:, counterparts(models)]]), _QUARTILES, axis=0)
     spread = np.maximum(0.5 * MAD_TO_SIGMA * (high - low), np.sqrt(np.maximum(best, 1.0)))
     return np.asarray(best * (best - 2 * nats) / (2 * spread**2))
 
