@@ -14,7 +14,7 @@ from tracker.evidence.images.change import change_threshold
 from tracker.evidence.images.image_statistics import ImageStatistics, SampleGrid
 from tracker.evidence.images.working_view import WorkingView
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.mask_image import parts_of_mask
+from tracker.footage.image_file import parts_of_mask
 from tracker.footage.recording import read_background, read_mask
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Region

@@ -30,7 +30,7 @@ from tracker.evidence.images.image_statistics import SPACING_PX
 from tracker.evidence.images.silhouette_cleaning import clean_silhouette
 from tracker.evidence.images.working_view import WorkingView
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.mask_image import parts_of_mask
+from tracker.footage.image_file import parts_of_mask
 from tracker.footage.recording import Recording, background_frames, read_mask
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Camera

@@ -21,7 +21,7 @@ from tracker.evidence.view_evidence import (
     with_segments,
 )
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.mask_image import UNKNOWN
+from tracker.footage.image_file import UNKNOWN
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
 from tracker.session.session import load_session
