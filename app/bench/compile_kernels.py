@@ -186,8 +186,7 @@ def _track(
     cameras: Sequence[CameraSource], settings: "TrackSettings", models: Sequence[BodyModel], start: Sequence[Array]
 ) -> None:
     from tracker.estimation.chamfer.tracker import ChamferTracker
-    from tracker.estimation.tracking.subjects import Subjects
-    from tracker.estimation.tracking.tracker import TrackingRun
+    from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 
     with open_observer(cameras) as observer:
         run = TrackingRun(observer, Subjects.of(models), start, range(_FRAME, _FRAME + _FRAMES))
@@ -207,7 +206,7 @@ def _estimate(
     from tracker.estimation.by_frame.region_scorer import FrameEvidence
     from tracker.estimation.runs.frame_hypotheses import FrameHypotheses
     from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
-    from tracker.estimation.tracking.subjects import Subjects
+    from tracker.estimation.tracking.tracker import Subjects
 
     bodies = tuple(PosedBody(m, pose) for m, pose in zip(models, poses, strict=True))
     with open_observer(cameras) as observer:

@@ -1,8 +1,7 @@
 """Run trackers on staged evidence, the chamfer tracker by default."""
 
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.pipeline.methods import make_tracker
 
 

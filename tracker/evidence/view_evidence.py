@@ -4,6 +4,7 @@ The features of a region do not depend on a prediction (`RegionFeatures`). Which
 (`select_evidence`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -28,7 +29,7 @@ from tracker.evidence.images.edges import Edges
 from tracker.evidence.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
 from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.keypoints import ViewKeypoints
-from tracker.geometry.arrays import FloatArray, Image, Mask
+from tracker.geometry.arrays import Array, FloatArray, Image, Mask
 from tracker.geometry.cameras import Camera, Region
 
 SCENE_SPACING_PX = 4
@@ -146,6 +147,11 @@ def with_colors_only(view: ViewEvidence, colors: Image | None = None) -> ViewEvi
     )  # fmt: skip
 
 
+def outliers_px(views: Sequence[ViewEvidence], theta_px: float | None) -> Array:
+    """Convert an outlier distance from px of the footage to working px of each view, (V,); see `outlier_px`."""
+    return np.array([v.outlier_px(theta_px) for v in views])
+
+
 def default_theta_px(camera: Camera) -> float:
     """Return the outlier distance of a camera: 3% of the longer side of its image (20 px at 640x480)."""
     return _theta_px(camera.size)
@@ -155,20 +161,22 @@ def _theta_px(size: tuple[int, int]) -> float:
     return 0.03 * max(size)
 
 
-def silhouette_evidence(changes: Changes, edges: Edges, limit_px: float) -> Silhouette:
+def silhouette_evidence(changes: Changes, edges: Edges, filmed: Camera) -> Silhouette:
     """Build the evidence of a silhouette. Next to unknown pixels it has no contour, and among them no outside.
 
     Args:
         changes: the silhouette in a region.
         edges: edges of the same region.
-        limit_px: largest distance to its contour, working px.
+        filmed: camera of the footage at working scale; distances to the contour end at twice its outlier distance.
     """
     inside, contour = changes.inside, trace_silhouette(changes.inside)
     if changes.unknown is not None:
         contour, inside = contour.away_from(changes.unknown), changes.inside | changes.unknown
     first = thin_points(contour.points_px, *inside.shape)
     trust = contour_trust(contour, inside, edges)
-    return Silhouette(inside, contour.points_px[first], contour.normals[first], trust, contour, limit_px)
+    return Silhouette(
+        inside, contour.points_px[first], contour.normals[first], trust, contour, 2 * default_theta_px(filmed)
+    )
 
 
 class RegionFeatures(NamedTuple):
@@ -185,7 +193,6 @@ class RegionFeatures(NamedTuple):
     """Samples of the segments; None if not yet taken."""
     colors: Image | None = None
     silhouette: Silhouette | None = None
-    ahead_frames: float = 0.0
 
     @property
     def box(self) -> Region:
@@ -199,6 +206,7 @@ def select_evidence(
     predicted_px: FloatArray | None,
     static_edges: StaticEdgeModel | None,
     max_angle_rad: float = MAX_ANGLE_RAD,
+    ahead_frames: float = 0.0,
 ) -> ViewEvidence:
     """Select the edges of a region that the prediction accepts and that are not static.
 
@@ -208,6 +216,7 @@ def select_evidence(
             all edges. Without segments all edges are accepted.
         static_edges: static edges of the view, which are refused; None if unknown.
         max_angle_rad: largest angle between an edge of an accepted segment and a contour, rad.
+        ahead_frames: frames by which the picture was taken later than the frame.
     """
     segments, samples, theta = (
         features.segments,
@@ -227,7 +236,7 @@ def select_evidence(
     distance = distance_image(found, 2 * theta)
     return ViewEvidence(
         features.camera, features.scale, points, distance, features.corner_px, features.image_size, normals,
-        features.colors, segments, samples, chosen, is_static, features.silhouette, features.ahead_frames,
+        features.colors, segments, samples, chosen, is_static, features.silhouette, ahead_frames,
     )  # fmt: skip
 
 

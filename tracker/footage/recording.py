@@ -89,12 +89,13 @@ class Recording:
         if not in_background:
             self._check_offsets()
         self.fps = next((f.fps for f in self._footage if f.fps is not None), None)
-        self._decoded, self._is_listed = _DecodedFrames(cache_bytes), False
+        self._decoded = _DecodedFrames(cache_bytes)
+        self._end: int | None = None  # number of frames, once all are listed
 
     def with_cameras(self, cameras: Sequence[CameraSource]) -> "Recording":
         """Return the same open footage, read with other offsets of the same cameras; either closes it for both."""
         other = copy(self)
-        other._cameras = tuple(cameras)
+        other._cameras, other._end = tuple(cameras), None
         return other
 
     @property
@@ -188,8 +189,9 @@ class Recording:
         self.close()
 
     def _check(self, k: int) -> None:
-        self._is_listed = self._is_listed or self.listed_share is None
-        if k < 0 or (self._is_listed and k >= self.n_frames):
+        if self._end is None and self.listed_share is None:
+            self._end = self.n_frames
+        if k < 0 or (self._end is not None and k >= self._end):
             self._check_offsets()
             raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
 

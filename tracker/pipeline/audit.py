@@ -16,7 +16,7 @@ from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.runs.frame_hypotheses import Proposal
 from tracker.estimation.runs.path_assessment import RunPose
 from tracker.estimation.runs.run_estimate import Progress, RunFrames, estimate_run, poses_beside
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array

@@ -7,9 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from tracker.estimation.tracking.confidence import PoseQuality
-from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.subjects import Keyframes
-from tracker.estimation.tracking.tracker import TrackerSettings
+from tracker.estimation.tracking.tracker import Keyframes, PoseEstimate, TrackerSettings
 from tracker.geometry.arrays import Array
 from tracker.session.session import Person
 from tracker.session.store.annotation_store import AnnotationStore

@@ -9,10 +9,11 @@ from staging import camera_at, view_evidence
 from tracker.body.model import PosedBody
 from tracker.errors import RecordingError
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.images.edge_segments import MAX_LENGTH, accept_segments, link_edges
+from tracker.evidence.foreground import FOREGROUND_MARGIN
+from tracker.evidence.images.edge_segments import MAX_LENGTH, accept_segments, link_and_sample
 from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.images.working_view import WorkingView, region_around, working_scale
-from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
+from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import (
     ACCEPTED_SHARE,
     SCENE_SPACING_PX,
@@ -342,7 +343,8 @@ def test_evidence_read_ahead_equals_evidence_read_later(real_frame, monkeypatch,
     boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
     static_edges = None if background else [StaticEdgeModel(c.size) for c in observer.working_cameras]
     expected = observer.evidence(25, boxes, predicted, static_edges)
-    monkeypatch.setattr("tracker.evidence.observer.link_edges", lambda *a: linked.append(a) or link_edges(*a))
+    place = "tracker.evidence.foreground.link_and_sample"
+    monkeypatch.setattr(place, lambda *a: linked.append(a) or link_and_sample(*a))
 
     def look_ahead(regions, still):
         observer.prefetch(25, regions, still)

@@ -30,7 +30,7 @@ from tracker.estimation.appearance.limb_score import ColorView, LimbScore, LimbS
 from tracker.estimation.appearance.region_deficit import counterparts
 from tracker.evidence.contours.occluding_contours import part_poses
 from tracker.evidence.images.color_histogram import BINS, bin_of
-from tracker.evidence.view_evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence, outliers_px
 from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
 
@@ -106,8 +106,8 @@ class Colors:
             person: index of the scored body.
         """
         self._views = [
-            ColorView(v.camera.projection, v.camera.center_world, v.colors, v.distance, v.theta_px)
-            for v in views
+            ColorView(v.camera.projection, v.camera.center_world, v.colors, v.distance, theta)
+            for v, theta in zip(views, outliers_px(views, None).tolist(), strict=True)
             if v.colors is not None
         ]
         self._ahead_frames = np.array([v.ahead_frames for v in views if v.colors is not None])

@@ -102,7 +102,7 @@ def region_residuals(known: RegionModel, frame: RegionFrame, bodies: Sequence[Po
         views = []
         for i, v in shown:
             if v.ahead_frames == time:
-                room = contour_room(v.camera, len(bodies), _PIECE_CELLS)
+                room = contour_room([v.camera], len(bodies), _PIECE_CELLS)
                 tables = known.tables.of_view(i)
                 views.append(_View(v, frame.background[i], tables, scratch_buffer(surfaces, room, 0)))
         own = _RegionResiduals(views, ahead(bodies, time), person)

@@ -10,7 +10,7 @@ from tracker.estimation.by_frame.frame_problem import PersonFit, with_body
 from tracker.estimation.chamfer.settings import TrackSettings, search_frame
 from tracker.estimation.fitting.gauss_newton import with_locked_dofs
 from tracker.estimation.search.best_first import COARSE_SEARCH, SearchSettings
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.geometry.arrays import Array
 
 

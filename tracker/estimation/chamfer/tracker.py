@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from tracker.estimation.by_frame.forward_pass import track_forward
 from tracker.estimation.chamfer.frame_estimator import ChamferEstimator
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import PoseEstimate, TrackingRun
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from tracker.estimation.contour.paper_fit import paper_residuals, unlimited_view
 from tracker.estimation.contour.settings import ContourSettings
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import NormalEquations
-from tracker.estimation.tracking.estimate import NormalMatrix
 from tracker.estimation.tracking.person_memory import PersonMemory
+from tracker.estimation.tracking.tracker import NormalMatrix
 from tracker.evidence.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from tracker.estimation.by_frame.forward_pass import track_forward
 from tracker.estimation.contour.frame_estimator import ContourEstimator
 from tracker.estimation.contour.settings import ContourSettings
-from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import PoseEstimate, TrackingRun
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ A residual block returns the normal equations of its weighted residuals at a pos
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -121,6 +121,7 @@ class PosePrior:
     """Weight of each degree of freedom, (n_dofs,), per radian or metre."""
 
     @classmethod
+    @lru_cache(maxsize=32)  # of each body; asked for several times for each frame
     def of_spreads(cls, model: BodyModel) -> "PosePrior":
         """Return the prior by the joint spreads of a body, around its neutral pose."""
         return cls(model.neutral(), 1 / model.spreads)

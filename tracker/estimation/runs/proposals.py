@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.shortest_step import nearest_equivalent
+from tracker.body.motion.velocity import nearest_equivalent
 from tracker.estimation.by_frame.limb_recovery import with_limb
 from tracker.estimation.fitting.hypothesis import limbs_elsewhere
 from tracker.estimation.fitting.limb_exchange import exchanged, paired_limbs, turned_round

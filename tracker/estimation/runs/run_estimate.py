@@ -28,7 +28,7 @@ from tracker.estimation.runs.path_assessment import RunPose, assessed_path
 from tracker.estimation.runs.path_search import PathSearch
 from tracker.estimation.runs.proposals import other_sides
 from tracker.estimation.search.chamfer_cost import frame_cost
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.estimation.trajectory.solve import PosedPath, even_blocks, solve_path
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence, with_colors_only

@@ -8,7 +8,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.estimation.by_frame.settings import TOLERANCE, prior_blocks
+from tracker.estimation.by_frame.frame_problem import prior_blocks
+from tracker.estimation.by_frame.settings import TOLERANCE
 from tracker.estimation.contour.paper import paper_settings
 from tracker.estimation.contour.paper_fit import (
     FitIteration,

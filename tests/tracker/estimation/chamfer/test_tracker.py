@@ -6,12 +6,12 @@ from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_eviden
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.prediction import PredictSettings
+from tracker.body.motion.velocity import PredictSettings
 from tracker.estimation.chamfer.settings import TrackSettings, pose_cost, search_frame
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.search import chamfer_cost
 from tracker.estimation.search.best_first import SearchSettings
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.contours import occluding_contours
@@ -384,8 +384,12 @@ def test_contours_are_traced_once_per_pose(gavrila, monkeypatch, segments):
     truth = dancing(gavrila, 3)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
     predicted, found, scored = [], [], []
-    trace, trace_views, score = (occluding_contours.trace, chamfer_cost.ChamferCost._traced, chamfer_cost.score_traced)
-    monkeypatch.setattr(occluding_contours, "trace", lambda *a: predicted.append(a) or trace(*a))
+    trace, trace_views, score = (
+        occluding_contours.trace_surfaces,
+        chamfer_cost.ChamferCost._traced,
+        chamfer_cost.score_traced,
+    )
+    monkeypatch.setattr(occluding_contours, "trace_surfaces", lambda *a: predicted.append(a) or trace(*a))
     monkeypatch.setattr(chamfer_cost.ChamferCost, "_traced", lambda *a: found.append(a) or trace_views(*a))
     monkeypatch.setattr(chamfer_cost, "score_traced", lambda *a: scored.append(a) or score(*a))
     for estimate in track(Shown(views), [gavrila], truth[:1], range(3), TrackSettings(segments=segments)):
