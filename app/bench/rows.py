@@ -268,7 +268,7 @@ def evolution(cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
         strategy = cma.CMAEvolutionStrategy(np.zeros(model.n_dofs), 1.0, options)
         while not strategy.stop():
             asked = strategy.ask()
-            poses = np.stack([model.clip(model.retract(start, sigma * step)) for step in asked])
+            poses = np.stack([model.move(start, sigma * step) for step in asked])
             strategy.tell(asked, cost.of_person(0, poses, [start])[0])
         return float(strategy.result.fbest)
 

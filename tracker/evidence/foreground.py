@@ -136,7 +136,7 @@ class Foreground:
         is_restricted = changes is not None or with_static_edges
         edges = detect_edges(smooth, levels(prepared.strengths, is_restricted), foreground)
         segments, samples = link_and_sample(edges.found, edges.gradients, settings.max_segment_px)
-        silhouette = None if changes is None else silhouette_evidence(changes, edges, filmed)
+        silhouette = None if changes is None else silhouette_evidence(changes, edges, filmed.size)
         return RegionFeatures(camera, scale, box[:2], filmed.size, edges.found, segments, samples, smooth, silhouette)
 
     def _changes(self, prepared: Prepared, smooth: Image, box: Region) -> Changes | None:

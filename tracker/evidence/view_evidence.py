@@ -131,7 +131,7 @@ class ViewEvidence:
     @property
     def theta_px(self) -> float:
         """Outlier distance, working px: beyond it an edge does not count. It follows the size of the whole image."""
-        return _theta_px(self.image_size or self.camera.size)
+        return default_theta_px(self.image_size or self.camera.size)
 
     def outlier_px(self, theta_px: float | None) -> float:
         """Convert an outlier distance from px of the footage to working px; None gives `theta_px` of the view."""
@@ -152,22 +152,18 @@ def outliers_px(views: Sequence[ViewEvidence], theta_px: float | None) -> Array:
     return np.array([v.outlier_px(theta_px) for v in views])
 
 
-def default_theta_px(camera: Camera) -> float:
-    """Return the outlier distance of a camera: 3% of the longer side of its image (20 px at 640x480)."""
-    return _theta_px(camera.size)
-
-
-def _theta_px(size: tuple[int, int]) -> float:
+def default_theta_px(size: tuple[int, int]) -> float:
+    """Return the outlier distance of an image of a size, px: 3% of its longer side (20 px at 640x480)."""
     return 0.03 * max(size)
 
 
-def silhouette_evidence(changes: Changes, edges: Edges, filmed: Camera) -> Silhouette:
+def silhouette_evidence(changes: Changes, edges: Edges, size: tuple[int, int]) -> Silhouette:
     """Build the evidence of a silhouette. Next to unknown pixels it has no contour, and among them no outside.
 
     Args:
         changes: the silhouette in a region.
         edges: edges of the same region.
-        filmed: camera of the footage at working scale; distances to the contour end at twice its outlier distance.
+        size: of the footage at working scale, px; distances to the contour end at twice its outlier distance.
     """
     inside, contour = changes.inside, trace_silhouette(changes.inside)
     if changes.unknown is not None:
@@ -175,7 +171,7 @@ def silhouette_evidence(changes: Changes, edges: Edges, filmed: Camera) -> Silho
     first = thin_points(contour.points_px, *inside.shape)
     trust = contour_trust(contour, inside, edges)
     return Silhouette(
-        inside, contour.points_px[first], contour.normals[first], trust, contour, 2 * default_theta_px(filmed)
+        inside, contour.points_px[first], contour.normals[first], trust, contour, 2 * default_theta_px(size)
     )
 
 
@@ -221,7 +217,7 @@ def select_evidence(
     segments, samples, theta = (
         features.segments,
         features.samples,
-        _theta_px(features.image_size or features.camera.size),
+        default_theta_px(features.image_size or features.camera.size),
     )
     chosen = is_static = None
     if segments is not None:

@@ -8,7 +8,7 @@ from tracker.body.model import BodyModel
 from tracker.estimation.runs.path_assessment import RunPose
 from tracker.geometry.arrays import Array
 from tracker.pipeline.assessed_poses import assessed_by_run
-from tracker.pipeline.tracked_changes import number
+from tracker.pipeline.tracked_changes import numbers
 from tracker.session.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 
 
@@ -31,7 +31,7 @@ def estimated_row(
         before,
         values=found.pose,
         model_revision=revision,
-        part_costs_px=tuple(number(c) for c in found.part_costs_px),
+        part_costs_px=numbers(found.part_costs_px),
         trace=(*(x for x in before.trace or () if x.kind != "path"), *searches),
     )
     return assessed_by_run(model, pose, found)

@@ -73,7 +73,7 @@ def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) 
     coefficients = np.linalg.lstsq(np.vander(times, order + 1), steps, rcond=None)[0]
     step = coefficients.sum(axis=0)  # the polynomial at time 1
     bound = np.where(model.dof_is_length, settings.bound_m, settings.bound_rad)
-    return model.clip(model.retract(last, np.clip(step, -bound, bound)))
+    return model.move(last, np.clip(step, -bound, bound))
 
 
 class _EulerJoint(NamedTuple):

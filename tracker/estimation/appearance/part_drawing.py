@@ -64,10 +64,11 @@ def draw(meshes: Meshes, P: Array, Ts_world_part: Array, height: int, width: int
     return canvas
 
 
-def draw_bodies(bodies: Sequence[PosedBody], view: CellView) -> Canvas:
-    """Draw all bodies into a view, where they are at the time of its picture."""
-    meshes, then = meshes_of(tuple(b.model for b in bodies)), ahead(bodies, view.ahead_frames)
-    return draw(meshes, view.camera.projection, part_poses(then), *view.colors.shape[:2])
+def draw_bodies(bodies: Sequence[PosedBody], views: Sequence[CellView]) -> list[Canvas]:
+    """Draw all bodies into views, where they are at the time of each picture."""
+    meshes = meshes_of(tuple(b.model for b in bodies))
+    poses = {time: part_poses(ahead(bodies, time)) for time in {v.ahead_frames for v in views}}
+    return [draw(meshes, v.camera.projection, poses[v.ahead_frames], *v.colors.shape[:2]) for v in views]
 
 
 def grown(canvas: Canvas, margin: float) -> Mask:

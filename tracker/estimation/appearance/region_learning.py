@@ -58,11 +58,8 @@ class _Shown(NamedTuple):
     canvas: Canvas
     background: FloatArray
     """Log density of the colour of each cell as background, (h, w)."""
-
-    @property
-    def share(self) -> float:
-        """See `sample_share`."""
-        return sample_share(self.cells.camera)
+    share: float
+    """See `sample_share`."""
 
 
 def learning_frames(frames: Sequence[int]) -> list[int]:
@@ -87,9 +84,10 @@ def learn_regions(
 
     def of_view(i: int) -> tuple[BackgroundDensity, list[_Shown]]:
         cells = [(k, cells_of(f.views[i])) for k, f in enumerate(frames)]
-        drawn = [(k, c, draw_bodies(frames[k].bodies, c)) for k, c in cells if c is not None]
+        drawn = [(k, c, draw_bodies(frames[k].bodies, [c])[0]) for k, c in cells if c is not None]
         known = _background(cameras[i], drawn, empty[i] if empty else None)
-        return known, [_Shown(k, i, c, canvas, background_of(known, c, canvas)) for k, c, canvas in drawn]
+        shown = [(k, i, c, canvas, background_of(known, c, canvas)) for k, c, canvas in drawn]
+        return known, [_Shown(*s, sample_share(s[2].camera)) for s in shown]
 
     backgrounds, of_views = zip(*map_parallel(of_view, range(len(cameras))), strict=True)
     shown = [s for of_view in of_views for s in of_view]
@@ -143,8 +141,9 @@ def _calibrated(
 ) -> RegionTables:
     """Return tables with T."""
     under, around = np.zeros(tables.trust.shape), np.zeros(tables.trust.shape)
+    by_view = tables.by_view()
     for s in shown:
-        own = tables.of_view(s.view)
+        own = by_view[s.view]
         count_ratios(s.cells.colors, s.canvas, s.share, s.background, own, weights[s.frame], under[s.view])
         reach = REACH_M * s.cells.camera.K[0, 0]
         count_ratios_around(s.cells.colors, s.canvas, s.share, s.background, own, reach, around[s.view])
@@ -168,8 +167,9 @@ def _with_prior(counts: Array, of_body: IntArray) -> Array:
 def _agreement(models: Sequence[BodyModel], tables: RegionTables, shown: Sequence[_Shown], n_frames: int) -> Array:
     """Return the weight of each part on each frame, (T, P), which falls with the distance from the usual evidence."""
     nats, samples = np.zeros((2, n_frames, tables.trust.shape[1]))
+    by_view = tables.by_view()
     for s in shown:
-        own = tables.of_view(s.view)
+        own = by_view[s.view]
         add_score(s.cells.colors, s.canvas, s.share, s.background, own, nats[s.frame], samples[s.frame])
     rates = nats / np.maximum(samples, TINY)
     best = usual(rates, models)

@@ -8,6 +8,7 @@ that view for that part. No rule states what is a shadow, a ghost, or a bystande
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +61,11 @@ class RegionModel:
     tables: RegionTables
     """Tables of all views: (V, P, ...)."""
 
+    @cached_property
+    def by_view(self) -> tuple[RegionTables, ...]:
+        """Tables of each view."""
+        return self.tables.by_view()
+
     def frame(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> RegionFrame:
         """Return what region evidence needs of a frame.
 
@@ -72,31 +78,23 @@ class RegionModel:
             cells = cells_of(views[i])
             if cells is None:
                 return None, np.zeros((0, 0), np.float32)
-            return cells, background_of(self.backgrounds[i], cells, draw_bodies(bodies, cells))
+            return cells, background_of(self.backgrounds[i], cells, *draw_bodies(bodies, [cells]))
 
         cells, background = zip(*map_parallel(of_view, range(len(views))), strict=True)
         return RegionFrame(cells, background)
 
     def nats(self, frame: RegionFrame, bodies: Sequence[PosedBody]) -> float:
-        """Return the sum of `score(...).nats`, in less time."""
-        return float(self._parts(frame, self._draw(frame, bodies))[0].sum())
+        """Return the sum of `score(...).nats`."""
+        return float(self.score(frame, bodies).nats.sum())
 
     def score(self, frame: RegionFrame, bodies: Sequence[PosedBody]) -> RegionScore:
         """Return the evidence of each part in each view, for bodies of the models that were learnt."""
-        return RegionScore(*self._parts(frame, self._draw(frame, bodies)))
-
-    @staticmethod
-    def _draw(frame: RegionFrame, bodies: Sequence[PosedBody]) -> list[Canvas | None]:
-        return [None if view is None else draw_bodies(bodies, view) for view in frame.views]
-
-    def _parts(self, frame: RegionFrame, drawn: Sequence[Canvas | None]) -> tuple[Array, Array]:
-        """Return the fields of a score."""
-        nats, samples = np.zeros((2, len(frame.views), self.tables.trust.shape[1]))
-        for i, (view, canvas) in enumerate(zip(frame.views, drawn, strict=True)):
-            if view is not None and canvas is not None:
-                at = view.colors, canvas, sample_share(view.camera), frame.background[i]
-                add_score(*at, self.tables.of_view(i), nats[i], samples[i])
-        return nats, samples
+        score = RegionScore(*np.zeros((2, len(frame.views), self.tables.trust.shape[1])))
+        shown = [(i, v) for i, v in enumerate(frame.views) if v is not None]
+        for (i, view), canvas in zip(shown, draw_bodies(bodies, [v for _, v in shown]), strict=True):
+            at = view.colors, canvas, sample_share(view.camera), frame.background[i]
+            add_score(*at, self.by_view[i], score.nats[i], score.samples[i])
+        return score
 
 
 def background_of(known: BackgroundDensity, view: CellView, canvas: Canvas) -> FloatArray:

@@ -44,6 +44,8 @@ class _View(NamedTuple):
     """Log density of the colour of each cell as background, (h, w)."""
     tables: RegionTables
     """Of the view."""
+    share: float
+    """See `sample_share`."""
     scratch: Scratch
     """For the pieces of its contours."""
 
@@ -72,7 +74,7 @@ class _RegionResiduals:
         camera, scratch, models = view.cells.camera, view.scratch, tuple(x.model for x in self.bodies)
         P, eye, surfaces = camera.projection, camera.center_world, surfaces_of(models)
         canvas = draw(meshes_of(models), P, Ts, *view.cells.colors.shape[:2])
-        place = view.cells.colors, canvas, sample_share(camera), view.background, view.tables
+        place = view.cells.colors, canvas, view.share, view.background, view.tables
         nats, samples = np.zeros((2, len(Ts)))
         add_score(*place, nats, samples)
         place_parts(Ts, surfaces, scratch.traced)
@@ -103,8 +105,8 @@ def region_residuals(known: RegionModel, frame: RegionFrame, bodies: Sequence[Po
         for i, v in shown:
             if v.ahead_frames == time:
                 room = contour_room([v.camera], len(bodies), _PIECE_CELLS)
-                tables = known.tables.of_view(i)
-                views.append(_View(v, frame.background[i], tables, scratch_buffer(surfaces, room, 0)))
+                scratch = scratch_buffer(surfaces, room, 0)
+                views.append(_View(v, frame.background[i], known.by_view[i], sample_share(v.camera), scratch))
         own = _RegionResiduals(views, ahead(bodies, time), person)
         blocks.append(at_time(own, bodies[person].velocity, time))
     return SummedBlocks(blocks)

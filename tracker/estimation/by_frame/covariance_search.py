@@ -76,7 +76,7 @@ def _samples(model: BodyModel, pose: Array, scorer: PoseScorer, sigma: Array, dr
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))
     steps[:, free] = _SCALE * np.linalg.solve(factor.T, _normal_samples(_N_SAMPLES, len(free), draw).T).T
-    return [model.clip(model.retract(pose, step)) for step in steps]
+    return [model.move(pose, step) for step in steps]
 
 
 @lru_cache(maxsize=8)

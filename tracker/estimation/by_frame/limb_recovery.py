@@ -159,7 +159,7 @@ def _put(Ts: Array, parts: IntArray, points: Array, places: Array) -> None:
 def with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:
     """Return a pose, (n_values,), with the limb of another."""
     change = np.where(limb.dofs, model.difference(other, values), 0.0)
-    return model.clip(model.retract(values, change))
+    return model.move(values, change)
 
 
 def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSettings) -> Array:
@@ -212,4 +212,4 @@ def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Arra
         return out
     changes = np.zeros((len(poses), model.n_dofs))
     changes[:, dofs] = steps
-    return np.array([model.clip(model.retract(pose, change)) for pose, change in zip(poses, changes, strict=True)])
+    return np.array([model.move(pose, change) for pose, change in zip(poses, changes, strict=True)])

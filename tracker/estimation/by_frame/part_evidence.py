@@ -191,7 +191,7 @@ def _outside(view: ViewEvidence, bodies: Sequence[PosedBody]) -> Array:
     n, silhouette, cells = sum(len(b.model.parts) for b in bodies), view.silhouette, cells_of(view)
     if silhouette is None or cells is None:
         return np.full(n, np.nan)
-    labels = draw_bodies(bodies, cells).labels.ravel()
+    labels = draw_bodies(bodies, [cells])[0].labels.ravel()
     inside = cells_of(with_colors_only(view, np.repeat(np.uint8(255) * silhouette.inside[..., None], 3, axis=2)))
     assert inside is not None  # of the same region
     total = np.bincount(labels, minlength=n + 1)[1:].astype(np.float64)

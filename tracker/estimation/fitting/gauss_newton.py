@@ -97,13 +97,9 @@ class PointTargets:
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        parts, points_world = model.point_parts[self.points], model.points_at(kinematics, self.points)
-        if self.centers and model.center_offsets.any():
-            parts = np.where(model.center_offsets[self.points].any(axis=1), model.proximal_parts[self.points], parts)
-            points_world = model.joint_centers_at(kinematics, self.points)
-        J = model.point_jacobian(kinematics, parts, points_world) * self.weights[:, None, None]
-        r = (points_world - self.targets_world) * self.weights[:, None]
-        return normal_equations(r.ravel(), J.reshape(-1, model.n_dofs))
+        places, J = model.points_with_jacobian(kinematics, self.points, self.centers)
+        r = (places - self.targets_world) * self.weights[:, None]
+        return normal_equations(r.ravel(), (J * self.weights[:, None, None]).reshape(-1, model.n_dofs))
 
     def residuals(self, model: BodyModel, kinematics: Kinematics) -> tuple[Array, Array]:
         """Return the weighted residuals, (N, 3), and their derivatives by the points, (N, 3, 3), per metre."""
@@ -224,7 +220,7 @@ def iterate(
             worth = -(g + 0.5 * H @ step) @ step > gain
             change = np.zeros(model.n_dofs)
             change[active] = step
-            trial = np.where(is_locked, start, model.clip(model.retract(pose, change)))
+            trial = np.where(is_locked, start, model.move(pose, change))
             moved = float(np.abs(model.difference(trial, pose)).max())
             there = _sum(model, trial, blocks) if worth else here
             if there.cost < here.cost or not worth or moved < tolerance or damping > DAMPING.most:

@@ -23,7 +23,7 @@ def continued(model: BodyModel, before: Array | None, here: Array) -> list[Propo
     poses = [here]
     if before is not None:
         step = model.difference(here, nearest_equivalent(model, before, here, None))
-        poses.append(model.clip(model.retract(here, step)))
+        poses.append(model.move(here, step))
     return [Proposal(pose, "neighbour") for pose in poses]
 
 

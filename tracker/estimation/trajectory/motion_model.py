@@ -59,9 +59,10 @@ class MotionPoints:
         Ts = kinematics.Ts_world_part[self.parts]
         return np.asarray(np.einsum("pij,pj->pi", Ts[:, :3, :3], self.points_part) + Ts[:, :3, 3])
 
-    def jacobian(self, kinematics: Kinematics, points_world: Array) -> Array:
-        """Return the derivatives of their places, (3 P, n_dofs), metres per rad or metre."""
-        return self.model.point_jacobian(kinematics, self.parts, points_world).reshape(-1, self.model.n_dofs)
+    def linearized(self, kinematics: Kinematics) -> tuple[Array, Array]:
+        """Return their places, see `at`, and the derivatives of these, (3 P, n_dofs), metres per rad or metre."""
+        places = self.at(kinematics)
+        return places, self.model.point_jacobian(kinematics, self.parts, places).reshape(-1, self.model.n_dofs)
 
 
 @lru_cache(maxsize=16)

@@ -133,8 +133,8 @@ class _Solver:
 
     def _within_limits(self, poses: Iterable[Array], before: Sequence[Array]) -> list[Array]:
         """Return poses within the limits, with fixed and locked ones as before."""
-        clip, at = self.path.model.clip, zip(poses, before, self.fixed, strict=True)
-        return [old if fixed else np.where(self.locked_values, old, clip(pose)) for pose, old, fixed in at]
+        at = zip(self.path.model.clip(np.array([*poses])), before, self.fixed, strict=True)
+        return [old if fixed else np.where(self.locked_values, old, pose) for pose, old, fixed in at]
 
     def read(self, t: int) -> None:
         """Read the evidence of the next frame, given by its place in the path."""
@@ -237,8 +237,7 @@ class _Solver:
             return self._evidence(t, poses[t], kinematics[t], None if before is None else before.frames[t])
 
         frames, equations = zip(*map_parallel(of_frame, range(T)), strict=True)
-        places = np.array([self.points.at(k) for k in kinematics])
-        jacobians = np.array([self.points.jacobian(*at) for at in zip(kinematics, places, strict=True)])
+        places, jacobians = map(np.array, zip(*map(self.points.linearized, kinematics), strict=True))
         gradient = np.array([e.gradient for e in equations])
         hessian = np.zeros((3, T, model.n_dofs, model.n_dofs))
         hessian[0] = [e.hessian for e in equations]

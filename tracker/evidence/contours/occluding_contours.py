@@ -71,7 +71,12 @@ def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_P
 def trace_views(bodies: Sequence[PosedBody], cameras: Sequence[Camera], times: Sequence[float]) -> list[Contour]:
     """Trace the contours of all bodies in several views, (V,), whose pictures are later than the frame; see `ahead`."""
     surfaces, poses = surfaces_of(tuple(b.model for b in bodies)), {t: part_poses(ahead(bodies, t)) for t in {*times}}
-    return [trace_surfaces(surfaces, poses[t], c, PIECE_PX) for c, t in zip(cameras, times, strict=True)]
+    pieces = piece_buffer(surfaces, contour_room([c.pinhole for c in cameras], len(bodies)))
+    out = []
+    for camera, time in zip(cameras, times, strict=True):
+        place_parts(poses[time], surfaces, pieces)
+        out.append(_traced(surfaces, camera, PIECE_PX, pieces))
+    return out
 
 
 def trace_surfaces(surfaces: Surfaces, Ts_world_part: Array, camera: Camera, piece_px: float) -> Contour:
@@ -79,6 +84,11 @@ def trace_surfaces(surfaces: Surfaces, Ts_world_part: Array, camera: Camera, pie
     n_bodies = int(surfaces.people.max()) + 1
     pieces = piece_buffer(surfaces, contour_room([camera.pinhole], n_bodies, piece_px))
     place_parts(Ts_world_part, surfaces, pieces)
+    return _traced(surfaces, camera, piece_px, pieces)
+
+
+def _traced(surfaces: Surfaces, camera: Camera, piece_px: float, pieces: Pieces) -> Contour:
+    """Return the contours of placed parts in a view."""
     n = trace_pieces(camera.projection, camera.center_world, surfaces, float(piece_px), pieces)
     out = contour_buffer(n)
     store_contour(pieces, out)

@@ -126,7 +126,7 @@ def fit_from_guess(scene: Scene, seed: int = 0) -> tuple[tuple[RoughStep, ...], 
     """
     model, truth, rng = scene.model, scene.truth[0], np.random.default_rng([seed, 9])
     step = np.where(model.dof_is_length, ROUGH_M, ROUGH_RAD) * rng.normal(size=model.n_dofs)
-    start, settings = model.clip(model.retract(truth, step)), paper_settings("edges")
+    start, settings = model.move(truth, step), paper_settings("edges")
     observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
     unlimited = unlimited_views(observer.evidence(0), settings)
     residuals = paper_residuals(unlimited, [PosedBody(model, start)], 0, settings)

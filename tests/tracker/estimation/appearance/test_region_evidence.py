@@ -29,7 +29,7 @@ def plain_score(known, frame, bodies):
     nats, samples = np.zeros((2, *known.tables.trust.shape[:2]))
     for i, view in enumerate(frame.views):
         labels = part_labels(bodies, view.camera)
-        nearness = draw_bodies(bodies, view).nearness
+        nearness = draw_bodies(bodies, [view])[0].nearness
         for v, u in np.argwhere((labels > 0) & (nearness > 0)):
             p = labels[v, u] - 1
             r, g, b = view.colors[v, u].astype(int) * BINS // 256

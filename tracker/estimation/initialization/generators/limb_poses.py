@@ -67,7 +67,7 @@ def _within_limits(model: BodyModel, limb: Limb) -> Array:
     held = np.isfinite(model.spreads[dofs])
     steps[:, held] = _HELD * normal[:, held] * model.spreads[dofs][held]
     changes = _of_dofs(model, dofs, steps)
-    return changes[~_in_trunk(model, limb, model.clip(model.retract(model.neutral(), changes)))]
+    return changes[~_in_trunk(model, limb, model.move(model.neutral(), changes))]
 
 
 def _kind(limb: Limb) -> str:
