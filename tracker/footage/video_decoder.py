@@ -145,11 +145,6 @@ class PassedFrames:
         """Return the frame with a time stamp if it is kept."""
         return self._frames.get(pts, (None, 0))[0]
 
-    def clear(self) -> None:
-        """Discard all frames."""
-        self._frames.clear()
-        self.n_bytes = 0
-
     def _discard(self, pts: int) -> None:
         _, n_bytes = self._frames.pop(pts, (None, 0))
         self.n_bytes -= n_bytes

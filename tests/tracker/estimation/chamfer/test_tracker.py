@@ -383,18 +383,13 @@ def test_contours_are_traced_once_per_pose(gavrila, monkeypatch, segments):
     """Those of the prediction and those of the result, in each view; the cost of the result traces nothing."""
     truth = dancing(gavrila, 3)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
-    predicted, found, scored = [], [], []
-    trace, trace_views, score = (
-        occluding_contours.trace_surfaces,
-        chamfer_cost.ChamferCost._traced,
-        chamfer_cost.score_traced,
-    )
-    monkeypatch.setattr(occluding_contours, "trace_surfaces", lambda *a: predicted.append(a) or trace(*a))
-    monkeypatch.setattr(chamfer_cost.ChamferCost, "_traced", lambda *a: found.append(a) or trace_views(*a))
+    traced, scored = [], []
+    trace, score = occluding_contours.trace_pieces, chamfer_cost.score_traced
+    monkeypatch.setattr(occluding_contours, "trace_pieces", lambda *a: traced.append(a) or trace(*a))
     monkeypatch.setattr(chamfer_cost, "score_traced", lambda *a: scored.append(a) or score(*a))
     for estimate in track(Shown(views), [gavrila], truth[:1], range(3), TrackSettings(segments=segments)):
         assert estimate.statuses == ("good",)
-        assert (len(predicted), len(found), len(scored)) == (3, 1, 1)  # of three views, at one and all at once
+        assert (len(traced), len(scored)) == (3 + 3, 1)
         assert len(scored[0][0].firsts) == 3 + 1  # it is given the contours of all views
-        for calls in (predicted, found, scored):
-            calls.clear()
+        traced.clear()
+        scored.clear()
