@@ -200,10 +200,9 @@ def _estimate(
 ) -> None:  # fmt: skip
     """Estimate the poses of a few frames together, and search a limb on one."""
     from tracker.body.limbs import limbs
-    from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions
+    from tracker.estimation.appearance.region_model import LearningFrame, learn_regions
     from tracker.estimation.by_frame.limb_recovery import search_limbs
-    from tracker.estimation.by_frame.pose_score import common_evidence
-    from tracker.estimation.by_frame.region_scorer import FrameEvidence
+    from tracker.estimation.by_frame.pose_score import FrameEvidence, common_evidence
     from tracker.estimation.runs.frame_hypotheses import FrameHypotheses
     from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
     from tracker.estimation.tracking.tracker import Subjects

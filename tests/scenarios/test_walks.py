@@ -1,17 +1,12 @@
-"""The walks of docs/architecture.md: each call is made, in the order in which the table has them; a frame's is short."""
+"""The walks of docs/architecture.md: each call is made, in the order in which the table has them."""
 
 import pytest
-from tracking_runs import track
+from tracking_runs import track, with_reference
 from walks import traced
 
 import quadrille
-from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.fitting.gauss_newton import fit_to_points
-from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import open_observer
-from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
-from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import save_model
 from tracker.simulate import Simulation, simulate
 
@@ -33,14 +28,10 @@ def test_people_are_found_and_tracked_as_the_documents_say(tmp_path):
 
 @pytest.mark.slow
 def test_a_tracked_frame_passes_few_files(data_folder, tmp_path):
-    folder, frames = data_folder("walk"), []
-    videos, sides = sorted(folder.glob("*.mp4")), {"background": folder / "background", "masks": folder / "masks"}
-    session = assemble(NewSession(tmp_path / "s", folder / "Calib.toml", videos, heights=1.75, **sides))
-    model, reference = session.people[0].model, read_joints(folder / "ground_truth.trc", session.fps)
-    places = dict(zip(reference.names, reference.points[0], strict=True))
-    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
+    sides, frames = ("background", "masks"), []
+    session, _, start = with_reference(data_folder("walk"), tmp_path / "s", sides=sides, heights=1.75)
     with traced() as walk, open_observer(session.cameras) as observer:
-        steps = iter(track(observer, [model], [start], range(9), TrackSettings()))
+        steps = iter(track(observer, [session.people[0].model], [start], range(9)))
         for _ in range(9):
             with walk.counted() as crossings:
                 next(steps)

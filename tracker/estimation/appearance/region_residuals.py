@@ -16,8 +16,7 @@ import numpy as np
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody, ahead, parts_of
-from tracker.estimation.appearance.part_drawing import draw, meshes_of
-from tracker.estimation.appearance.region_cells import CELL_PX, CellView
+from tracker.estimation.appearance.part_drawing import CELL_PX, CellView, draw, meshes_of
 from tracker.estimation.appearance.region_kernels import RegionTables, add_score
 from tracker.estimation.appearance.region_model import RegionFrame, RegionModel, sample_share
 from tracker.estimation.appearance.region_residual_kernels import add_depth_forces, add_region_pulls

@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.progress import Report, unreported
-from tracker.estimation.appearance.part_drawing import draw_bodies
-from tracker.estimation.appearance.region_cells import cells_of
-from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions
-from tracker.estimation.appearance.region_model import RegionModel, RegionScore
+from tracker.estimation.appearance.part_drawing import cells_of, draw_bodies
+from tracker.estimation.appearance.region_model import LearningFrame, RegionModel, RegionScore, learn_regions
 from tracker.estimation.by_frame.frame_problem import Bodies
 from tracker.estimation.fitting.clocked_residuals import person_residuals
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS

@@ -11,8 +11,13 @@ from tracker.compute.threads import kernel_pool
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.appearance.region_residuals import region_residuals
 from tracker.estimation.by_frame.frame_problem import Bodies, trust, with_body
-from tracker.estimation.by_frame.pose_score import PoseScorer, without_prediction
-from tracker.estimation.by_frame.region_scorer import FrameEvidence, RegionScorer, with_regions
+from tracker.estimation.by_frame.pose_score import (
+    FrameEvidence,
+    PoseScorer,
+    RegionScorer,
+    with_regions,
+    without_prediction,
+)
 from tracker.estimation.by_frame.settings import OWN_TRUST, EstimationSettings, RecoverSettings
 from tracker.estimation.fitting.contour_residuals import PartCosts
 from tracker.estimation.fitting.gauss_newton import ResidualBlock, with_locked_dofs

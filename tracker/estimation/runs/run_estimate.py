@@ -15,11 +15,9 @@ import numpy as np
 from tracker.body.model import PosedBody
 from tracker.body.motion.velocity import moving_bodies
 from tracker.compute.progress import mapped
-from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions, learning_frames
-from tracker.estimation.appearance.region_model import RegionModel
+from tracker.estimation.appearance.region_model import LearningFrame, RegionModel, learn_regions, learning_frames
 from tracker.estimation.by_frame.frame_problem import Bodies, with_body
-from tracker.estimation.by_frame.pose_score import common_evidence
-from tracker.estimation.by_frame.region_scorer import FrameEvidence
+from tracker.estimation.by_frame.pose_score import FrameEvidence, common_evidence
 from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.fitting.limb_exchange import turned_round
 from tracker.estimation.runs.facing import KNOWN, Facing, turning_nats

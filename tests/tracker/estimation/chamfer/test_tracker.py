@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid, view_evidence
-from tracking_runs import track
+from tracking_runs import track, with_reference
 
 from tracker.body.model import PosedBody
 from tracker.body.motion.velocity import PredictSettings
@@ -17,7 +17,6 @@ from tracker.evaluation.references import read_joints
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.observer import Observer, open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 
 COARSE = TrackSettings(
@@ -337,21 +336,11 @@ def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypa
 @pytest.mark.slow
 def test_a_real_recording(data_folder, tmp_path):
     """Three frames of a cluttered room from the reference's pose, as `init --method joints` sets it."""
-    folder = data_folder("balance_real")
-    session = assemble(
-        NewSession(
-            tmp_path / "s",
-            calibration=folder / "Calib.toml",
-            videos=sorted(folder.glob("*.mp4")),
-            background=folder / "background",
-        )
-    )
+    joints, sides = "reference_joints.trc", ("background",)
+    session, reference, start = with_reference(data_folder("balance_real"), tmp_path / "s", joints, sides)
     model = session.people[0].model
-    reference = read_joints(folder / "reference_joints.trc", session.fps)
-    places = dict(zip(reference.names, reference.points[0], strict=True))
-    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS})
     with open_observer(session.cameras) as observer:
-        found = list(track(observer, [model], [start.pose], range(3), TrackSettings()))
+        found = list(track(observer, [model], [start], range(3), TrackSettings()))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, range(3))
     assert errors.mpjpe_mm < 90
@@ -361,14 +350,8 @@ def test_a_real_recording(data_folder, tmp_path):
 @pytest.mark.slow
 def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folder, tmp_path):
     """Without a background: an arm swings before a patterned picture and along a skirting board."""
-    folder = data_folder("walk")
-    session = assemble(
-        NewSession(tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75)
-    )
+    session, reference, start = with_reference(data_folder("walk"), tmp_path / "s", heights=1.75)
     model, frames = session.people[0].model, range(12)
-    reference = read_joints(folder / "ground_truth.trc", session.fps)
-    places = dict(zip(reference.names, reference.points[0], strict=True))
-    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
     with open_observer(session.cameras) as observer:
         found = list(track(observer, [model], [start], frames, TrackSettings(), keyframes={0: {0: start}}))
     poses = {f.frame: f.poses[0] for f in found}

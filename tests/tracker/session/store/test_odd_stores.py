@@ -12,7 +12,7 @@ import pytest
 from damage import altered, old_store, written_store
 
 from tracker.errors import DamagedStoreError
-from tracker.session.store import checksums, definitions, query_limit, schema
+from tracker.session.store import checksums, definitions, schema, verification
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.connection import Connection
 from tracker.session.store.edit_tree import now
@@ -261,7 +261,7 @@ def test_each_day_of_the_calendar_is_a_time():
 
 @pytest.mark.slow
 def test_a_query_without_end_is_stopped(path, monkeypatch):
-    monkeypatch.setattr(query_limit, "_FREE_STEPS", 1_000_000)
+    monkeypatch.setattr(verification, "_FREE_STEPS", 1_000_000)
     with closing(Connection(path, read_only=True)) as connection:
         endless = "WITH RECURSIVE n (k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT count(*) FROM n"
         with pytest.raises(DamagedStoreError, match="a query took more steps than its rows can need"):
@@ -273,14 +273,14 @@ def test_a_signal_ends_a_long_query(path, monkeypatch):
     def stop():
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(query_limit, "_FREE_STEPS", 0)
-    with closing(sqlite3.connect(path)) as db, pytest.raises(KeyboardInterrupt), query_limit.limited(db, stop):
+    monkeypatch.setattr(verification, "_FREE_STEPS", 0)
+    with closing(sqlite3.connect(path)) as db, pytest.raises(KeyboardInterrupt), verification.limited(db, stop):
         db.execute("WITH RECURSIVE n (k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT count(*) FROM n").fetchall()
 
 
 @pytest.mark.parametrize("n_frames", [300])
 def test_queries_of_the_program_stay_far_below_the_limit(path, n_frames, monkeypatch):
     """A tenth of the steps per byte, and none for free, are enough to check and read a store."""
-    monkeypatch.setattr(query_limit, "_FREE_STEPS", 0)
-    monkeypatch.setattr(query_limit, "_STEPS_PER_BYTE", query_limit._STEPS_PER_BYTE / 10)
+    monkeypatch.setattr(verification, "_FREE_STEPS", 0)
+    monkeypatch.setattr(verification, "_STEPS_PER_BYTE", verification._STEPS_PER_BYTE / 10)
     read_all(path)
