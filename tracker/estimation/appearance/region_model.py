@@ -19,7 +19,7 @@ from tracker.compute.sampling import spread_indices
 from tracker.compute.threads import map_parallel
 from tracker.estimation.appearance.background_density import BackgroundDensity, learn_background
 from tracker.estimation.appearance.color_shares import log_density
-from tracker.estimation.appearance.part_colors import MAX_NATS
+from tracker.estimation.appearance.part_colors import MAX_NATS, counterparts
 from tracker.estimation.appearance.part_drawing import (
     CELL_PX,
     Canvas,
@@ -29,7 +29,7 @@ from tracker.estimation.appearance.part_drawing import (
     draw_bodies,
     grown,
 )
-from tracker.estimation.appearance.region_deficit import counterparts, usual
+from tracker.estimation.appearance.region_deficit import usual
 from tracker.estimation.appearance.region_kernels import (
     N_RATIOS,
     RegionTables,

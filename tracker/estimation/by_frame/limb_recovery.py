@@ -18,13 +18,13 @@ from tracker.body.model import BodyModel
 from tracker.body.motion.velocity import nearest_equivalent
 from tracker.body.searches import Search, SearchKind
 from tracker.compute.jit import njit
+from tracker.compute.sampling import even_points
 from tracker.compute.threads import N_HELPERS, kernel_pool
 from tracker.estimation.by_frame.pose_score import PoseScorer
 from tracker.estimation.by_frame.settings import RecoverSettings
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
 from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
 from tracker.estimation.fitting.hypothesis import BEAM_NATS, CLEAR_NATS, SAME_POSE_M, Hypothesis, apart, distinct
-from tracker.estimation.search.even_points import even_points
 from tracker.geometry.arrays import Array, IntArray
 
 T = TypeVar("T")

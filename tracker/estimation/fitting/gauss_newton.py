@@ -238,11 +238,11 @@ def iterate(
 
 
 def with_locked_dofs(model: BodyModel, pose: Array, locked: Array, active_dofs: NDArray[np.bool_] | None) -> Array:
-    """Return a pose with the locked degrees of freedom of another pose.
+    """Return poses with the locked degrees of freedom of another pose.
 
     Args:
         model: the body.
-        pose: (n_values,).
+        pose: (..., n_values).
         locked: pose from which the locked degrees of freedom are taken, (n_values,).
         active_dofs: degrees of freedom that are not locked, (n_dofs,); None: all.
     """
@@ -363,7 +363,7 @@ def _sum(model: BodyModel, pose: Array, blocks: Sequence[ResidualBlock]) -> Norm
 
 
 def pressed_against_limit(model: BodyModel, pose: Array, gradient: Array) -> NDArray[np.bool_]:
-    """Return the degrees of freedom at a limit that descent would cross, (n_dofs,)."""
-    at = pose[model.dof_value]
+    """Return the degrees of freedom at a limit that descent would cross, of poses, (..., n_values), (..., n_dofs)."""
+    at = pose[..., model.dof_value]
     low, high = model.limits[:, 0], model.limits[:, 1]
     return ((at <= low + TINY) & (gradient > 0)) | ((at >= high - TINY) & (gradient < 0))

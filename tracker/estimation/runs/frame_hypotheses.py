@@ -170,7 +170,8 @@ class FrameHypotheses:
     def _with_locked_dofs(self, proposals: Sequence[Proposal]) -> list[Proposal]:
         """Return proposals with the locked degrees of freedom of the frame; a keyframe beside it may have others."""
         here, active = self.bodies[self.person].values, self._scorer.active_dofs
-        return [p._replace(pose=with_locked_dofs(self.model, p.pose, here, active)) for p in proposals]
+        poses = with_locked_dofs(self.model, np.array([p.pose for p in proposals]), here, active) if proposals else ()
+        return [p._replace(pose=pose) for p, pose in zip(proposals, poses, strict=True)]
 
     def _join(self, new: HypothesisSet) -> None:
         self._found = new if self._found is None else self._found.joined(new)

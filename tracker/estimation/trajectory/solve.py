@@ -277,8 +277,7 @@ class _Solver:
 
     def _held(self, here: _State) -> Mask:
         """Return the degrees of freedom that stay: locked ones, and those that press against a limit, (T, n_dofs)."""
-        pressed = [pressed_against_limit(self.path.model, *at) for at in zip(here.poses, here.gradient, strict=True)]
-        return self.locked | np.array(pressed)
+        return self.locked | pressed_against_limit(self.path.model, np.array(here.poses), here.gradient)
 
     def _held_equations(self, here: _State, held: Mask, damping: float) -> Array:
         blocks = np.array(here.hessian)
@@ -306,7 +305,7 @@ class _Solver:
             return self._evidence(t, poses[t], kinematics[t], None if before is None else before.frames[t])
 
         frames, equations = zip(*map_parallel(of_frame, range(T)), strict=True)
-        places, jacobians = map(np.array, zip(*map(self.points.linearized, kinematics), strict=True))
+        places, jacobians = self.points.linearized(kinematics)
         gradient = np.array([e.gradient for e in equations])
         hessian = np.zeros((3, T, model.n_dofs, model.n_dofs))
         hessian[0] = [e.hessian for e in equations]

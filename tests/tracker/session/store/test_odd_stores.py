@@ -12,7 +12,7 @@ import pytest
 from damage import altered, old_store, written_store
 
 from tracker.errors import DamagedStoreError
-from tracker.session.store import checksums, definitions, schema, verification
+from tracker.session.store import checksums, schema, verification
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.connection import Connection
 from tracker.session.store.edit_tree import now
@@ -81,14 +81,14 @@ def test_foreign_definitions_are_refused(path, foreign, read_only):
 def test_foreign_definitions_in_an_older_store(tmp_path, version):
     path = old_store(tmp_path / "annotations.sqlite", version)
     with closing(sqlite3.connect(path)) as db:
-        assert definitions.foreign_definition(db) is None
+        assert verification.foreign_definition(db) is None
     altered(path, "CREATE TRIGGER gone AFTER INSERT ON poses BEGIN DELETE FROM poses; END")
     with pytest.raises(DamagedStoreError, match="the trigger 'gone' is none of the program"):
         AnnotationStore(path)
 
 
 def test_the_words_of_the_program_define_tables_alone():
-    words, names = definitions._own_words()
+    words, names = verification._own_words()
     assert not words & {"SELECT", "CHECK", "DEFAULT", "AS", "GENERATED", "TRIGGER", "VIEW", "VIRTUAL", "COLLATE", "'"}
     assert names >= {*checksums.COLUMNS, "contents", "told"}
     assert all("CREATE" in text or "ALTER" in text or "INSERT" in text for text in schema.STATEMENTS if text.strip())

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb, limb_display_name, limbs
 from tracker.body.model import BodyModel
-from tracker.estimation.search.even_points import even_points
+from tracker.compute.sampling import even_points
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 
