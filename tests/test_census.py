@@ -8,14 +8,14 @@ import pytest
 from architecture import FILES, ROOT, nodes, trees
 from code_counts import code_lines, git, numbers, private_names, unexplained_rises
 
-MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 838, 200, 0
+MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 838, 199, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
-MAX_CODE_LINES = {"tracker": 49640, "app": 21007, "js": 14419, "css": 4189, "tests": 66707}
+MAX_CODE_LINES = {"tracker": 49571, "app": 21003, "js": 14419, "css": 4189, "tests": 66693}
 """Lines without blanks, comments and docstrings. Clocks, curves, the bar of a chain and calibration in the page raised
 them by what was not won back elsewhere; meshes, blurred faces and markers did, too, and one module of systems."""
 MAX_HIDDEN_SUBJECTS = 25
-MAX_PRIVATE = 207
+MAX_PRIVATE = 203
 """Uses of private names in tests: a test goes through the public surface where that shows the same."""
 HIDDEN_SUBJECT = re.compile(r"(?:^|(?<=[.!?:])\s+)(?:What|Where|Who|Whose|Those|Nor)\b")
 COMMENT = re.compile(r"(?:^|[ \t])#.*", re.MULTILINE)

@@ -63,7 +63,7 @@ def acquisitions(frame: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
 def _off(frame: BenchFrame, pose: Array) -> Array:
     """Return a pose that is off by 1 cm and 3 degrees in every degree of freedom, as a tracked one."""
     model = frame.model
-    return np.asarray(model.clip(model.retract(pose, model.difference(frame.near_prediction(), frame.values))))
+    return np.asarray(model.move(pose, model.difference(frame.near_prediction(), frame.values)))
 
 
 def _off_m(frame: BenchFrame, body: PosedBody, k: int) -> float:

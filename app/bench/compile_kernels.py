@@ -186,8 +186,7 @@ def _track(
     cameras: Sequence[CameraSource], settings: "TrackSettings", models: Sequence[BodyModel], start: Sequence[Array]
 ) -> None:
     from tracker.estimation.chamfer.tracker import ChamferTracker
-    from tracker.estimation.tracking.subjects import Subjects
-    from tracker.estimation.tracking.tracker import TrackingRun
+    from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 
     with open_observer(cameras) as observer:
         run = TrackingRun(observer, Subjects.of(models), start, range(_FRAME, _FRAME + _FRAMES))
@@ -201,13 +200,12 @@ def _estimate(
 ) -> None:  # fmt: skip
     """Estimate the poses of a few frames together, and search a limb on one."""
     from tracker.body.limbs import limbs
-    from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions
+    from tracker.estimation.appearance.region_model import LearningFrame, learn_regions
     from tracker.estimation.by_frame.limb_recovery import search_limbs
-    from tracker.estimation.by_frame.pose_score import common_evidence
-    from tracker.estimation.by_frame.region_scorer import FrameEvidence
+    from tracker.estimation.by_frame.pose_score import FrameEvidence, common_evidence
     from tracker.estimation.runs.frame_hypotheses import FrameHypotheses
     from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
-    from tracker.estimation.tracking.subjects import Subjects
+    from tracker.estimation.tracking.tracker import Subjects
 
     bodies = tuple(PosedBody(m, pose) for m, pose in zip(models, poses, strict=True))
     with open_observer(cameras) as observer:

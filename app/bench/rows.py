@@ -18,8 +18,7 @@ from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, damped_step
 from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled
 from tracker.estimation.search.best_first import COARSE_SEARCH, SearchSettings, search
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackerSettings, TrackingRun
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.observer import open_observer
 from tracker.evidence.view_evidence import ViewEvidence
@@ -269,7 +268,7 @@ def evolution(cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
         strategy = cma.CMAEvolutionStrategy(np.zeros(model.n_dofs), 1.0, options)
         while not strategy.stop():
             asked = strategy.ask()
-            poses = np.stack([model.clip(model.retract(start, sigma * step)) for step in asked])
+            poses = np.stack([model.move(start, sigma * step) for step in asked])
             strategy.tell(asked, cost.of_person(0, poses, [start])[0])
         return float(strategy.result.fbest)
 

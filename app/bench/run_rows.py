@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import BenchFrame, pose_at
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.evidence.observer import open_observer
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import Leg, TrackSession

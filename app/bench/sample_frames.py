@@ -56,13 +56,13 @@ class BenchFrame:
         for name, amount in off.items():
             dof = self.model.dof_names.index(name)
             step[dof] = amount if self.model.dof_is_length[dof] else np.radians(amount)
-        return self.model.clip(self.model.retract(self.values, step))
+        return self.model.move(self.values, step)
 
     def near_prediction(self) -> Array:
         """Return a prediction as on a tracked frame: off by 1 cm and 3 degrees in every degree of freedom."""
         off = np.where(self.model.dof_is_length, 0.01, np.radians(3))
         signs = np.random.default_rng(_SEED).choice((-1.0, 1.0), self.model.n_dofs)
-        return self.model.clip(self.model.retract(self.values, off * signs))
+        return self.model.move(self.values, off * signs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def _spread(model: BodyModel, values: Array, n: int) -> Array:
     """Return poses spread by 10 degrees and 5 cm in every degree of freedom, (n, n_values)."""
     spread = np.where(model.dof_is_length, 0.05, np.radians(10))
     steps = spread * np.random.default_rng(_SEED).normal(size=(n, model.n_dofs))
-    return np.stack([model.clip(model.retract(values, step)) for step in steps])
+    return np.stack([model.move(values, step) for step in steps])
 
 
 def read_crowd(folder: Path, frame: int) -> BenchCrowd:

@@ -7,8 +7,7 @@ import numpy as np
 
 from app.bench.rows import Row, Yardstick, in_yardsticks
 from app.bench.sample_frames import FRAME, BenchFrame, pose_at
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.estimation.voxel.frame_estimator import VoxelEstimator
 from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.evidence.observer import Observer

@@ -9,7 +9,7 @@ from app.remedies import command_line_text
 from app.runtime.progress import Reporter, duration_text
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import Remedy
-from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
+from tracker.estimation.tracking.tracker import BackwardStep, PoseEstimate
 from tracker.pipeline.find_people import FINDING
 from tracker.pipeline.track_session import EstimateStep
 

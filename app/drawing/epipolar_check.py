@@ -7,7 +7,8 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import Camera, epipolar_segment
+from tracker.geometry.cameras import Camera
+from tracker.geometry.framing import epipolar_segment
 from tracker.geometry.triangulation import triangulate
 
 _NEAR_M = 0.3

@@ -7,7 +7,8 @@ from app.drawing.overlays import Path
 from app.state.floor_picking import Picking
 from app.state.state import State
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import Camera, epipolar_segment
+from tracker.geometry.cameras import Camera
+from tracker.geometry.framing import epipolar_segment
 from tracker.geometry.ground_plane import GroundPlane, up_rotation
 from tracker.session.session import Session
 

@@ -25,7 +25,8 @@ from tracker.evidence.contours.surfaces import surfaces_of
 from tracker.evidence.images.edge_segments import accept_segments
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray, IntArray, Mask
-from tracker.geometry.cameras import Camera, epipolar_segment
+from tracker.geometry.cameras import Camera
+from tracker.geometry.framing import epipolar_segment
 from tracker.interchange.observations.plans import MaskPlan
 from tracker.session.session import Person, Session
 

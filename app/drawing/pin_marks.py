@@ -9,7 +9,7 @@ from app.drawing.overlays import Path
 from app.drawing.seen_bodies import bodies_in
 from app.state.page_view import View
 from app.state.state import State, finite_or_none
-from tracker.geometry.cameras import epipolar_segment
+from tracker.geometry.framing import epipolar_segment
 from tracker.geometry.triangulation import PointObservation, triangulate
 from tracker.session.session import Session
 

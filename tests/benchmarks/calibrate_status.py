@@ -32,7 +32,7 @@ from tracker.estimation.acquisition.from_joints import height_from_joints, place
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.tracking import confidence
-from tracker.estimation.tracking.estimate import PoseEstimate
+from tracker.estimation.tracking.tracker import PoseEstimate
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import open_observer
 from tracker.footage.camera_source import CameraSource

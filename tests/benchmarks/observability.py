@@ -19,8 +19,7 @@ from scipy.stats import spearmanr
 from tracker.body.model import PosedBody
 from tracker.estimation.chamfer.tracker import ChamferTracker
 from tracker.estimation.fitting.observability import OBSERVABLE_M, OBSERVABLE_RAD, ContourNoise, observe_pose
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.evidence.observer import open_observer
 from tracker.formats.pose_csv import read_pose_table
 from tracker.geometry.arrays import Array

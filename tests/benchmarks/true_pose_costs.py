@@ -20,8 +20,8 @@ from true_starts import joint_centers, limb_joints, track_from
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.acquisition.from_joints import height_from_joints
+from tracker.estimation.by_frame.frame_problem import trust
 from tracker.estimation.by_frame.pose_score import common_evidence, scorer_without_prediction
-from tracker.estimation.by_frame.settings import trust
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.evaluation.references import read_joints

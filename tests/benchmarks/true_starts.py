@@ -10,9 +10,7 @@ from tracker.body.model import BodyModel
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.chamfer.tracker import ChamferTracker
 from tracker.estimation.fitting.gauss_newton import fit_to_points
-from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import PoseEstimate, Subjects, TrackingRun
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.formats.joint_maps import LIMB_JOINTS

@@ -14,8 +14,7 @@ import numpy as np
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.runs import run_estimate
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.estimation.trajectory.hypotheses import all_together, through
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import open_observer

@@ -9,7 +9,7 @@ import numpy as np
 from gestures import wait_for
 
 from tracker.estimation.chamfer.method import CHAMFER
-from tracker.estimation.tracking.estimate import PoseEstimate
+from tracker.estimation.tracking.tracker import PoseEstimate
 from tracker.pipeline.methods import METHODS
 
 STEP_M = 0.01

@@ -7,7 +7,7 @@ from tracker.body.model import PosedBody
 from tracker.compute.progress import result_of
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 

@@ -8,7 +8,7 @@ from staging import cameras_around, own_evidence, painted, posed
 
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions
+from tracker.estimation.appearance.region_model import LearningFrame, learn_regions
 
 CAMERAS = [c.cropped((0, 0, 319, 239)) for c in cameras_around(2, size=(320, 240))]
 """Whole views, of odd width and height."""

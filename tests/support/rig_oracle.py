@@ -1,4 +1,4 @@
-"""Derivatives of points by the motions of their part and by a camera, with numpy: the oracle of `piece_kernels`."""
+"""Derivatives of points by the motions of their part and by a camera, with numpy: the oracle of `piece_sums`."""
 
 import numpy as np
 

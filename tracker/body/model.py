@@ -284,6 +284,16 @@ class BodyModel:
         point_jacobian(kinematics, self.dof_is_length, self.moves, parts, points, J)
         return J
 
+    def points_with_jacobian(
+        self, kinematics: "Kinematics", points: IntArray, centers: bool = False
+    ) -> tuple[Array, Array]:
+        """Return `points_at`, or `joint_centers_at`, (N, 3), and their `point_jacobian`, (N, 3, n_dofs)."""
+        parts, places = self.point_parts[points], self.points_at(kinematics, points)
+        if centers and self.center_offsets.any():
+            parts = np.where(self.center_offsets[points].any(axis=1), self.proximal_parts[points], parts)
+            places = self.joint_centers_at(kinematics, points)
+        return places, self.point_jacobian(kinematics, parts, places)
+
     def retract(self, values: Array, step: Array) -> Array:
         """Move a pose, (n_values,), by steps in its degrees of freedom, (..., n_dofs), to (..., n_values).
 
@@ -297,6 +307,10 @@ class BodyModel:
             turn = rigid.quaternion_exp(step[..., ball.dofs])
             out[..., ball.values] = rigid.quaternion_multiply(out[..., ball.values], turn)
         return out
+
+    def move(self, values: Array, step: Array) -> Array:
+        """Move a pose as `retract` does, but within the joint limits; see `clip`."""
+        return self.clip(self.retract(values, step))
 
     def difference(self, values_to: Array, values_from: Array) -> Array:
         """Return the step in the degrees of freedom, (n_dofs,), by which `retract` gets from one pose to the other."""

@@ -1,6 +1,7 @@
-"""Prepare one view of a frame, then extract a region's smoothed image and its foreground."""
+"""Prepare one view of a frame, then extract the features of a region: its foreground, edges and silhouette."""
 
 import threading
+from collections.abc import Sequence
 from concurrent.futures import Executor, Future
 from copy import copy
 from typing import NamedTuple
@@ -10,14 +11,18 @@ from numpy.typing import NDArray
 
 from tracker.evidence.images import background_subtraction
 from tracker.evidence.images.background_subtraction import Changes
-from tracker.evidence.images.change import change_threshold
-from tracker.evidence.images.image_statistics import ImageStatistics, SampleGrid
-from tracker.evidence.images.working_view import WorkingView
+from tracker.evidence.images.edge_segments import link_and_sample
+from tracker.evidence.images.edges import ImageStatistics, SampleGrid, detect_edges, levels
+from tracker.evidence.images.working_view import WorkingView, fit_region
+from tracker.evidence.view_evidence import EdgeSettings, RegionFeatures, silhouette_evidence
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.mask_image import parts_of_mask
+from tracker.footage.image_file import parts_of_mask
 from tracker.footage.recording import read_background, read_mask
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Region
+
+FOREGROUND_MARGIN = 0.012
+"""Width of the margin around the silhouette in which edges count, as a fraction of the longer side of the image."""
 
 
 class Prepared(NamedTuple):
@@ -42,8 +47,6 @@ class _Empty(NamedTuple):
     """Smoothed image, in working pixels, (H, W, 3)."""
     statistics: ImageStatistics
     """Measurements at the sample grid."""
-    usable: NDArray[np.intp]
-    """Indices of the samples that measure exposure, (m,)."""
 
 
 class Foreground:
@@ -103,17 +106,40 @@ class Foreground:
         statistics = self._grid.measure(frame)
         if empty is None:
             return Prepared(frame, mask, statistics.strengths, 0.0, np.ones(3, np.float32))
-        gain = background_subtraction.exposure_gain(
-            statistics.colors[empty.usable], empty.statistics.colors[empty.usable]
-        )
-        differences = np.abs(statistics.colors - gain * empty.statistics.colors).max(axis=-1)
-        return Prepared(frame, mask, statistics.strengths, change_threshold(differences), gain)
+        gain, threshold = background_subtraction.exposure_and_threshold(statistics.colors, empty.statistics.colors)
+        return Prepared(frame, mask, statistics.strengths, threshold, gain)
 
-    def smooth_region(self, prepared: Prepared, box: Region) -> Image:
-        """Return a region of the frame, smoothed, in working pixels, (H, W, 3)."""
-        return background_subtraction.smooth_image(self.view.image(prepared.frame, box))
+    def box(self, region: Region | None) -> Region:
+        """Return a region within the image, working px; the whole image for None."""
+        return self.view.whole if region is None else fit_region(region, self.view.camera.size)
 
-    def changes(self, prepared: Prepared, smooth: Image, box: Region) -> Changes | None:
+    def features(
+        self, prepared: Prepared | None, region: Region | None, with_static_edges: bool, settings: EdgeSettings
+    ) -> RegionFeatures:
+        """Return the features of a region, working px, or of the whole image (None); without edges where the frame is
+        damaged (None)."""
+        box, scale, filmed = self.box(region), self.view.scale, self.view.filmed
+        camera = self.view.camera.cropped(box)
+        if prepared is None:
+            nothing = np.zeros((camera.height, camera.width), np.uint8)
+            return RegionFeatures(camera, scale, box[:2], filmed.size, nothing)
+        smooth = background_subtraction.smooth_image(self.view.image(prepared.frame, box))
+        changes = self._changes(prepared, smooth, box) if settings.foreground else None
+        margin_px = FOREGROUND_MARGIN * max(filmed.size)
+        foreground = None if changes is None else background_subtraction.dilate(changes.anything, margin_px)
+        shown = self.view.shown
+        if shown is not None:
+            u0, v0, u1, v1 = box
+            part = np.ascontiguousarray(shown[v0:v1, u0:u1])
+            foreground = part if foreground is None else foreground & part
+        # The model of static edges refuses texture, so low thresholds can keep the weaker edges of bodies.
+        is_restricted = changes is not None or with_static_edges
+        edges = detect_edges(smooth, levels(prepared.strengths, is_restricted), foreground)
+        segments, samples = link_and_sample(edges.found, edges.gradients, settings.max_segment_px)
+        silhouette = None if changes is None else silhouette_evidence(changes, edges, filmed.size)
+        return RegionFeatures(camera, scale, box[:2], filmed.size, edges.found, segments, samples, smooth, silhouette)
+
+    def _changes(self, prepared: Prepared, smooth: Image, box: Region) -> Changes | None:
         """Return the foreground of a region by its mask, else by its background; None without either.
 
         Args:
@@ -139,5 +165,17 @@ class Foreground:
         if background is None:
             return None
         smooth = background_subtraction.smooth_image(self.view.image(background, self.view.whole))
-        statistics = self._grid.measure(background)
-        return _Empty(smooth, statistics, np.flatnonzero(background_subtraction.has_usable_exposure(statistics.colors)))
+        return _Empty(smooth, self._grid.measure(background))
+
+
+def prepare_views(
+    views: Sequence[Foreground], frames: Sequence[Image | None], shown: Sequence[int]
+) -> list[Prepared | None]:
+    """Prepare the frame that each view shows, as filmed, (H, W, 3); None where it is damaged.
+
+    Raises:
+        RecordingError: a mask cannot be used.
+    """
+    for view in views:  # those of all views at the same time
+        view.measure_empty_scene()
+    return [None if f is None else view.prepare(f, k) for view, f, k in zip(views, frames, shown, strict=True)]

@@ -15,29 +15,21 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from tracker.evidence.foreground import Foreground, Prepared
-from tracker.evidence.images import background_subtraction
-from tracker.evidence.images.edge_segments import link_edges, sample_segments
-from tracker.evidence.images.edges import detect_edges, levels
+from tracker.evidence.foreground import Foreground, Prepared, prepare_views
 from tracker.evidence.images.static_edges import StaticEdgeModel
-from tracker.evidence.images.working_view import fit_region
 from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.view_evidence import (
     DEFAULT_EDGES,
     EdgeSettings,
     RegionFeatures,
     ViewEvidence,
-    default_theta_px,
     select_evidence,
-    silhouette_evidence,
 )
-from tracker.footage.camera_source import CameraSource
+from tracker.footage.camera_source import CameraSource, ahead_frames
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Camera, Region
 
-FOREGROUND_MARGIN = 0.012
-"""Width of the margin around the silhouette in which edges count, as a fraction of the longer side of the image."""
 FRAMES_AHEAD = 2
 """Frames that are read ahead, each by a thread of its own."""
 
@@ -138,8 +130,7 @@ class Observer:
 
     def ahead_frames(self, k: int) -> tuple[float, ...]:
         """Return by how many frames the picture of each view was taken later than frame k; see `Clock`."""
-        shown = zip(self.cameras, self._shown(k), strict=True)
-        return tuple(c.clock.offset_frames(at) + at - k for c, at in shown)
+        return ahead_frames(self.cameras, self._shown(k), k)
 
     def _shown(self, k: int) -> list[int]:
         """Return the frame whose picture each view has on frame k: k, or that of the nearest time; see `in_time`."""
@@ -177,7 +168,7 @@ class Observer:
             if regions is not None and ahead.features is None:
                 ahead = ahead._replace(
                     features=self._finder.submit(
-                        self._find_ahead, k, ahead.prepared, list(regions), with_static_edges, edges
+                        self._find_ahead, ahead.prepared, list(regions), with_static_edges, edges
                     ),
                     with_static_edges=with_static_edges,
                     edges=edges,
@@ -218,17 +209,18 @@ class Observer:
         if ahead is not None and ahead.features is not None and (ahead.with_static_edges, ahead.edges) == asked:
             features = ahead.features.result()
 
-        shown = self._shown(k)
+        shown, times = self._shown(k), self.ahead_frames(k)
 
         def observe(
             i: int, region: Region | None, predicted_px: FloatArray | None, model: StaticEdgeModel | None
         ) -> ViewEvidence:
-            known = features and features[i].box == self._box(i, region)
-            seen = features[i] if known else self._find_features(k, i, prepared[i], region, with_static_edges, edges)
+            view = self._views[i]
+            known = features and features[i].box == view.box(region)
+            seen = features[i] if known else view.features(prepared[i], region, with_static_edges, edges)
             if predicted_px is not None:
                 predicted_px = predicted_px - np.array([*seen.corner_px, *seen.corner_px], np.float32)
             model = model if seen.silhouette is None else None
-            found = select_evidence(seen, predicted_px, model, edges.max_angle_rad)
+            found = select_evidence(seen, predicted_px, model, edges.max_angle_rad, times[i])
             if self.keypoints is None or prepared[i] is None:
                 return found
             return replace(found, keypoints=self.keypoints.in_view(shown[i], i, found.camera))
@@ -247,14 +239,10 @@ class Observer:
             frames = self.recording.read_each(shown, chosen)
         else:
             frames = self.recording.read(k) if chosen is None else self.recording.read(k, chosen)
-        for view in self._views:  # those of all views at the same time
-            view.measure_empty_scene()
-        seen = zip(self._views, frames, shown, strict=True)
-        return [None if f is None else view.prepare(f, at) for view, f, at in seen]
+        return prepare_views(self._views, frames, shown)
 
     def _find_ahead(
         self,
-        k: int,
         prepared: Future[list[Prepared | None]],
         regions: Sequence[Region | None],
         with_static_edges: bool,
@@ -263,45 +251,9 @@ class Observer:
         n = len(self._views)
         return list(
             self._pool_ahead.map(
-                self._find_features, [k] * n, range(n), prepared.result(), regions, [with_static_edges] * n, [edges] * n
+                Foreground.features, self._views, prepared.result(), regions, [with_static_edges] * n, [edges] * n
             )
         )
-
-    def _box(self, i: int, region: Region | None) -> Region:
-        view = self._views[i].view
-        return view.whole if region is None else fit_region(region, view.camera.size)
-
-    def _find_features(
-        self, k: int, i: int, prepared: Prepared | None, region: Region | None, with_static_edges: bool,
-        settings: EdgeSettings,
-    ) -> RegionFeatures:  # fmt: skip
-        """Return the features of a region of view i of frame k."""
-        view, box = self._views[i], self._box(i, region)
-        working = view.view.camera
-        camera, scale, filmed = working.cropped(box), view.view.scale, view.view.filmed
-        ahead = self.ahead_frames(k)[i]
-        if prepared is None:
-            nothing = np.zeros((camera.height, camera.width), np.uint8)
-            return RegionFeatures(camera, scale, box[:2], filmed.size, nothing, ahead_frames=ahead)
-        smooth = view.smooth_region(prepared, box)
-        changes = view.changes(prepared, smooth, box) if settings.foreground else None
-        margin_px = FOREGROUND_MARGIN * max(filmed.size)
-        foreground = None if changes is None else background_subtraction.dilate(changes.anything, margin_px)
-        shown = view.view.shown
-        if shown is not None:
-            u0, v0, u1, v1 = box
-            part = np.ascontiguousarray(shown[v0:v1, u0:u1])
-            foreground = part if foreground is None else foreground & part
-        # The model of static edges refuses texture, so low thresholds can keep the weaker edges of bodies.
-        edges = detect_edges(
-            smooth, levels(prepared.strengths, restricted=changes is not None or with_static_edges), foreground
-        )
-        segments = link_edges(edges.found, edges.gradients, settings.max_segment_px)
-        silhouette = None if changes is None else silhouette_evidence(changes, edges, 2 * default_theta_px(filmed))
-        return RegionFeatures(
-            camera, scale, box[:2], filmed.size, edges.found, segments, sample_segments(segments), smooth, silhouette,
-            ahead,
-        )  # fmt: skip
 
 
 @contextmanager

@@ -20,19 +20,17 @@ from tracker.evidence.images.background_subtraction import (
     Mask,
     Shading,
     apply_gain,
-    exposure_gain,
-    has_usable_exposure,
+    exposure_and_threshold,
     smooth_image,
     subtract_background,
 )
-from tracker.evidence.images.change import change_threshold
-from tracker.evidence.images.image_statistics import SPACING_PX
+from tracker.evidence.images.edges import SPACING_PX
 from tracker.evidence.images.silhouette_cleaning import clean_silhouette
 from tracker.evidence.images.working_view import WorkingView
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.mask_image import parts_of_mask
+from tracker.footage.image_file import parts_of_mask
 from tracker.footage.recording import Recording, background_frames, read_mask
-from tracker.geometry.arrays import FloatArray, Image
+from tracker.geometry.arrays import Image
 from tracker.geometry.cameras import Camera
 
 SilhouetteSource = Literal["mask", "background", "recording", "none"]
@@ -134,9 +132,7 @@ class SilhouetteFinder:
     def _changes(self, smooth: Image, model: BackgroundModel) -> Changes:
         samples, empty = (x[::SPACING_PX, ::SPACING_PX].reshape(-1, 3) for x in (smooth, model.image))
         colors, empty_colors = samples.astype(np.float32), empty.astype(np.float32)
-        usable = has_usable_exposure(empty_colors)
-        gain: FloatArray = exposure_gain(colors[usable], empty_colors[usable])
-        threshold = change_threshold(np.abs(colors - gain * empty_colors).max(axis=-1))
+        gain, threshold = exposure_and_threshold(colors, empty_colors)
         background = apply_gain(model.image, gain)
         return subtract_background(smooth, background, threshold, self._shading, model.noise)
 

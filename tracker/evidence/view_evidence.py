@@ -4,6 +4,7 @@ The features of a region do not depend on a prediction (`RegionFeatures`). Which
 (`select_evidence`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -28,7 +29,7 @@ from tracker.evidence.images.edges import Edges
 from tracker.evidence.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
 from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.keypoints import ViewKeypoints
-from tracker.geometry.arrays import FloatArray, Image, Mask
+from tracker.geometry.arrays import Array, FloatArray, Image, Mask
 from tracker.geometry.cameras import Camera, Region
 
 SCENE_SPACING_PX = 4
@@ -130,7 +131,7 @@ class ViewEvidence:
     @property
     def theta_px(self) -> float:
         """Outlier distance, working px: beyond it an edge does not count. It follows the size of the whole image."""
-        return _theta_px(self.image_size or self.camera.size)
+        return default_theta_px(self.image_size or self.camera.size)
 
     def outlier_px(self, theta_px: float | None) -> float:
         """Convert an outlier distance from px of the footage to working px; None gives `theta_px` of the view."""
@@ -146,29 +147,32 @@ def with_colors_only(view: ViewEvidence, colors: Image | None = None) -> ViewEvi
     )  # fmt: skip
 
 
-def default_theta_px(camera: Camera) -> float:
-    """Return the outlier distance of a camera: 3% of the longer side of its image (20 px at 640x480)."""
-    return _theta_px(camera.size)
+def outliers_px(views: Sequence[ViewEvidence], theta_px: float | None) -> Array:
+    """Convert an outlier distance from px of the footage to working px of each view, (V,); see `outlier_px`."""
+    return np.array([v.outlier_px(theta_px) for v in views])
 
 
-def _theta_px(size: tuple[int, int]) -> float:
+def default_theta_px(size: tuple[int, int]) -> float:
+    """Return the outlier distance of an image of a size, px: 3% of its longer side (20 px at 640x480)."""
     return 0.03 * max(size)
 
 
-def silhouette_evidence(changes: Changes, edges: Edges, limit_px: float) -> Silhouette:
+def silhouette_evidence(changes: Changes, edges: Edges, size: tuple[int, int]) -> Silhouette:
     """Build the evidence of a silhouette. Next to unknown pixels it has no contour, and among them no outside.
 
     Args:
         changes: the silhouette in a region.
         edges: edges of the same region.
-        limit_px: largest distance to its contour, working px.
+        size: of the footage at working scale, px; distances to the contour end at twice its outlier distance.
     """
     inside, contour = changes.inside, trace_silhouette(changes.inside)
     if changes.unknown is not None:
         contour, inside = contour.away_from(changes.unknown), changes.inside | changes.unknown
     first = thin_points(contour.points_px, *inside.shape)
     trust = contour_trust(contour, inside, edges)
-    return Silhouette(inside, contour.points_px[first], contour.normals[first], trust, contour, limit_px)
+    return Silhouette(
+        inside, contour.points_px[first], contour.normals[first], trust, contour, 2 * default_theta_px(size)
+    )
 
 
 class RegionFeatures(NamedTuple):
@@ -185,7 +189,6 @@ class RegionFeatures(NamedTuple):
     """Samples of the segments; None if not yet taken."""
     colors: Image | None = None
     silhouette: Silhouette | None = None
-    ahead_frames: float = 0.0
 
     @property
     def box(self) -> Region:
@@ -199,6 +202,7 @@ def select_evidence(
     predicted_px: FloatArray | None,
     static_edges: StaticEdgeModel | None,
     max_angle_rad: float = MAX_ANGLE_RAD,
+    ahead_frames: float = 0.0,
 ) -> ViewEvidence:
     """Select the edges of a region that the prediction accepts and that are not static.
 
@@ -208,11 +212,12 @@ def select_evidence(
             all edges. Without segments all edges are accepted.
         static_edges: static edges of the view, which are refused; None if unknown.
         max_angle_rad: largest angle between an edge of an accepted segment and a contour, rad.
+        ahead_frames: frames by which the picture was taken later than the frame.
     """
     segments, samples, theta = (
         features.segments,
         features.samples,
-        _theta_px(features.image_size or features.camera.size),
+        default_theta_px(features.image_size or features.camera.size),
     )
     chosen = is_static = None
     if segments is not None:
@@ -227,7 +232,7 @@ def select_evidence(
     distance = distance_image(found, 2 * theta)
     return ViewEvidence(
         features.camera, features.scale, points, distance, features.corner_px, features.image_size, normals,
-        features.colors, segments, samples, chosen, is_static, features.silhouette, features.ahead_frames,
+        features.colors, segments, samples, chosen, is_static, features.silhouette, ahead_frames,
     )  # fmt: skip
 
 

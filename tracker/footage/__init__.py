@@ -12,7 +12,6 @@ __all__ = [
     "frame_rates",
     "image_file",
     "image_folder",
-    "mask_image",
     "proxy",
     "recording",
     "sound",

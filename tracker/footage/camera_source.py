@@ -110,6 +110,11 @@ class CameraSource:
         return replace(self, clock=replace(self.clock, lost=rows))
 
 
+def ahead_frames(cameras: Sequence[CameraSource], shown: Sequence[int], k: int) -> tuple[float, ...]:
+    """Return by how many frames the picture that each camera shows was taken later than frame k; see `Clock`."""
+    return tuple(c.clock.offset_frames(at) + at - k for c, at in zip(cameras, shown, strict=True))
+
+
 def whole_frames(start_frames: float) -> int:
     """Return the nearest whole frame; frame 0 within a frame before it, since footage has none earlier."""
     return 0 if -1 < start_frames < 0 else round(start_frames)

@@ -26,27 +26,6 @@ class Index(NamedTuple):
     """Presentation time stamps of the frames at which decoding can start, ascending."""
 
 
-class FileVersion(NamedTuple):
-    """A version of a file: it changes with the content."""
-
-    device: int
-    inode: int
-    size: int
-    """Bytes."""
-    changed_ns: int
-    """Time of the last change, ns."""
-
-
-def file_version_of(path: Path) -> FileVersion:
-    """Return the present version of a file.
-
-    Raises:
-        OSError: it is missing.
-    """
-    stat = path.stat()
-    return FileVersion(stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns)
-
-
 def stamp_of(path: Path) -> str:
     """Return a text that identifies a version of a file: its path, size and time of change."""
     stat = path.stat()

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import RecordingError
-from tracker.footage import passed_frames
+from tracker.footage import video_decoder
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_unchanged
 from tracker.footage.video import open_footage
 from tracker.geometry.arrays import Image
 
-DEFAULT_CACHE_BYTES = 2 * passed_frames.MAX_BYTES
+DEFAULT_CACHE_BYTES = 2 * video_decoder.MAX_PASSED_BYTES
 """Memory of decoded frames of all cameras, bytes: 72 frames of four cameras of 640x480, in RGB twice as large as those
 that a decoder passed."""
 _Key = tuple[int, int, int]
@@ -71,7 +71,7 @@ class Recording:
         Args:
             cameras: footage and offset of each camera.
             cache_bytes: size of the cache of decoded frames, bytes; the frames in use come on top, and those kept for
-                steps backward (`passed_frames.MAX_BYTES`).
+                steps backward (`video_decoder.MAX_PASSED_BYTES`).
             indices: folder in which the lists of frames are cached; None for no cache.
             in_background: do not wait for lists that are not cached; see `listed_share`.
 
@@ -82,7 +82,7 @@ class Recording:
         self._cameras = tuple(cameras)
         n_cameras = max(1, len(self._cameras))
         self._pool = ThreadPoolExecutor(n_cameras, thread_name_prefix="decode")
-        more = indices, in_background, passed_frames.MAX_BYTES // n_cameras
+        more = indices, in_background, video_decoder.MAX_PASSED_BYTES // n_cameras
         self._footage = list(self._pool.map(lambda c: open_footage(c.footage, c.camera.name, *more), self._cameras))
         for source, footage in zip(self._cameras, self._footage, strict=True):
             check_size(source.camera.name, footage.path, footage.size, source.camera.size)
@@ -90,11 +90,12 @@ class Recording:
             self._check_offsets()
         self.fps = next((f.fps for f in self._footage if f.fps is not None), None)
         self._decoded = _DecodedFrames(cache_bytes)
+        self._end: int | None = None  # number of frames, once all are listed
 
     def with_cameras(self, cameras: Sequence[CameraSource]) -> "Recording":
         """Return the same open footage, read with other offsets of the same cameras; either closes it for both."""
         other = copy(self)
-        other._cameras = tuple(cameras)
+        other._cameras, other._end = tuple(cameras), None
         return other
 
     @property
@@ -188,7 +189,9 @@ class Recording:
         self.close()
 
     def _check(self, k: int) -> None:
-        if k < 0 or (self.listed_share is None and k >= self.n_frames):
+        if self._end is None and self.listed_share is None:
+            self._end = self.n_frames
+        if k < 0 or (self._end is not None and k >= self._end):
             self._check_offsets()
             raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
 
@@ -271,7 +274,7 @@ def background_frames(source: CameraSource) -> Iterator[Image]:
 def read_mask(source: CameraSource, k: int) -> NDArray[np.uint8] | None:
     """Read the mask of frame k as filmed, (H, W); None if there is none.
 
-    Pixels are 0 for the background, k for person k, `mask_image.ANYONE` or `mask_image.UNKNOWN`.
+    Pixels are 0 for the background, k for person k, `image_file.ANYONE` or `image_file.UNKNOWN`.
 
     Raises:
         RecordingError: the file is not a gray 8-bit image, or of another size than the camera.

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import NamedTuple
 
 import av
 import numpy as np
@@ -18,17 +19,33 @@ from av.video.reformatter import VideoReformatter
 from tracker.errors import RecordingError
 from tracker.footage import frame_index, packet_scan
 from tracker.footage.chapters import ChapteredVideo, chapter_files
-from tracker.footage.display import display_turn, displayed_size
-from tracker.footage.frame_index import FileVersion, Index
-from tracker.footage.frame_reader import FrameReader
+from tracker.footage.frame_index import Index
 from tracker.footage.image_folder import ImageFolder
 from tracker.footage.packet_scan import PacketScan, TimeStamps
-from tracker.footage.passed_frames import MAX_BYTES
-from tracker.footage.video_decoder import VideoDecoder, open_container
+from tracker.footage.video_decoder import (
+    MAX_PASSED_BYTES,
+    FrameReader,
+    VideoDecoder,
+    display_turn,
+    displayed_rgb,
+    displayed_size,
+    open_container,
+)
 from tracker.geometry.arrays import Image, IntArray
 
 _ATTEMPTS = 2
 """Number of times that a frame is read: again if the file was replaced meanwhile."""
+
+
+class FileVersion(NamedTuple):
+    """A version of a file: it changes with the content."""
+
+    device: int
+    inode: int
+    size: int
+    """Bytes."""
+    changed_ns: int
+    """Time of the last change, ns."""
 
 
 class VideoFile:
@@ -57,7 +74,7 @@ class VideoFile:
         camera: str,
         indices: Path | None = None,
         in_background: bool = False,
-        passed_bytes: int = MAX_BYTES,
+        passed_bytes: int = MAX_PASSED_BYTES,
     ) -> None:
         """Open a video and list its frames.
 
@@ -183,7 +200,8 @@ class VideoFile:
             RecordingError: it is missing.
         """
         try:
-            return frame_index.file_version_of(self.path)
+            stat = self.path.stat()
+            return FileVersion(stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns)
         except FileNotFoundError:
             raise RecordingError(f"{self._where} is not there any more; put it back") from None
         except OSError as error:
@@ -263,7 +281,7 @@ class VideoFile:
         assert self._reader is not None
         try:
             frame = self._reader.read(self._listed.frames, k)
-            image = None if frame is None else self._to_rgb(frame)
+            image = None if frame is None else displayed_rgb(frame, self._converter)
         except av.FFmpegError as error:
             self._release()  # its position is unknown
             if self._present_version() != self._opened_version:
@@ -275,11 +293,6 @@ class VideoFile:
                 f"{image.shape[1]}x{image.shape[0]} in frame {k}; convert it to one size"
             )
         return image
-
-    def _to_rgb(self, frame: VideoFrame) -> Image:
-        # One converter for all frames: preparing one takes longer than a conversion.
-        image: Image = np.asarray(self._converter.reformat(frame, format="rgb24").to_ndarray(), np.uint8)
-        return display_turn(frame).apply(image)
 
     # --- the list of frames -------------------------------------------------------------------------------------
 
@@ -349,7 +362,11 @@ Footage = VideoFile | ImageFolder | ChapteredVideo
 
 
 def open_footage(
-    path: Path, camera: str, indices: Path | None = None, in_background: bool = False, passed_bytes: int = MAX_BYTES
+    path: Path,
+    camera: str,
+    indices: Path | None = None,
+    in_background: bool = False,
+    passed_bytes: int = MAX_PASSED_BYTES,
 ) -> Footage:
     """Open a video file, a folder of images, or one of the chapters of a video.
 

@@ -22,9 +22,8 @@ from tracker.files import write_text_atomic
 from tracker.formats.text_files import TextKind, parse_toml, read_text
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import Camera, coefficient_counts, count_words
 from tracker.geometry.lengths import METRES_BY_WORD
-from tracker.geometry.lenses import coefficient_counts, count_words
 from tracker.validation import MAX_NUMBER, MAX_SIDE_PX, ROUNDING, FileStem, Number, Vector, check, quoted
 
 Units = Literal["m", "cm", "mm"]

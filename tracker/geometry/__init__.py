@@ -15,7 +15,6 @@ __all__ = [
     "ground_plane",
     "lengths",
     "lens_tables",
-    "lenses",
     "rigid",
     "robust_triangulation",
     "same_place",

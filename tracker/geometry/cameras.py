@@ -12,8 +12,6 @@ from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.lenses import (
-    coefficient_counts,
-    count_words,
     distort_slopes,
     fisheye_directions,
     fisheye_limit,
@@ -42,6 +40,16 @@ MAX_PINHOLE_GROWTH = 4.0
 
 NEAR_PLANE_M = 0.05
 """Depth of the near plane, metres: nothing closer to a camera is drawn or matched."""
+
+
+def coefficient_counts(fisheye: bool) -> tuple[int, ...]:
+    """Return how many coefficients a lens model takes; 0 leaves out all terms."""
+    return (0, 4) if fisheye else (0, 4, 5, 8)
+
+
+def count_words(fisheye: bool) -> str:
+    """Return the numbers of coefficients in words, for messages."""
+    return "0 or 4 fisheye" if fisheye else "0, 4, 5 or 8"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +104,7 @@ class Camera:
         """Projection matrix, (3, 4): maps homogeneous world points to homogeneous undistorted pixels."""
         return self.pinhole.K @ self.T_camera_world[:3]
 
-    @property
+    @cached_property
     def center_world(self) -> Array:
         """Optical centre in the world, (3,), metres."""
         return self.T_world_camera[:3, 3].copy()
@@ -164,6 +172,11 @@ class Camera:
         A fisheye lens may see points beside and behind the camera; NaN where its model ends.
         """
         return self._directions_to_px(rigid.apply(self.T_camera_world, np.asarray(points_world, dtype=np.float64)))
+
+    def project_with_depths(self, points_world: Array) -> tuple[Array, Array]:
+        """Return `project` and `depths` of world points, `(..., 3)`, as `(..., 2)` and `(...)`."""
+        directions = rigid.apply(self.T_camera_world, points_world)
+        return self._directions_to_px(directions), directions[..., 2]
 
     def project_with_jacobian(self, points_world: Array) -> tuple[Array, Array]:
         """Project world points `(N, 3)` to undistorted pixels, with derivatives, as the function of this name does."""
@@ -324,6 +337,16 @@ def project_with_jacobian(Ts_camera_world: Array, K: Array, points_world: Array)
     return (focal @ slopes[:, :, None])[..., 0] + K[..., :2, 2], focal @ slopes_by_point
 
 
+def projections(cameras: Sequence[Camera]) -> tuple[Array, Array]:
+    """Return the projection matrices of cameras, (V, 3, 4), and their optical centres in the world, (V, 3), metres."""
+    return np.stack([c.projection for c in cameras]), np.stack([c.center_world for c in cameras])
+
+
+def px_per_m(cameras: Sequence[Camera], point_world: Array) -> float:
+    """Return the length of a metre at a point, (3,), in undistorted images, px: the median over the cameras."""
+    return float(np.median([c.K[0, 0] / max(c.depths(point_world), NEAR_PLANE_M) for c in cameras]))
+
+
 def viewed_point(cameras: Sequence[Camera]) -> Array:
     """Return the point nearest to all optical axes in the least squares sense, (3,), metres.
 
@@ -344,52 +367,3 @@ def across_lines(points: Array, directions: Array) -> tuple[Array, Array]:
     """
     across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     return across.sum(axis=0), (across @ points[..., None]).sum(axis=0)[:, 0]
-
-
-def epipolar_segment(source: Camera, target: Camera, point_px: Array) -> Array | None:
-    """Project the viewing ray of a pixel of `source` into the image of `target`.
-
-    Args:
-        source: the camera in which the point was seen.
-        target: the camera in which to draw.
-        point_px: the point in undistorted pixels of `source`, (2,).
-
-    Returns:
-        The end points of the visible segment in undistorted pixels of `target`, (2, 2), clipped to its image,
-        or None if the ray does not cross the image.
-    """
-    target = target.pinhole
-    direction = target.T_camera_world[:3, :3] @ source.pinhole.rays(point_px)
-    origin = rigid.apply(target.T_camera_world, source.center_world)
-    # The part of the ray t >= 0 in front of the target: z(t) = o_z + t d_z >= near.
-    t_low, t_high = 0.0, np.inf
-    if abs(direction[2]) < TINY:
-        if origin[2] < NEAR_PLANE_M:
-            return None
-    else:
-        t_near = (NEAR_PLANE_M - origin[2]) / direction[2]
-        t_low, t_high = (max(0.0, t_near), t_high) if direction[2] > 0 else (t_low, t_near)
-    if t_high <= t_low:
-        return None
-    P = target.K @ np.stack([origin, direction], axis=1)  # (3, 2): homogeneous pixel as P @ (1, t)
-    ends = np.stack([P @ (1.0, t_low), P[:, 1] if np.isinf(t_high) else P @ (1.0, t_high)])
-    if abs(ends[1, 2]) < TINY:  # the ray runs parallel to the image: go far enough to leave it
-        ends[1] = P @ (1.0, t_low + 1 / TINY)
-    return _clip_segment(ends[:, :2] / ends[:, 2:], target.size)
-
-
-def _clip_segment(segment_px: Array, size: tuple[int, int]) -> Array | None:
-    """Clip a segment (2, 2) to the image by Liang and Barsky's method."""
-    (start, end), t0, t1 = segment_px, 0.0, 1.0
-    delta = end - start
-    for axis in (0, 1):
-        for sign, bound in ((-1.0, 0.5), (1.0, size[axis] - 0.5)):
-            p, q = sign * delta[axis], bound - sign * start[axis]
-            if abs(p) < TINY:
-                if q < 0:
-                    return None
-            elif p < 0:
-                t0 = max(t0, q / p)
-            else:
-                t1 = min(t1, q / p)
-    return np.stack([start + t0 * delta, start + t1 * delta]) if t0 < t1 else None

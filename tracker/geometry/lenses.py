@@ -15,16 +15,6 @@ _NEWTON_STEPS = 5
 """Each step doubles the digits of the interpolation, which has at least three."""
 
 
-def coefficient_counts(fisheye: bool) -> tuple[int, ...]:
-    """Return how many coefficients a lens model takes; 0 leaves out all terms."""
-    return (0, 4) if fisheye else (0, 4, 5, 8)
-
-
-def count_words(fisheye: bool) -> str:
-    """Return the numbers of coefficients in words, for messages."""
-    return "0 or 4 fisheye" if fisheye else "0, 4, 5 or 8"
-
-
 def distort_slopes(xy: Array, distortion: Array) -> Array:
     """Apply Brown and Conrady's model to slopes of rays, (..., 2).
 

@@ -147,6 +147,48 @@ def stack_rows(rows: Sequence[IntArray]) -> IntArray:
     return out
 
 
+class SortedViews(NamedTuple):
+    """Sorted points of several images."""
+
+    points: FloatArray
+    """`RowSortedPoints.points`, one image after the other, (2 + more, N)."""
+    firsts: IntArray
+    """Index of the first point of each image, then N, (V + 1,)."""
+    rows: IntArray
+    """See `stack_rows`, (V, strips, rows + 1)."""
+    counts: IntArray
+    """Number of points of each image without padding, (V,)."""
+
+
+def stack_points(points: Sequence[FloatArray], sizes: Sequence[tuple[int, int]]) -> SortedViews:
+    """Sort the points (N, 2 + more) of images of the given widths and heights; see `sort_points`."""
+    return _stacked([sort_points(p, size) for p, size in zip(points, sizes, strict=True)])
+
+
+def near_points(
+    points: Sequence[FloatArray], sizes: Sequence[tuple[int, int]],
+    pieces: Sequence[tuple[FloatArray, NDArray[np.bool_]]], reaches: Sequence[float],
+) -> SortedViews:  # fmt: skip
+    """Sort the points of images and select those near visible pieces; see `sort_points` and `within_reach`.
+
+    Args:
+        points: of each image, (N, 2 + more).
+        sizes: width and height of each, px.
+        pieces: x0, y0, x1, y1, (M, 4), of each, and whether they are hidden, (M,).
+        reaches: largest distance in each, px.
+    """
+    each = zip(points, sizes, pieces, reaches, strict=True)
+    return _stacked([within_reach(sort_points(p, size), *own, reach) for p, size, own, reach in each])
+
+
+def _stacked(each: Sequence[RowSortedPoints]) -> SortedViews:
+    return SortedViews(
+        np.ascontiguousarray(np.concatenate([e.points for e in each], axis=1)),
+        np.cumsum([0, *(e.points.shape[1] for e in each)], dtype=np.int64),
+        stack_rows([e.rows for e in each]), np.array([e.n_points for e in each], dtype=np.int64),
+    )  # fmt: skip
+
+
 @njit(**NO_REFCOUNT)
 def cells_within(
     u0: np.float32, v0: np.float32, u1: np.float32, v1: np.float32, reach: np.float32, rows: IntArray

@@ -16,12 +16,11 @@ from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.runs.frame_hypotheses import Proposal
 from tracker.estimation.runs.path_assessment import RunPose
 from tracker.estimation.runs.run_estimate import Progress, RunFrames, estimate_run, poses_beside
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
-from tracker.pipeline.assessed_poses import assessed_by_run
-from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row, pose_change
+from tracker.pipeline.estimated_rows import assessed_by_run, assessed_keyframe, estimated_row, pose_change
 from tracker.pipeline.tracked_changes import settings_record
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session

@@ -21,8 +21,7 @@ from tracker.estimation.fitting.gauss_newton import PointTargets
 from tracker.estimation.fitting.pins import PinBlock, pin_block
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.initialization.first_pose import HEIGHT_SIGMA
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model, has_preset_proportions
 from tracker.geometry.arrays import Array

@@ -15,10 +15,10 @@ from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.runs.frame_hypotheses import Proposal
 from tracker.estimation.runs.path_assessment import RunPose
 from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
-from tracker.pipeline.assessed_poses import assessed_by_run
+from tracker.pipeline.estimated_rows import assessed_by_run
 from tracker.session.session import Session
 from tracker.session.store.records import PoseRecord
 

@@ -15,7 +15,7 @@ from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import learn_static_edges
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M
 from tracker.estimation.fitting.retarget import retarget_pose
-from tracker.estimation.tracking.estimate import TrackedFrame
+from tracker.estimation.tracking.tracker import TrackedFrame
 from tracker.estimation.tracking.view_regions import regions
 from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.observer import Observer

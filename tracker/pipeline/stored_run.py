@@ -14,9 +14,7 @@ from tracker.body.motion.history import HISTORY_FRAMES
 from tracker.errors import Remedy, SessionError
 from tracker.estimation.runs.run_estimate import poses_beside
 from tracker.estimation.tracking.confidence import Status, status_named
-from tracker.estimation.tracking.estimate import TrackedFrame
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackedFrame, TrackerSettings, TrackingRun
 from tracker.estimation.trajectory.solve import even_blocks
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource

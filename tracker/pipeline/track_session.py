@@ -15,9 +15,15 @@ from tracker.estimation.runs.path_assessment import RunPose
 from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
 from tracker.estimation.search.chamfer_cost import frame_cost
 from tracker.estimation.tracking.confidence import Status, status_named
-from tracker.estimation.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import Tracker, TrackingRun
+from tracker.estimation.tracking.tracker import (
+    BackwardStep,
+    NormalMatrix,
+    PoseEstimate,
+    Subjects,
+    TrackedFrame,
+    Tracker,
+    TrackingRun,
+)
 from tracker.estimation.trajectory.solve import even_blocks
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
@@ -129,6 +135,8 @@ class TrackSession:
             records_before: poses that an interrupted run has stored, by person and frame.
         """
         self.tracker, self.legs, self.label = tracker, legs, label
+        self.frames = [k for leg in legs for k in leg.frames]
+        """The frames to track, in their order."""
         self._stored, self._writer, self._save_frames = stored, writer, save_frames
         self.tracked = {f.frame: f for leg in legs for f in leg.before}
         """Frames tracked so far by their number, with those that were known before."""
@@ -160,11 +168,6 @@ class TrackSession:
     def observer(self) -> Observer:
         """Gives the evidence of the cameras that are tracked with."""
         return self.legs[0].run.observer
-
-    @property
-    def frames(self) -> list[int]:
-        """The frames to track, in their order."""
-        return [k for leg in self.legs for k in leg.frames]
 
     def ends(self, frame: int) -> tuple[int, int]:
         """Return the first and the last frame of the leg that tracks a frame."""

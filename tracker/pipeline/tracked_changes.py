@@ -7,9 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from tracker.estimation.tracking.confidence import PoseQuality
-from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.subjects import Keyframes
-from tracker.estimation.tracking.tracker import TrackerSettings
+from tracker.estimation.tracking.tracker import Keyframes, PoseEstimate, TrackerSettings
 from tracker.geometry.arrays import Array
 from tracker.session.session import Person
 from tracker.session.store.annotation_store import AnnotationStore
@@ -94,8 +92,8 @@ def tracked_changes(
                 status=found.statuses[i],
                 cost_px=number(found.cost_px),
                 settings=record,
-                view_costs_px=tuple(number(c) for c in found.view_costs_px),
-                part_costs_px=tuple(number(c) for c in found.part_costs_px[i]),
+                view_costs_px=numbers(found.view_costs_px),
+                part_costs_px=numbers(found.part_costs_px[i]),
                 remark=found.notes[i],
                 limbs_lost=_limbs_lost(found.qualities[i]),
                 trace=found.traces[i] if found.traces else None,
@@ -149,3 +147,8 @@ def _limbs_lost(quality: PoseQuality | None) -> tuple[float, ...]:
 def number(value: float) -> float | None:
     """Return None for NaN and infinity, which JSON cannot hold."""
     return float(value) if np.isfinite(value) else None
+
+
+def numbers(values: Array) -> tuple[float | None, ...]:
+    """Return `number` of each of some values, (n,)."""
+    return tuple(map(number, values))

@@ -20,7 +20,7 @@ from tracker.errors import TrackerError
 from tracker.estimation.chamfer.settings import TrackSettings, search_frame
 from tracker.estimation.contour.fit_steps import FitPlan, contour_steps
 from tracker.estimation.search.best_first import SearchStep, Stage, stages
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.geometry.arrays import Array
 
 _ContourFit = Literal["body", "chains"]

@@ -19,7 +19,7 @@ from tracker.compute.progress import Report
 from tracker.errors import TrackerError
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.initialization.frame_trials import Trying
-from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
+from tracker.estimation.tracking.tracker import BackwardStep, PoseEstimate
 from tracker.evaluation.judging.judge import judge
 from tracker.interchange.detection.detect import DetectionPlan, complete_detection, detect_people, open_name
 from tracker.interchange.detection.detector import Detector

@@ -21,7 +21,7 @@ from tracker.body.limbs import limb_display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.appearance.background_density import MIN_SEEN
-from tracker.estimation.appearance.region_learning import learning_frames
+from tracker.estimation.appearance.region_model import learning_frames
 from tracker.estimation.by_frame.frame_problem import Bodies
 from tracker.estimation.by_frame.part_evidence import UsualEvidence, contradiction, learn_run, read_frame
 from tracker.estimation.fitting.hypothesis import limbs_elsewhere

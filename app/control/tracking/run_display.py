@@ -10,7 +10,7 @@ from app.state.people import ShownPose
 from app.state.progress import TrackStage, TrackState
 from app.state.state import Costs, finite_or_none
 from tracker.estimation.tracking import confidence
-from tracker.estimation.tracking.estimate import BackwardStep, PoseEstimate
+from tracker.estimation.tracking.tracker import BackwardStep, PoseEstimate
 from tracker.pipeline.track_session import EstimatedRows, EstimateStep, Step, TrackSession
 
 

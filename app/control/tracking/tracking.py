@@ -17,9 +17,7 @@ from app.state.run_choices import RunChoices
 from app.storage.turns import TurnError
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.tracking.confidence import Status
-from tracker.estimation.tracking.estimate import PoseEstimate, TrackedFrame
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
+from tracker.estimation.tracking.tracker import PoseEstimate, Subjects, TrackedFrame, TrackerSettings, TrackingRun
 from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker

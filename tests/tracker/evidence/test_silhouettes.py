@@ -8,7 +8,7 @@ from fisheye import with_fisheye
 from tracker.evidence.images.background_subtraction import SHADOWS
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.mask_image import ANYONE, UNKNOWN
+from tracker.footage.image_file import ANYONE, UNKNOWN
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
 

@@ -9,10 +9,11 @@ from staging import camera_at, view_evidence
 from tracker.body.model import PosedBody
 from tracker.errors import RecordingError
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.images.edge_segments import MAX_LENGTH, accept_segments, link_edges
+from tracker.evidence.foreground import FOREGROUND_MARGIN
+from tracker.evidence.images.edge_segments import MAX_LENGTH, accept_segments, link_and_sample
 from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.images.working_view import WorkingView, region_around, working_scale
-from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
+from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import (
     ACCEPTED_SHARE,
     SCENE_SPACING_PX,
@@ -21,7 +22,7 @@ from tracker.evidence.view_evidence import (
     with_segments,
 )
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.mask_image import UNKNOWN
+from tracker.footage.image_file import UNKNOWN
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
 from tracker.session.session import load_session
@@ -121,8 +122,8 @@ def test_small_images_are_not_enlarged():
 
 
 def test_theta_is_a_share_of_the_longer_side():
-    assert default_theta_px(camera_at("c", (4, 0, 0), size=(640, 480))) == pytest.approx(19.2)
-    assert default_theta_px(camera_at("c", (4, 0, 0), size=(480, 640))) == pytest.approx(19.2)
+    assert default_theta_px((640, 480)) == pytest.approx(19.2)
+    assert default_theta_px((480, 640)) == pytest.approx(19.2)
 
 
 def test_scene_points_are_edges_one_to_a_cell():
@@ -273,7 +274,7 @@ def test_a_region_shows_what_the_whole_image_shows_there(real_frame, session, re
     for whole, part, (u0, v0, u1, v1) in zip(observer.evidence(25), observer.evidence(25, boxes), boxes, strict=True):
         assert part.camera.size == (u1 - u0, v1 - v0) == part.distance.shape[::-1]
         assert part.corner_px == (u0, v0)
-        assert part.theta_px == whole.theta_px == default_theta_px(whole.camera)
+        assert part.theta_px == whole.theta_px == default_theta_px(whole.camera.size)
         joints = real_frame.model.points_world(real_frame.values)
         np.testing.assert_allclose(part.camera.project(joints) + np.array([u0, v0]), whole.camera.project(joints))
         inner = (slice(v0 + 8, v1 - 8), slice(u0 + 8, u1 - 8))
@@ -342,7 +343,8 @@ def test_evidence_read_ahead_equals_evidence_read_later(real_frame, monkeypatch,
     boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
     static_edges = None if background else [StaticEdgeModel(c.size) for c in observer.working_cameras]
     expected = observer.evidence(25, boxes, predicted, static_edges)
-    monkeypatch.setattr("tracker.evidence.observer.link_edges", lambda *a: linked.append(a) or link_edges(*a))
+    place = "tracker.evidence.foreground.link_and_sample"
+    monkeypatch.setattr(place, lambda *a: linked.append(a) or link_and_sample(*a))
 
     def look_ahead(regions, still):
         observer.prefetch(25, regions, still)

@@ -12,9 +12,8 @@ from clips import encode
 from tracker.errors import RecordingError
 from tracker.footage import image_file, video_decoder
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.image_file import decode_image, read_image, read_image_or_none, read_unchanged
+from tracker.footage.image_file import decode_image, read_image, read_image_or_none, read_label_image, read_unchanged
 from tracker.footage.image_folder import ImageFolder
-from tracker.footage.mask_image import read_label_image
 from tracker.footage.proxy import Proxy
 from tracker.footage.recording import read_background, read_mask
 from tracker.footage.video import VideoFile

@@ -9,10 +9,10 @@ import pytest
 from clips import SIZE, N, encode, encode_stamped, number, picture, write_images
 
 from tracker.errors import RecordingError
-from tracker.footage.frame_reader import FrameReader
 from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.picture_numbers import picture_numbers
 from tracker.footage.video import VideoFile, open_footage
+from tracker.footage.video_decoder import FrameReader
 
 
 def decode_all(path):

@@ -4,7 +4,8 @@ import pytest
 
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
-from tracker.geometry.cameras import NEAR_PLANE_M, Camera, epipolar_segment, project_with_jacobian, viewed_point
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera, project_with_jacobian, viewed_point
+from tracker.geometry.framing import epipolar_segment
 
 K = np.array([[600.0, 0.0, 315.3], [0.0, 610.0, 244.7], [0.0, 0.0, 1.0]])
 DISTORTIONS = {

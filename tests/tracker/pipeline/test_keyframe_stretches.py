@@ -11,7 +11,7 @@ from stored_motions import put_poses
 from tracker.errors import TrackerError
 from tracker.estimation.chamfer.method import CHAMFER
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.tracking.estimate import PoseEstimate
+from tracker.estimation.tracking.tracker import PoseEstimate
 from tracker.pipeline import track_session
 from tracker.pipeline.keyframe_stretches import KeyframeStretch, frames_of, stretches_to_track
 from tracker.pipeline.methods import METHODS

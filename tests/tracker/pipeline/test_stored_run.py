@@ -12,7 +12,7 @@ from stored_motions import put_poses
 from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.estimation.chamfer.method import CHAMFER
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.tracking.estimate import AlternativePose, BackwardStep, PoseEstimate
+from tracker.estimation.tracking.tracker import AlternativePose, BackwardStep, PoseEstimate
 from tracker.pipeline import methods, track_session
 from tracker.pipeline.methods import METHODS, make_tracker
 from tracker.pipeline.stored_run import TrackPlan, stored_run

@@ -3,7 +3,7 @@ import json
 import numpy as np
 
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.tracking.estimate import AlternativePose, PoseEstimate
+from tracker.estimation.tracking.tracker import AlternativePose, PoseEstimate
 from tracker.pipeline.methods import METHODS, make_tracker
 from tracker.pipeline.tracked_changes import StoredPerson, recorded_method, settings_record, tracked_changes
 from tracker.session.store.annotation_store import AnnotationStore

@@ -1,6 +1,6 @@
 """Poses over time, without images: prediction, interpolation, inconsistent frames, the floor, who is who.
 
-Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`, `shortest_step`,
+Imports `geometry` and `body`. Callers use `velocity.predict`, `velocity.shortest_step`, `interpolation`,
 `consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`, `continuation.who_is_who` and
 `keyframe_doubts`.
 """
@@ -13,7 +13,5 @@ __all__ = [
     "interpolation",
     "keyframe_doubts",
     "pose_path",
-    "prediction",
-    "shortest_step",
     "velocity",
 ]

@@ -1,12 +1,184 @@
-"""Velocities of poses, by which a body is shown to cameras whose pictures were taken between frames."""
+"""Steps between poses in degrees of freedom, the shorter way round; velocities and predictions that follow from them.
+
+Two sets of angles give a joint of three axes, each orthogonal to the one before, the same rotation: `a, b, c` and `a +
+180, 180 - b, c + 180` degrees, with `-b` where the third axis is the first. A search may find either. Numbers that jump
+from one to the other (an Euler flip) look like a fast turn that nobody made.
+
+By its velocity a body is shown to cameras whose pictures were taken between frames.
+"""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.shortest_step import shortest_step
-from tracker.geometry.arrays import Array
+from tracker.body.parts import Joint
+from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array, IntArray
+
+MAX_ORDER = 2
+"""Highest degree of a motion model: GD96 Sect. 4.2 predicts with constant acceleration."""
+
+
+@dataclass(frozen=True)
+class PredictSettings:
+    """Settings of the motion model."""
+
+    order: int = 1
+    """Degree of the polynomial: 0 stays, 1 is constant velocity, 2 is constant acceleration, as in the paper. On noisy
+    poses a parabola overshoots and tracks worse than constant velocity."""
+    window: int = 3
+    """Number of past poses it is fitted to."""
+    full_window: bool = False
+    """Whether the pose stays until there are as many past poses; else fewer are fitted, with a lower degree."""
+    bound_rad: float = float(np.radians(25))
+    """Largest predicted change of an angle from one frame to the next, rad."""
+    bound_m: float = 0.10
+    """Largest predicted change of a position from one frame to the next, metres."""
+
+    def __post_init__(self) -> None:
+        """Check the settings; raise a TrackerError for values that predict nothing."""
+        if not 0 <= self.order <= MAX_ORDER or self.window < 1:
+            raise TrackerError(
+                f"expected a prediction of order 0 to {MAX_ORDER} over at least 1 past pose, found order "
+                f"{self.order} over {self.window}"
+            )
+
+
+def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) -> Array:
+    """Extrapolate the past poses by one frame.
+
+    The polynomial is fitted to the shortest steps from the last pose, so that a rotation continues through half a
+    turn. With too few poses for the order, the order is reduced.
+
+    Args:
+        model: the body.
+        past: its poses, one frame apart, the last one last, (n_values,) each; at least one.
+        settings: degree, window and bounds.
+
+    Returns:
+        The predicted pose within the joint limits, (n_values,).
+    """
+    last, recent = past[-1], past[-settings.window :]
+    short = settings.full_window and len(recent) < settings.window
+    order = 0 if short else min(settings.order, len(recent) - 1)
+    if order == 0:
+        return model.clip(last)
+    steps = np.array([shortest_step(model, p, last) for p in recent])
+    times = np.arange(1.0 - len(recent), 1.0)
+    coefficients = np.linalg.lstsq(np.vander(times, order + 1), steps, rcond=None)[0]
+    step = coefficients.sum(axis=0)  # the polynomial at time 1
+    bound = np.where(model.dof_is_length, settings.bound_m, settings.bound_rad)
+    return model.move(last, np.clip(step, -bound, bound))
+
+
+class _EulerJoint(NamedTuple):
+    """A joint whose rotations have two sets of angles each."""
+
+    dofs: IntArray
+    """Its degrees of freedom, (3,)."""
+    values: IntArray
+    """Indices of its angles in a pose, (3,)."""
+    middle_sum: float
+    """Sum of the middle angles of both sets, rad."""
+    limits: Array
+    """Lowest and highest of each angle, (3, 2), rad."""
+    centers: Array
+    """Angles in the middle between both limits, (3,), rad; NaN without limits."""
+
+    @classmethod
+    def of(cls, model: BodyModel, joint: int, middle_sum: float) -> "_EulerJoint":
+        """Return what is known of a joint, by its index."""
+        dofs = np.flatnonzero((model.dof_joint == joint) & ~model.dof_is_length)
+        limits = model.limits[dofs]
+        centers = [np.mean(x) if np.isfinite(x).all() else np.nan for x in limits]
+        return cls(dofs, model.dof_value[dofs], middle_sum, limits, np.array(centers))
+
+    def other(self, angles: Array, near: Array) -> Array:
+        """Return the other set of angles of the same rotations, (..., 3), each by the turn nearest to another, rad."""
+        out = np.stack([angles[..., 0] + np.pi, self.middle_sum - angles[..., 1], angles[..., 2] + np.pi], axis=-1)
+        return np.asarray(out - 2 * np.pi * np.round((out - near) / (2 * np.pi)))
+
+
+def shortest_step(model: BodyModel, to: Array, start: Array) -> Array:
+    """Return the shortest step, (n_dofs,), by which `BodyModel.retract` gets from one pose to another.
+
+    The numbers that it leads to may be others than those of `to`, and beyond the joint limits: unlimited angles go the
+    shorter way round, and joints to the nearer of their two sets of angles.
+    """
+    return _step_and_flips(model, to, start)[0]
+
+
+def nearest_equivalent(
+    model: BodyModel, poses: Array, reference: Array, active_dofs: NDArray[np.bool_] | None = None
+) -> Array:
+    """Return the same poses by numbers that are nearer to those of a reference.
+
+    Args:
+        model: the body.
+        poses: (..., n_values).
+        reference: (n_values,), or one for each pose.
+        active_dofs: degrees of freedom that may change, (n_dofs,); None: all.
+
+    Returns:
+        Of the two sets of angles of each joint the nearer one, among those within the limits, (..., n_values).
+    """
+    out = np.array(poses)
+    for joint in _euler_joints(model):
+        if active_dofs is not None and not active_dofs[joint.dofs].all():
+            continue
+        near, own = reference[..., joint.values], out[..., joint.values]
+        low, high = joint.limits.T
+        other = joint.other(own, np.where(np.isnan(joint.centers), near, joint.centers))
+        own_fits, other_fits = (np.isclose(x, np.clip(x, low, high)).all(axis=-1) for x in (own, other))
+        is_nearer = ((other - near) ** 2).sum(axis=-1) < ((own - near) ** 2).sum(axis=-1)
+        is_other = (other_fits & (is_nearer | ~own_fits))[..., None]
+        out[..., joint.values] = np.where(is_other, np.clip(other, low, high), own)
+    return out
+
+
+def _step_and_flips(model: BodyModel, to: Array, start: Array) -> tuple[Array, list[int]]:
+    """Return the shortest step, and the middle degrees of freedom of joints that go to their other set of angles."""
+    step, flipped = model.difference(to, start), list[int]()
+    winds = ~model.dof_is_length & np.isinf(model.limits).all(axis=1)
+    step = np.where(winds, np.remainder(step + np.pi, 2 * np.pi) - np.pi, step)
+    for joint in _euler_joints(model):
+        rotation = step[joint.dofs]
+        if rotation @ rotation <= np.pi**2 / 2:  # to the other set, both outer angles go by 180 degrees less
+            continue
+        other = joint.other(np.asarray(to)[joint.values], start[joint.values]) - start[joint.values]
+        if other @ other < rotation @ rotation:
+            step[joint.dofs] = other
+            flipped.append(int(joint.dofs[1]))
+    return step, flipped
+
+
+@lru_cache(maxsize=16)
+def _euler_joints(model: BodyModel) -> Sequence[_EulerJoint]:
+    out = []
+    for i, joint in enumerate(model.joints):
+        middle_sum = middle_angle_sum(joint)
+        if middle_sum is not None:
+            out.append(_EulerJoint.of(model, i, middle_sum))
+    return out
+
+
+def middle_angle_sum(joint: Joint) -> float | None:
+    """Return the sum of the middle angles of both sets of a joint, rad.
+
+    None without three axes, each orthogonal to the one before: such a joint does not reach every orientation.
+    """
+    if joint.kind != "revolute" or len(joint.axes) != 3:
+        return None
+    first, second, third = (np.array(a.direction) for a in joint.axes)
+    if not np.allclose([first @ second, second @ third], 0):
+        return None
+    return float(-2 * np.arctan2(second @ np.cross(first, third), first @ third))
+
 
 NEAR = (-2, -1, 0, 1, 2)
 """Frames whose poses a velocity depends on, from its own."""

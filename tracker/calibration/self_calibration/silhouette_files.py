@@ -8,7 +8,7 @@ import numpy as np
 from tracker.calibration.self_calibration.person_silhouettes import NOTHING, Flaw, PersonSilhouette, measure_silhouette
 from tracker.compute.progress import Report
 from tracker.evidence.silhouettes import SilhouetteFinder
-from tracker.footage.mask_image import parts_of_mask
+from tracker.footage.image_file import parts_of_mask
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera

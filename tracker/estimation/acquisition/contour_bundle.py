@@ -167,7 +167,7 @@ class ContourBundle:
             of_person[fitted] += shared[at]
         for seen, pose, step in zip(self._seen, state.poses, own, strict=True):
             model = self._model(seen)
-            poses.append(model.clip(model.retract(pose, step[: model.n_dofs])))
+            poses.append(model.move(pose, step[: model.n_dofs]))
         return RigState(corrections, tuple(sizes), tuple(poses))
 
     def free(self, state: RigState, equations: ArrowEquations) -> tuple[Mask, Mask]:
@@ -300,7 +300,7 @@ class _GroupResiduals(NamedTuple):
 
 def _by_points(block: PointBlock, body: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> NormalEquations:
     """Return the normal equations of points by the sizes, then by the pose."""
-    by_pose = body.point_jacobian(kinematics, body.point_parts[block.points], body.points_at(kinematics, block.points))
+    _, by_pose = body.points_with_jacobian(kinematics, block.points)
     by_unknowns = np.concatenate([points_by_sizes(body, kinematics, by_sizes)[block.points], by_pose], axis=2)
     r, by_points = block.residuals(body, kinematics)
     rows = by_points @ by_unknowns

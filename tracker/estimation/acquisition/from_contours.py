@@ -35,7 +35,7 @@ from tracker.estimation.fitting.pins import PinBlock
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.search.chamfer_cost import ChamferCost
 from tracker.estimation.tracking.pose_errors import acquired_sigma_m
-from tracker.estimation.tracking.view_regions import read_views, visible_pieces_px
+from tracker.estimation.tracking.view_regions import read_views
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.observer import Observer
@@ -211,6 +211,7 @@ def learn_static_edges(observer: Observer, bodies: Mapping[int, tuple[PosedBody,
     models = [StaticEdgeModel(c.size) for c in observer.working_cameras]
     for k, people in bodies.items():
         views = read_views(observer, k, people, models)
-        visible = [visible_pieces_px(occluding_contours.trace(people, v.camera)) for v in views]
+        contours = [occluding_contours.trace(people, v.camera) for v in views]
+        visible = [c.pieces_px[~c.occluded] for c in contours]
         update_static_edges(models, views, visible)
     return models

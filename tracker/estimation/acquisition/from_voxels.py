@@ -123,7 +123,7 @@ def fit_sizes_to_voxels(
         if number < settings.rounds:
             step, steps, covariance = _step(parameters, sizes, free, [f.equations for f in found])
             sizes = sizes + step
-            poses = [body.clip(body.retract(p, s)) for p, s in zip(poses, steps, strict=True)]
+            poses = [body.move(p, s) for p, s in zip(poses, steps, strict=True)]
     body = with_height_of_stature(parameters.body(sizes), parameters.base)
     return VoxelSizes(
         parameters, sizes, body, covariance, tuple(f.frame for f in frames), tuple(poses), overlaps[0], overlaps[-1]

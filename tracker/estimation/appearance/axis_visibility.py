@@ -3,6 +3,8 @@
 Each part is represented by an ellipsoid: fast, and accurate enough for samples on axes.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,7 @@ ALONG = 7
 """Samples along the axis of each part."""
 
 
+@lru_cache(maxsize=32)  # of each body; asked for on each frame
 def ellipsoids(model: BodyModel) -> Array:
     """Return centre and half-axes of the ellipsoids that represent the parts, (n_parts, 6), metres."""
     return np.array([(*c, *s.half_axes) for c, s in zip(model.centers_part, model.shapes, strict=True)])

@@ -14,7 +14,7 @@ from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.estimation.appearance.color_shares import VOLUME, log_density
-from tracker.estimation.appearance.region_cells import CellView
+from tracker.estimation.appearance.part_drawing import CellView
 from tracker.evidence.images.background_subtraction import MAX_HUE_SHIFT, MIN_SHADE, exposure_gain, has_usable_exposure
 from tracker.evidence.images.change import NOISE_SIGMAS
 from tracker.evidence.images.color_histogram import BINS, bin_of

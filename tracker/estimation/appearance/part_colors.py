@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics, chain_poses
-from tracker.body.model import PosedBody, ahead, parts_of
+from tracker.body.model import BodyModel, PosedBody, ahead, parts_of
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.estimation.appearance.axis_visibility import (
@@ -27,10 +27,9 @@ from tracker.estimation.appearance.axis_visibility import (
 )
 from tracker.estimation.appearance.color_shares import DOUBT, smoothed
 from tracker.estimation.appearance.limb_score import ColorView, LimbScore, LimbScorer, StaticParts
-from tracker.estimation.appearance.region_deficit import counterparts
 from tracker.evidence.contours.occluding_contours import part_poses
 from tracker.evidence.images.color_histogram import BINS, bin_of
-from tracker.evidence.view_evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence, outliers_px
 from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
 
@@ -106,8 +105,8 @@ class Colors:
             person: index of the scored body.
         """
         self._views = [
-            ColorView(v.camera.projection, v.camera.center_world, v.colors, v.distance, v.theta_px)
-            for v in views
+            ColorView(v.camera.projection, v.camera.center_world, v.colors, v.distance, theta)
+            for v, theta in zip(views, outliers_px(views, None).tolist(), strict=True)
             if v.colors is not None
         ]
         self._ahead_frames = np.array([v.ahead_frames for v in views if v.colors is not None])
@@ -233,6 +232,17 @@ class Colors:
             np.empty((n_samples, 2), np.int64), np.empty((n, 13)), np.empty((n, 4)), np.empty(n, np.int64),
             np.empty((4, 3)),
         )  # fmt: skip
+
+
+def counterparts(models: Sequence[BodyModel]) -> IntArray:
+    """Return the index of each part's counterpart on the other side, or of itself without one, (P,)."""
+    out, first = list[int](), 0
+    for model in models:
+        names = [p.name for p in model.parts]
+        swapped = [n.replace("left", "?").replace("right", "left").replace("?", "right") for n in names]
+        out += [first + (names.index(n) if n in names else i) for i, n in enumerate(swapped)]
+        first += len(names)
+    return np.array(out)
 
 
 def _share(counts: Array) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.compute.quantiles import MAD_TO_SIGMA
+from tracker.estimation.appearance.part_colors import counterparts
 from tracker.geometry.arrays import Array, IntArray
 
 _QUARTILES = (25.0, 75.0)
@@ -76,14 +77,3 @@ def worst_views(nats: Array, models: Sequence[BodyModel]) -> IntArray:
     """
     lacks = np.stack([part_deficits(of_view, models) for of_view in nats.transpose(1, 0, 2)])
     return np.asarray(lacks.argmax(axis=0))
-
-
-def counterparts(models: Sequence[BodyModel]) -> IntArray:
-    """Return the index of each part's counterpart on the other side, or of itself without one, (P,)."""
-    out, first = list[int](), 0
-    for model in models:
-        names = [p.name for p in model.parts]
-        swapped = [n.replace("left", "?").replace("right", "left").replace("?", "right") for n in names]
-        out += [first + (names.index(n) if n in names else i) for i, n in enumerate(swapped)]
-        first += len(names)
-    return np.array(out)

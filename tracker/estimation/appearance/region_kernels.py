@@ -29,9 +29,9 @@ class RegionTables(NamedTuple):
     trust: FloatArray
     """T of each bin of r, (P, `N_RATIOS`), nats."""
 
-    def of_view(self, view: int) -> "RegionTables":
-        """Return the tables of one of several views."""
-        return RegionTables(*(table[view] for table in self))
+    def by_view(self) -> tuple["RegionTables", ...]:
+        """Return the tables of each of several views."""
+        return tuple(map(RegionTables, *self))
 
 
 class LimbImages(NamedTuple):

@@ -58,7 +58,7 @@ class RegionLimbScorer:
             nats, trust = np.empty(shape, np.float32), np.empty((len(limb), *shape), np.float32)
             images = LimbImages(Canvas(canvas.nearness, labels), nats, trust)
             share = sample_share(view.camera)
-            fill_limb_images(view.colors, share, frame.background[i], known.tables.of_view(i), parts, images)
+            fill_limb_images(view.colors, share, frame.background[i], known.by_view[i], parts, images)
             self._views.append(_View(view.ahead_frames, P, share, images))
         self.static_nats = float(sum(v.images.static_nats.sum() for v in self._views))
         """Evidence for all bodies without the limb, nats."""

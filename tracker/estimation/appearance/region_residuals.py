@@ -16,8 +16,7 @@ import numpy as np
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody, ahead, parts_of
-from tracker.estimation.appearance.part_drawing import draw, meshes_of
-from tracker.estimation.appearance.region_cells import CELL_PX, CellView
+from tracker.estimation.appearance.part_drawing import CELL_PX, CellView, draw, meshes_of
 from tracker.estimation.appearance.region_kernels import RegionTables, add_score
 from tracker.estimation.appearance.region_model import RegionFrame, RegionModel, sample_share
 from tracker.estimation.appearance.region_residual_kernels import add_depth_forces, add_region_pulls
@@ -44,6 +43,8 @@ class _View(NamedTuple):
     """Log density of the colour of each cell as background, (h, w)."""
     tables: RegionTables
     """Of the view."""
+    share: float
+    """See `sample_share`."""
     scratch: Scratch
     """For the pieces of its contours."""
 
@@ -72,7 +73,7 @@ class _RegionResiduals:
         camera, scratch, models = view.cells.camera, view.scratch, tuple(x.model for x in self.bodies)
         P, eye, surfaces = camera.projection, camera.center_world, surfaces_of(models)
         canvas = draw(meshes_of(models), P, Ts, *view.cells.colors.shape[:2])
-        place = view.cells.colors, canvas, sample_share(camera), view.background, view.tables
+        place = view.cells.colors, canvas, view.share, view.background, view.tables
         nats, samples = np.zeros((2, len(Ts)))
         add_score(*place, nats, samples)
         place_parts(Ts, surfaces, scratch.traced)
@@ -102,9 +103,9 @@ def region_residuals(known: RegionModel, frame: RegionFrame, bodies: Sequence[Po
         views = []
         for i, v in shown:
             if v.ahead_frames == time:
-                room = contour_room(v.camera, len(bodies), _PIECE_CELLS)
-                tables = known.tables.of_view(i)
-                views.append(_View(v, frame.background[i], tables, scratch_buffer(surfaces, room, 0)))
+                room = contour_room([v.camera], len(bodies), _PIECE_CELLS)
+                scratch = scratch_buffer(surfaces, room, 0)
+                views.append(_View(v, frame.background[i], known.by_view[i], sample_share(v.camera), scratch))
         own = _RegionResiduals(views, ahead(bodies, time), person)
         blocks.append(at_time(own, bodies[person].velocity, time))
     return SummedBlocks(blocks)

@@ -15,7 +15,6 @@ __all__ = [
     "options",
     "part_evidence",
     "pose_score",
-    "region_scorer",
     "settings",
     "start_pose",
 ]

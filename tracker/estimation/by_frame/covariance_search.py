@@ -17,7 +17,7 @@ from tracker.estimation.by_frame.pose_score import PoseScorer
 from tracker.estimation.by_frame.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
 from tracker.estimation.fitting.gauss_newton import PosePrior, ResidualBlock
-from tracker.estimation.fitting.gauss_newton_compiled import solver_of
+from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
 
@@ -50,7 +50,7 @@ def search_along_covariance(
 
     def refined(scorer: PoseScorer, pose: Array) -> Hypothesis:
         held = PosePrior(pose, 1 / own)
-        fit = solver_of(model)(
+        fit = solve_fast(
             model, pose, _blocks(scorer, held), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
         )
         return Hypothesis.refined(model, fit, scorer.cost(fit) - held.cost(model, fit.pose))
@@ -59,7 +59,7 @@ def search_along_covariance(
     cheapest = min(others, key=lambda x: x.cost)
     best = cheapest if cheapest.cost < here.cost - CLEAR_NATS else here
     entry = Search.of("samples", (), here.cost, cheapest.cost, best is cheapest)
-    return scorer.scored(model, solver_of(model)(model, best.pose, scorer.blocks, scorer.active_dofs, 0)), entry
+    return scorer.scored(model, solve_fast(model, best.pose, scorer.blocks, scorer.active_dofs, 0)), entry
 
 
 def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:
@@ -71,12 +71,12 @@ def _samples(model: BodyModel, pose: Array, scorer: PoseScorer, sigma: Array, dr
     """Return poses drawn around a pose, (n_values,) each."""
     free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
     blocks = _blocks(scorer, PosePrior(pose, 1 / sigma))
-    around = solver_of(model)(model, pose, blocks, scorer.active_dofs, 0)
+    around = solve_fast(model, pose, blocks, scorer.active_dofs, 0)
     # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))
     steps[:, free] = _SCALE * np.linalg.solve(factor.T, _normal_samples(_N_SAMPLES, len(free), draw).T).T
-    return [model.clip(model.retract(pose, step)) for step in steps]
+    return [model.move(pose, step) for step in steps]
 
 
 @lru_cache(maxsize=8)

@@ -3,23 +3,20 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from tracker.body.model import PosedBody, ahead
-from tracker.body.motion.prediction import PredictSettings
-from tracker.body.motion.shortest_step import shortest_step
+from tracker.body.model import PosedBody
+from tracker.body.motion.velocity import PredictSettings, shortest_step
 from tracker.compute.threads import map_parallel
 from tracker.estimation.by_frame.assessment import PersonEstimate
 from tracker.estimation.by_frame.frame_estimator import FrameEstimator
 from tracker.estimation.by_frame.frame_problem import Bodies
-from tracker.estimation.by_frame.settings import EstimationSettings, chamfer_cost
+from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.by_frame.start_pose import SearchedStart, StartFrame, settle_starts
 from tracker.estimation.search.chamfer_cost import ChamferCost
 from tracker.estimation.tracking.confidence import Status
-from tracker.estimation.tracking.estimate import AlternativePose, PoseEstimate
 from tracker.estimation.tracking.person_memory import PersonMemory
-from tracker.estimation.tracking.tracker import TrackingRun
-from tracker.estimation.tracking.view_regions import confirmed_regions, regions, visible_pieces_px
-from tracker.evidence.contours import occluding_contours
-from tracker.evidence.contours.occluding_contours import Contour
+from tracker.estimation.tracking.tracker import AlternativePose, PoseEstimate, TrackingRun
+from tracker.estimation.tracking.view_regions import confirmed_regions, regions
+from tracker.evidence.contours.occluding_contours import Contour, trace_views
 from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
@@ -102,7 +99,7 @@ class _ForwardPass:
         fixed, people = subjects.keyframes_at(frame), range(len(subjects.models))
         estimates = estimator.estimate([p for p in subjects.tracked if p not in fixed])
         statuses: list[Status] = [estimates[p].status if p in estimates else "good" for p in people]
-        cost_of = self._learn(frame, estimator, seen.views, statuses, starts)
+        cost_of = self._learn(fixed, estimator, seen.views, statuses, starts)
         return _Found(frame, estimator, estimates, starts, cost_of)
 
     def collected(self, found: _Found) -> PoseEstimate:
@@ -141,9 +138,8 @@ class _ForwardPass:
     def _observe(self, frame: int, bodies: Bodies, where: Sequence[Region | None]) -> _Seen:
         """Trace the contours of all people in each view, and compute the evidence around them."""
         observer, settings = self._run.observer, self._settings
-        times = zip(observer.working_cameras, observer.ahead_frames(frame), strict=True)
-        contours = [occluding_contours.trace(ahead(bodies, t), c) for c, t in times]
-        visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
+        contours = trace_views(bodies, observer.working_cameras, observer.ahead_frames(frame))
+        visible = [c.pieces_px[~c.occluded] for c in contours] if settings.segments else None
         return _Seen(bodies, contours, observer.evidence(frame, where, visible, self._static_edges, settings.edges))
 
     def _settled(self, seen: _Seen) -> tuple[_Seen, dict[int, SearchedStart]]:
@@ -161,20 +157,22 @@ class _ForwardPass:
         return seen, starts
 
     def _learn(
-        self, frame: int, estimator: FrameEstimator, views: Sequence[ViewEvidence], statuses: Sequence[Status],
-        starts: Mapping[int, SearchedStart],
+        self, keyframes: Mapping[int, Array], estimator: FrameEstimator, views: Sequence[ViewEvidence],
+        statuses: Sequence[Status], starts: Mapping[int, SearchedStart],
     ) -> ChamferCost:  # fmt: skip
         """Learn from the poses of a frame, and return the cost around its estimates.
 
         If a frame contradicts its keyframe, colours are learnt from the settled pose.
         """
-        keyframes = self._run.subjects.keyframes_at(frame)
         settled = {p: starts[p].body for p in starts if starts[p].taken and p in keyframes}
         learnt = tuple(settled.get(p, b) for p, b in enumerate(estimator.bodies))
         _remember(self._memories, estimator, learnt, statuses, keyframes)
-        cost_of = chamfer_cost(views, estimator.bodies, self._settings)
+        settings = self._settings
+        cost_of = ChamferCost(views, estimator.bodies, settings.theta_px, settings.outliers)
         if self._static_edges is not None:
-            there = cost_of if learnt == estimator.bodies else chamfer_cost(views, learnt, self._settings)
+            there = cost_of
+            if learnt != estimator.bodies:
+                there = ChamferCost(views, learnt, settings.theta_px, settings.outliers)
             update_static_edges(self._static_edges, views, there.predicted_pieces_px)
         return cost_of
 

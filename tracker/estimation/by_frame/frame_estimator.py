@@ -6,7 +6,8 @@ the whole body is searched, if the method does that, and proposals of single lim
 cheapest refined pose wins.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import combinations
 
 from tracker.body.limbs import Limb, limb_display_name
 from tracker.body.model import PosedBody
@@ -15,13 +16,19 @@ from tracker.compute.threads import map_parallel
 from tracker.estimation.appearance.part_colors import Colors
 from tracker.estimation.by_frame.assessment import PersonEstimate, assess, estimate_fixed, finalize
 from tracker.estimation.by_frame.frame_problem import Bodies, FrameProblem, PersonFit, PersonPrior, with_body
-from tracker.estimation.by_frame.identity_swaps import identity_swaps
 from tracker.estimation.by_frame.limb_recovery import search_entry, search_limbs
 from tracker.estimation.by_frame.pose_score import PoseScorer
 from tracker.estimation.by_frame.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
 from tracker.estimation.fitting.gauss_newton import Fit, with_locked_dofs
-from tracker.estimation.fitting.hypothesis import SAME_POSE_M, SETTLED_M, distance_m, limbs_elsewhere
+from tracker.estimation.fitting.hypothesis import (
+    BEAM_NATS,
+    CLEAR_NATS,
+    SAME_POSE_M,
+    SETTLED_M,
+    distance_m,
+    limbs_elsewhere,
+)
 from tracker.estimation.tracking.person_memory import PersonMemory
 from tracker.evidence.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
@@ -207,3 +214,45 @@ class FrameEstimator:
         other = min(tried, key=scorer.cost)
         before, after = scorer.cost(fit), scorer.cost(other)
         return evaluations, other if after < before else fit, Search.of("body", (), before, after, after < before)
+
+
+def identity_swaps(
+    problem: FrameProblem, bodies: Bodies, fits: Mapping[int, PersonFit]
+) -> dict[tuple[int, int], tuple[Array, ...]]:
+    """Return the pairs that may be swapped, and the poses of all people, (n_values,) each, with that pair swapped.
+
+    Each of a pair takes the other's pose and is refined there, with their own prediction and their own colours.
+
+    Args:
+        problem: of the frame.
+        bodies: all people as they were found.
+        fits: of the people who were tracked.
+    """
+    swaps, recover = {}, problem.settings.recover
+    color_weight = recover.colors if recover else 0.0
+    for p, q in combinations(fits, 2):
+        if bodies[p].model.value_names != bodies[q].model.value_names or not _is_plausible(problem, bodies, p, q):
+            continue
+        here = sum(fits[i].fit.cost - color_weight * problem.color_nats(i, bodies) for i in (p, q))
+        swapped = with_body(bodies, p, PosedBody(bodies[p].model, bodies[q].values))
+        swapped = with_body(swapped, q, PosedBody(bodies[q].model, bodies[p].values))
+        there = 0.0
+        for i in (p, q):
+            refined = problem.refine(i, swapped, fits[i])
+            swapped = with_body(swapped, i, refined.body)
+            there += refined.fit.cost - color_weight * problem.color_nats(i, swapped)
+        if there < here + CLEAR_NATS:
+            swaps[p, q] = tuple(b.values for b in swapped)
+    return swaps
+
+
+def _is_plausible(problem: FrameProblem, bodies: Bodies, p: int, q: int) -> bool:
+    """Return whether the predictions of two people admit a swap."""
+    increase = 0.0
+    for i, other in ((p, q), (q, p)):
+        model, prediction = bodies[i].model, problem.priors(i, bodies)[0]
+        swapped, own = (
+            prediction.linearize(model, bodies[k].values, model.kinematics(bodies[k].values)).cost for k in (other, i)
+        )
+        increase += swapped - own
+    return increase < BEAM_NATS

@@ -5,6 +5,7 @@ Nothing here moves a person: bodies come in as arguments, and fits are returned.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.prediction import PredictSettings
-from tracker.body.motion.shortest_step import shortest_step
+from tracker.body.motion.velocity import PredictSettings, shortest_step
 from tracker.body.searches import Search
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.by_frame.settings import (
@@ -21,20 +21,18 @@ from tracker.estimation.by_frame.settings import (
     OWN_TRUST,
     TOLERANCE,
     EstimationSettings,
-    prior_blocks,
-    trust,
 )
 from tracker.estimation.fitting.clocked_residuals import ClockedResiduals, PersonResiduals, person_residuals
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE, PartCosts
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
-from tracker.estimation.fitting.gauss_newton_compiled import solver_of
+from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
 from tracker.estimation.fitting.hypothesis import SETTLED_M, Hypothesis, distance_m
-from tracker.estimation.fitting.interpenetration import BodyPenetration
+from tracker.estimation.fitting.interpenetration import BodyPenetration, SelfPenetration
 from tracker.estimation.fitting.keypoints import keypoint_blocks
 from tracker.estimation.tracking.confidence import PoseQuality
 from tracker.estimation.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
 from tracker.evidence.contours.occluding_contours import Contour
-from tracker.evidence.view_evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence, outliers_px
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import ROUNDING_PX2
 
@@ -122,10 +120,15 @@ class FrameProblem:
             predicted: all people as predicted, and their contours in each view, if those have been traced.
         """
         self.views, self.people, self.settings = tuple(views), tuple(people), settings
-        self.thetas_px = np.array([v.outlier_px(settings.theta_px) for v in views])
+        self.thetas_px = outliers_px(views, settings.theta_px)
         """Outlier distance of each view, (V,), working px."""
         self._predicted = predicted
-        self._pool, self._assignments = EvidencePool(views), list[EvidenceAssignment]()
+        self._assignments = list[EvidenceAssignment]()
+        self._colors: dict[int, tuple[Bodies, Colors]] = {}
+
+    @cached_property
+    def _pool(self) -> EvidencePool:
+        return EvidencePool(self.views)
 
     def refine(self, person: int, bodies: Bodies, before: PersonFit | None = None) -> PersonFit:
         """Refine the pose of one person, and return the fit.
@@ -176,38 +179,51 @@ class FrameProblem:
         """Return a fit as if its pose, little trusted, were the prediction of all limbs, if it has one."""
         if not found.is_predicted:
             return found.fit
-        prediction, own, *_ = self._priors_of(person, found)
-        return found.fit.with_prior(self.people[person].model, prediction, own)
+        predicted, sigma = self.people[person].predicted, self._sigma_of(person, found.untrusted_limbs or ())
+        return found.fit.with_prior(
+            self.people[person].model, PosePrior(predicted, 1 / sigma), self._own(person, found)
+        )
+
+    def _own(self, person: int, found: PersonFit) -> PosePrior:
+        """Return the pose of a fit as a weak prior."""
+        return PosePrior(found.fit.pose, 1 / (OWN_TRUST * self.sigma(person)))
 
     def _priors_of(self, person: int, found: PersonFit) -> tuple[PosePrior, PosePrior, *tuple[ResidualBlock, ...]]:
         """Return the prediction of a fit, its pose as a weak prior in that place, and the other prior terms."""
         prediction, *others = self.priors(person, found.bodies, found.untrusted_limbs or ())
         assert isinstance(prediction, PosePrior)
-        return prediction, PosePrior(found.fit.pose, 1 / (OWN_TRUST * self.sigma(person))), *others
+        return prediction, self._own(person, found), *others
 
     def solve(
         self, person: int, start: Array, blocks: Sequence[ResidualBlock], max_iterations: int, min_decrease: float = 0.0
     ) -> Fit:
         """Minimize the cost of some blocks from a pose, (n_values,)."""
         model, active = self.people[person].model, self.people[person].active_dofs
-        return solver_of(model)(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
+        return solve_fast(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
 
     def sigma(self, person: int) -> Array:
         """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
         return trust(self.people[person].model, self.settings)
 
+    def _sigma_of(self, person: int, untrusted: Sequence[Limb]) -> Array:
+        """Return `sigma`, large for untrusted limbs."""
+        sigma = self.sigma(person)
+        for limb in untrusted:
+            assert self.settings.recover is not None
+            sigma[limb.dofs] = self.settings.recover.trust_rad
+        return sigma
+
     def priors(self, person: int, bodies: Bodies, untrusted: Sequence[Limb] = ()) -> list[ResidualBlock]:
         """Build the terms beside the contours: prediction (first, weak for untrusted limbs), joint spread, penetration,
         key points."""
-        settings, model, sigma = self.settings, self.people[person].model, self.sigma(person)
-        for limb in untrusted:
-            assert settings.recover is not None
-            sigma[limb.dofs] = settings.recover.trust_rad
-        return [
+        model, sigma = self.people[person].model, self._sigma_of(person, untrusted)
+        blocks = [
             *prior_blocks(model, self.people[person].predicted, sigma),
-            *penetration(bodies, person, settings),
-            *keypoint_blocks(self.views, person, bodies[person].velocity),
+            *penetration(bodies, person, self.settings),
         ]
+        if any(v.keypoints for v in self.views):
+            blocks += keypoint_blocks(self.views, person, bodies[person].velocity)
+        return blocks
 
     def residuals(self, person: int, bodies: Bodies, everywhere: bool = False) -> PersonResiduals:
         """Build the residuals of a person's contours against the evidence assigned to them.
@@ -240,7 +256,7 @@ class FrameProblem:
         An assignment made for poses within a centimetre is used again.
         """
         if len(bodies) == 1 or not self.settings.occlusion:
-            return [self._pool.all_edges if everywhere else self._pool.views] * len(people)
+            return [self._pool.all_edges if everywhere else self.views] * len(people)
         assignment = next((a for a in reversed(self._assignments) if _are_near(a.bodies, bodies)), None)
         if assignment is None:
             assignment = EvidenceAssignment(self._pool, bodies)
@@ -248,8 +264,11 @@ class FrameProblem:
         return [assignment.own(p, everywhere) for p in people]
 
     def colors(self, person: int, bodies: Bodies) -> Colors:
-        """Return the colours of the frame under a person."""
-        return Colors(self.views, *self.around(person, bodies))
+        """Return the colours of the frame under a person. Those of the last bodies are kept."""
+        known = self._colors.get(person)
+        if known is None or known[0] != bodies:
+            known = self._colors[person] = bodies, Colors(self.views, *self.around(person, bodies))
+        return known[1]
 
     def color_nats(self, person: int, bodies: Bodies) -> float:
         """Return the log-likelihood ratio of the colours under a person, nats; 0 where their colours are unknown."""
@@ -288,3 +307,19 @@ def _are_near(before: Sequence[PosedBody], now: Sequence[PosedBody]) -> bool:
 def penetration(bodies: Bodies, person: int, settings: EstimationSettings) -> list[ResidualBlock]:
     """Return the term against the penetration of other bodies, if there are any and it is wanted."""
     return [BodyPenetration(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []
+
+
+def trust(model: BodyModel, settings: EstimationSettings) -> Array:
+    """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
+    return np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
+
+
+def prior_blocks(model: BodyModel, predicted: Array, sigmas: Array) -> list[ResidualBlock]:
+    """Build the prior terms of one body: prediction, joint spread and self-penetration.
+
+    Args:
+        model: the body.
+        predicted: the predicted pose, (n_values,).
+        sigmas: its standard deviations, (n_dofs,), rad or metres.
+    """
+    return [PosePrior(predicted, 1 / sigmas), PosePrior.of_spreads(model), SelfPenetration()]

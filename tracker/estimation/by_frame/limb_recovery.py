@@ -15,16 +15,16 @@ import numpy as np
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
-from tracker.body.motion.shortest_step import nearest_equivalent
+from tracker.body.motion.velocity import nearest_equivalent
 from tracker.body.searches import Search, SearchKind
 from tracker.compute.jit import njit
+from tracker.compute.sampling import even_points
 from tracker.compute.threads import N_HELPERS, kernel_pool
 from tracker.estimation.by_frame.pose_score import PoseScorer
 from tracker.estimation.by_frame.settings import RecoverSettings
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
-from tracker.estimation.fitting.gauss_newton_compiled import solver_of
+from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
 from tracker.estimation.fitting.hypothesis import BEAM_NATS, CLEAR_NATS, SAME_POSE_M, Hypothesis, apart, distinct
-from tracker.estimation.search.even_points import even_points
 from tracker.geometry.arrays import Array, IntArray
 
 T = TypeVar("T")
@@ -93,7 +93,7 @@ def _search_limb(
     """
 
     def limb_only(scorer: PoseScorer, pose: Array) -> Hypothesis:
-        return scorer.scored(model, solver_of(model)(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE))
+        return scorer.scored(model, solve_fast(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE))
 
     def whole_body(scorer: PoseScorer, pose: Array) -> Hypothesis:
         return scorer.fitted(model, pose)
@@ -159,7 +159,7 @@ def _put(Ts: Array, parts: IntArray, points: Array, places: Array) -> None:
 def with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:
     """Return a pose, (n_values,), with the limb of another."""
     change = np.where(limb.dofs, model.difference(other, values), 0.0)
-    return model.clip(model.retract(values, change))
+    return model.move(values, change)
 
 
 def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSettings) -> Array:
@@ -212,4 +212,4 @@ def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Arra
         return out
     changes = np.zeros((len(poses), model.n_dofs))
     changes[:, dofs] = steps
-    return np.array([model.clip(model.retract(pose, change)) for pose, change in zip(poses, changes, strict=True)])
+    return np.array([model.move(pose, change) for pose, change in zip(poses, changes, strict=True)])

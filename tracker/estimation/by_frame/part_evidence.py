@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.progress import Report, unreported
-from tracker.estimation.appearance.part_drawing import draw_bodies
-from tracker.estimation.appearance.region_cells import cells_of
-from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions
-from tracker.estimation.appearance.region_model import RegionModel, RegionScore
+from tracker.estimation.appearance.part_drawing import cells_of, draw_bodies
+from tracker.estimation.appearance.region_model import LearningFrame, RegionModel, RegionScore, learn_regions
 from tracker.estimation.by_frame.frame_problem import Bodies
 from tracker.estimation.fitting.clocked_residuals import person_residuals
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS
@@ -191,7 +189,7 @@ def _outside(view: ViewEvidence, bodies: Sequence[PosedBody]) -> Array:
     n, silhouette, cells = sum(len(b.model.parts) for b in bodies), view.silhouette, cells_of(view)
     if silhouette is None or cells is None:
         return np.full(n, np.nan)
-    labels = draw_bodies(bodies, cells).labels.ravel()
+    labels = draw_bodies(bodies, [cells])[0].labels.ravel()
     inside = cells_of(with_colors_only(view, np.repeat(np.uint8(255) * silhouette.inside[..., None], 3, axis=2)))
     assert inside is not None  # of the same region
     total = np.bincount(labels, minlength=n + 1)[1:].astype(np.float64)

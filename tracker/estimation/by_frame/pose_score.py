@@ -1,7 +1,7 @@
 """The one score of a pose on a frame, in nats: by contours, colours and priors together."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.limbs import Limb
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.threads import N_HELPERS, kernel_pool, map_chunked
 from tracker.estimation.appearance.part_colors import Colors, PartColors
-from tracker.estimation.by_frame.frame_problem import Bodies, penetration
+from tracker.estimation.appearance.region_limb_scorer import RegionLimbScorer
+from tracker.estimation.appearance.region_model import RegionFrame, RegionModel
+from tracker.estimation.by_frame.frame_problem import Bodies, penetration, with_body
 from tracker.estimation.by_frame.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, RecoverSettings
 from tracker.estimation.fitting.clocked_residuals import PersonResiduals, person_residuals
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
-from tracker.estimation.fitting.gauss_newton_compiled import solver_of
+from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.fitting.interpenetration import SelfPenetration
 from tracker.estimation.fitting.keypoints import keypoint_blocks
@@ -84,7 +86,7 @@ class PoseScorer:
 
     def fitted(self, model: BodyModel, pose: Array) -> Hypothesis:
         """Return the hypothesis of a pose, (n_values,), after its refinement."""
-        fit = solver_of(model)(model, pose, self.blocks, self.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+        fit = solve_fast(model, pose, self.blocks, self.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
         return self.scored(model, fit)
 
     def costs(self, candidates: Array) -> Array:
@@ -119,7 +121,7 @@ class PoseScorer:
 
         def refine(own: PoseScorer, pose: Array) -> Array:
             blocks = [*own.blocks, PosePrior(pose, 1 / sigma)]
-            return solver_of(model)(model, pose, blocks, own.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE).pose
+            return solve_fast(model, pose, blocks, own.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE).pose
 
         return np.array(self.each(refine, poses))
 
@@ -164,3 +166,65 @@ def without_prediction(
     model, velocity = bodies[person].model, bodies[person].velocity
     priors = [PosePrior.of_spreads(model), SelfPenetration(), *penetration(bodies, person, settings)]
     return FrameBlocks(residuals, priors, keypoint_blocks(views, person, velocity))
+
+
+class FrameEvidence(NamedTuple):
+    """The evidence of a frame on which poses are compared."""
+
+    views: Sequence[ViewEvidence]
+    """Evidence around all people, with all edges that may be theirs; see `common_evidence`."""
+    known: RegionModel
+    """Appearance of the people and places of the run."""
+    regions: RegionFrame
+    """Region evidence of the frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class RegionScorer(PoseScorer):
+    """Scores poses by contours, priors and region evidence. Colours of parts only rank proposals."""
+
+    evidence: FrameEvidence
+    bodies: Bodies
+    """All people; the scored person may be in any pose."""
+    person: int
+    """Index of the scored person."""
+    limb: Limb | None = None
+    """The limb in which poses differ; None if they may differ everywhere."""
+    limb_scorers: dict[bytes, RegionLimbScorer] = field(default_factory=dict)
+    """Scorer of the limb by the rest of the pose."""
+
+    def restricted_to(self, limb: Limb) -> "RegionScorer":
+        """See `PoseScorer.restricted_to`."""
+        return with_regions(super().restricted_to(limb), self.evidence, self.bodies, self.person, limb)
+
+    def _color_costs(self, poses: Array) -> Array:
+        if self.limb is None:
+            known, regions = self.evidence.known, self.evidence.regions
+            return -np.array([known.nats(regions, self._bodies(pose)) for pose in poses])
+        moves = np.isin(np.arange(poses.shape[1]), self.bodies[self.person].model.dof_value[self.limb.dofs])
+        rests, nats = [pose[~moves].tobytes() for pose in poses], np.zeros(len(poses))
+        for rest in set(rests):
+            own = np.array([r == rest for r in rests])
+            nats[own] = self._limb_nats(rest, poses[own])
+        return -nats
+
+    def _limb_nats(self, rest: bytes, poses: Array) -> Array:
+        """Return the evidence for poses, (n, n_values), of one rest, (n,), nats."""
+        assert self.limb is not None
+        scorer = self.limb_scorers.get(rest)
+        if scorer is None:
+            known, regions = self.evidence.known, self.evidence.regions
+            scorer = RegionLimbScorer(known, regions, self._bodies(poses[0]), self.person, self.limb.parts)
+            self.limb_scorers[rest] = scorer
+        return scorer(poses) + scorer.static_nats
+
+    def _bodies(self, pose: Array) -> Bodies:
+        return with_body(self.bodies, self.person, PosedBody(self.bodies[self.person].model, pose))
+
+
+def with_regions(
+    plain: PoseScorer, evidence: FrameEvidence, bodies: Bodies, person: int, limb: Limb | None = None
+) -> RegionScorer:
+    """Return a scorer that adds region evidence to a plain one; see `RegionScorer`."""
+    own = {f.name: getattr(plain, f.name) for f in fields(PoseScorer)}
+    return RegionScorer(**own, evidence=evidence, bodies=bodies, person=person, limb=limb)

@@ -1,21 +1,17 @@
 """Settings that all trackers share: motion model, evidence, priors, recovery; and the priors and the shown
 cost that follow from them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 
-from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.prediction import PredictSettings
+from tracker.body.motion.velocity import PredictSettings
 from tracker.estimation.fitting.contour_residuals import MatchSettings
-from tracker.estimation.fitting.gauss_newton import CLOSE_ENOUGH, PosePrior, ResidualBlock
+from tracker.estimation.fitting.gauss_newton import CLOSE_ENOUGH
 from tracker.estimation.fitting.hypothesis import BEAM_WIDTH
-from tracker.estimation.fitting.interpenetration import SelfPenetration
-from tracker.estimation.search.chamfer_cost import ChamferCost, Outliers
-from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
-from tracker.geometry.arrays import Array
+from tracker.estimation.search.chamfer_cost import Outliers
+from tracker.evidence.view_evidence import EdgeSettings
 
 MAX_ITERATIONS = 15
 """Gauss-Newton iterations of a whole body."""
@@ -105,26 +101,3 @@ def at_stride(settings: EstimationSettings, stride: int) -> EstimationSettings:
         settings, trust_rad=stride * settings.trust_rad, trust_m=stride * settings.trust_m,
         predict=replace(motion, bound_rad=stride * motion.bound_rad, bound_m=stride * motion.bound_m),
     )  # fmt: skip
-
-
-def trust(model: BodyModel, settings: EstimationSettings) -> Array:
-    """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
-    return np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
-
-
-def chamfer_cost(
-    views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], settings: EstimationSettings
-) -> ChamferCost:
-    """Return the cost function around posed bodies."""
-    return ChamferCost(views, bodies, settings.theta_px, settings.outliers)
-
-
-def prior_blocks(model: BodyModel, predicted: Array, sigmas: Array) -> list[ResidualBlock]:
-    """Build the prior terms of one body: prediction, joint spread and self-penetration.
-
-    Args:
-        model: the body.
-        predicted: the predicted pose, (n_values,).
-        sigmas: its standard deviations, (n_dofs,), rad or metres.
-    """
-    return [PosePrior(predicted, 1 / sigmas), PosePrior.of_spreads(model), SelfPenetration()]

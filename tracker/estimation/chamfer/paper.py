@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 
 from tracker.body.motion.history import HISTORY_FRAMES
-from tracker.body.motion.prediction import PredictSettings
+from tracker.body.motion.velocity import PredictSettings
 from tracker.estimation.chamfer.constants import PAPER_BODY
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.search.best_first import SearchSettings
-from tracker.estimation.tracking.subjects import require_body
+from tracker.estimation.tracking.tracker import require_body
 from tracker.evidence.view_evidence import EdgeSettings
 from tracker.geometry.shapes import TaperedSuperquadric
 

@@ -7,10 +7,10 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.estimation.by_frame.settings import EstimationSettings, chamfer_cost
+from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.search.best_first import SearchSettings, SearchStep, search
 from tracker.estimation.search.chamfer_cost import ChamferCost
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
 
@@ -42,7 +42,8 @@ def pose_cost(
 
     The velocities of the people, if given, move them to the time of each picture.
     """
-    return chamfer_cost(views, list(map(PosedBody, models, poses, velocities or [None] * len(poses))), settings)
+    bodies = list(map(PosedBody, models, poses, velocities or [None] * len(poses)))
+    return ChamferCost(views, bodies, settings.theta_px, settings.outliers)
 
 
 def search_frame(

@@ -9,8 +9,8 @@ from tracker.estimation.fitting.contour_arrays import ContourMotion, ContourTerm
 from tracker.estimation.fitting.segment_matching import match_points, pack_visible, store_static
 from tracker.estimation.fitting.twists import add_twists
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.contours.pieces import PIECE_PX, place_parts
-from tracker.evidence.contours.static_cache import StaticContours, copy_poses, is_static_unchanged, trace_moving_parts
+from tracker.evidence.contours.pieces import PIECE_PX, StaticContours, place_parts
+from tracker.evidence.contours.static_cache import copy_poses, is_static_unchanged, trace_moving_parts
 from tracker.evidence.images.distance_transform import bilinear
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
 

@@ -27,20 +27,20 @@ from tracker.estimation.fitting.contour_arrays import (
     ContourMotion,
     ContourTerm,
     ViewArrays,
+    points_to_match,
     scratch_buffer,
     sums_buffer,
 )
 from tracker.estimation.fitting.contour_kernels import COST_ONLY, WITH_JACOBIAN, accumulate_normal_equations
 from tracker.estimation.fitting.gauss_newton import NormalEquations
-from tracker.estimation.fitting.match_points import points_to_match
 from tracker.estimation.fitting.twists import twists_to_dofs
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.contours.static_cache import StaticContours, static_contours_buffer
+from tracker.evidence.contours.pieces import StaticContours, static_contours_buffer
 from tracker.evidence.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
-from tracker.evidence.view_evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence, outliers_px
 from tracker.geometry.arrays import Array, FloatArray, IntArray
-from tracker.geometry.cameras import Camera
-from tracker.geometry.segment_distance import sort_points, stack_rows
+from tracker.geometry.cameras import Camera, projections
+from tracker.geometry.segment_distance import stack_points
 
 CAPTURE = 2.0
 """Edge points farther than this many outlier distances from the predicted contours are left out for good. Halved and
@@ -153,30 +153,29 @@ class ContourResiduals:
         self._models, self._person = tuple(b.model for b in bodies), person
         self._model = bodies[person].model
         self._own = parts_of([b.model for b in bodies], person)
-        thetas = [v.outlier_px(theta_px) for v in views]
+        thetas = outliers_px(views, theta_px)
         near: Sequence[occluding_contours.Contour | None] = [None] * len(views)
         if not everywhere:
             near = contours or [occluding_contours.trace(bodies, v.camera) for v in views]
         points = [
             points_to_match(v, contour, CAPTURE * theta, settings.edges, settings.silhouette)
-            for v, contour, theta in zip(views, near, thetas, strict=True)
+            for v, contour, theta in zip(views, near, thetas.tolist(), strict=True)
         ]
-        sorted_points = [sort_points(p, v.camera.size) for p, v in zip(points, views, strict=True)]
+        sizes = [v.camera.size for v in views]
+        of_views = stack_points(points, sizes)
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         arrays = ViewArrays(
-            np.stack([v.camera.projection for v in views]),
-            np.stack([v.camera.center_world for v in views]),
-            np.array([v.camera.size for v in views], dtype=np.int64),
+            *projections([v.camera for v in views]),
+            np.array(sizes, dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),
-            np.ascontiguousarray(np.concatenate([s.points for s in sorted_points], axis=1)),
-            np.cumsum([0] + [s.points.shape[1] for s in sorted_points]),
-            stack_rows([s.rows for s in sorted_points]),
-            np.array(thetas),
+            of_views.points,
+            of_views.firsts,
+            of_views.rows,
+            thetas,
             # A view without edges does not count; its distance image is flat.
             np.array([weights if len(v.points_px) else 0 * weights for v in views]),
         )
-        widest = max((v.camera for v in views), key=lambda camera: camera.width)
-        self._max_pieces = occluding_contours.contour_room(widest, len(bodies))
+        self._max_pieces = occluding_contours.contour_room([v.camera for v in views], len(bodies))
         surfaces, Ts, own = (
             surfaces_of(tuple(b.model for b in bodies)),
             occluding_contours.part_poses(bodies),

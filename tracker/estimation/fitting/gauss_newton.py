@@ -7,7 +7,7 @@ A residual block returns the normal equations of its weighted residuals at a pos
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -97,13 +97,9 @@ class PointTargets:
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        parts, points_world = model.point_parts[self.points], model.points_at(kinematics, self.points)
-        if self.centers and model.center_offsets.any():
-            parts = np.where(model.center_offsets[self.points].any(axis=1), model.proximal_parts[self.points], parts)
-            points_world = model.joint_centers_at(kinematics, self.points)
-        J = model.point_jacobian(kinematics, parts, points_world) * self.weights[:, None, None]
-        r = (points_world - self.targets_world) * self.weights[:, None]
-        return normal_equations(r.ravel(), J.reshape(-1, model.n_dofs))
+        places, J = model.points_with_jacobian(kinematics, self.points, self.centers)
+        r = (places - self.targets_world) * self.weights[:, None]
+        return normal_equations(r.ravel(), (J * self.weights[:, None, None]).reshape(-1, model.n_dofs))
 
     def residuals(self, model: BodyModel, kinematics: Kinematics) -> tuple[Array, Array]:
         """Return the weighted residuals, (N, 3), and their derivatives by the points, (N, 3, 3), per metre."""
@@ -121,6 +117,7 @@ class PosePrior:
     """Weight of each degree of freedom, (n_dofs,), per radian or metre."""
 
     @classmethod
+    @lru_cache(maxsize=32)  # of each body; asked for several times for each frame
     def of_spreads(cls, model: BodyModel) -> "PosePrior":
         """Return the prior by the joint spreads of a body, around its neutral pose."""
         return cls(model.neutral(), 1 / model.spreads)
@@ -223,7 +220,7 @@ def iterate(
             worth = -(g + 0.5 * H @ step) @ step > gain
             change = np.zeros(model.n_dofs)
             change[active] = step
-            trial = np.where(is_locked, start, model.clip(model.retract(pose, change)))
+            trial = np.where(is_locked, start, model.move(pose, change))
             moved = float(np.abs(model.difference(trial, pose)).max())
             there = _sum(model, trial, blocks) if worth else here
             if there.cost < here.cost or not worth or moved < tolerance or damping > DAMPING.most:
@@ -241,11 +238,11 @@ def iterate(
 
 
 def with_locked_dofs(model: BodyModel, pose: Array, locked: Array, active_dofs: NDArray[np.bool_] | None) -> Array:
-    """Return a pose with the locked degrees of freedom of another pose.
+    """Return poses with the locked degrees of freedom of another pose.
 
     Args:
         model: the body.
-        pose: (n_values,).
+        pose: (..., n_values).
         locked: pose from which the locked degrees of freedom are taken, (n_values,).
         active_dofs: degrees of freedom that are not locked, (n_dofs,); None: all.
     """
@@ -366,7 +363,7 @@ def _sum(model: BodyModel, pose: Array, blocks: Sequence[ResidualBlock]) -> Norm
 
 
 def pressed_against_limit(model: BodyModel, pose: Array, gradient: Array) -> NDArray[np.bool_]:
-    """Return the degrees of freedom at a limit that descent would cross, (n_dofs,)."""
-    at = pose[model.dof_value]
+    """Return the degrees of freedom at a limit that descent would cross, of poses, (..., n_values), (..., n_dofs)."""
+    at = pose[..., model.dof_value]
     low, high = model.limits[:, 0], model.limits[:, 1]
     return ((at <= low + TINY) & (gradient > 0)) | ((at >= high - TINY) & (gradient < 0))

@@ -2,11 +2,11 @@
 
 A descent takes a dozen steps of a tenth of a millisecond each. In Python the calls between kernels take as long as the
 kernels, and hold the interpreter's lock. `gauss_newton.solve` is the readable version, for any blocks and for ball
-joints; `solver_of` returns the one that a body needs.
+joints; `solve_fast` calls the one that a body needs.
 """
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +32,6 @@ from tracker.estimation.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import TINY, Array, IntArray
 
 _KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration, KeypointBlock)
-
-
-Solver: TypeAlias = Callable[..., Fit]
-"""`gauss_newton.solve`, or `solve_compiled`, which has the same parameters."""
 
 
 class _Blocks(NamedTuple):
@@ -102,9 +98,18 @@ def solve_compiled(
     return Fit(found, cost, iterations, hessian)
 
 
-def solver_of(model: BodyModel) -> Solver:
-    """Return `solve_compiled`, or `gauss_newton.solve` for a body with ball joints, which no kernel covers."""
-    return solve_compiled if len(model.value_names) == model.n_dofs else gauss_newton.solve
+def solve_fast(
+    model: BodyModel,
+    pose: Array,
+    blocks: Sequence[ResidualBlock],
+    active_dofs: NDArray[np.bool_] | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+    tolerance: float = TOLERANCE,
+    gain: float = 0.0,
+) -> Fit:
+    """Call `solve_compiled`, or `gauss_newton.solve` for a body with ball joints, which no kernel covers."""
+    solve = solve_compiled if len(model.value_names) == model.n_dofs else gauss_newton.solve
+    return solve(model, pose, blocks, active_dofs, max_iterations, tolerance, gain)
 
 
 def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks:

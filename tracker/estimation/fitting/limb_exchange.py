@@ -1,12 +1,13 @@
 """Exchange two limbs of a pose: a leg in front of the other, or a body seen from behind, is easily taken for it."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from tracker.body.dimensions import mirror_part
 from tracker.body.limbs import Limb
-from tracker.body.model import PosedBody
+from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.fitting.gauss_newton import JOINT_M, UNKNOWN, PointTargets, PosePrior, ResidualBlock, solve
 from tracker.geometry.arrays import Array
 
@@ -37,10 +38,17 @@ def turned_round(body: PosedBody) -> Array:
 
 def _mirrored(body: PosedBody, moved: Sequence[int]) -> list[ResidualBlock]:
     """Return what draws some points of a body, by their indices, to where those of the other side are."""
-    model, names = body.model, list(body.model.point_names)
-    targets = {i: names.index(other) for i in moved if (other := mirror_part(names[i])) in names}
+    model, other_side = body.model, _other_side(body.model)
+    targets = {i: other_side[i] for i in moved if i in other_side}
     points = np.array([*targets], dtype=np.int64)
     return [
         PointTargets(points, body.points_world[[*targets.values()]], np.full(len(points), 1 / JOINT_M)),
         PosePrior(model.neutral(), np.full(model.n_dofs, 1 / UNKNOWN)),
     ]
+
+
+@lru_cache(maxsize=32)
+def _other_side(model: BodyModel) -> dict[int, int]:
+    """Return the index of the point on the other side by that of each point that has one."""
+    names = list(model.point_names)
+    return {i: names.index(other) for i, name in enumerate(names) if (other := mirror_part(name)) in names}

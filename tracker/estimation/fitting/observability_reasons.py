@@ -116,6 +116,6 @@ class _Bent:
             low, high = model.limits[bend]
             step[bend] = _BEND_RAD if high >= -low else -_BEND_RAD
             bodies = list(self._bodies)
-            bodies[self._person] = PosedBody(model, model.clip(model.retract(body.values, step)))
+            bodies[self._person] = PosedBody(model, model.move(body.values, step))
             self._tried[bend] = observe_pose(bodies, self._cameras, self._person, self._noise).sigmas_alone
         return self._tried[bend]

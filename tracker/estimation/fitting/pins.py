@@ -36,9 +36,8 @@ class PinBlock:
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        parts, points_world = model.point_parts[self.points], model.points_at(kinematics, self.points)
         r, by_points = self.residuals(model, kinematics)
-        rows = by_points @ model.point_jacobian(kinematics, parts, points_world)
+        rows = by_points @ model.points_with_jacobian(kinematics, self.points)[1]
         return normal_equations(r.ravel(), rows.reshape(-1, model.n_dofs))
 
     def widened(self, factor: float) -> "PinBlock":

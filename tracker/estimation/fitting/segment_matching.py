@@ -7,8 +7,8 @@ from tracker.compute.float32 import FAR2, ONE, ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.estimation.fitting.contour_arrays import Scratch, ViewArrays
-from tracker.evidence.contours.pieces import JOINED, PIECE_PX
-from tracker.evidence.contours.static_cache import StaticContours, mark_covered_segments, store_pieces, trace_static
+from tracker.evidence.contours.pieces import JOINED, PIECE_PX, StaticContours
+from tracker.evidence.contours.static_cache import mark_covered_segments, store_pieces, trace_static
 from tracker.evidence.contours.surfaces import Surfaces
 from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, cells_within

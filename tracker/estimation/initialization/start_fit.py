@@ -18,9 +18,7 @@ from tracker.estimation.chamfer.tracker import ChamferTracker
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M, Hypothesis, distance_m
 from tracker.estimation.initialization.start_search import search_around
 from tracker.estimation.tracking.confidence import Status
-from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import PoseEstimate, Subjects, TrackingRun
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
 

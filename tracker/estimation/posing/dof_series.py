@@ -27,7 +27,7 @@ def move_dofs(model: BodyModel, poses: Array, dofs: Sequence[int], steps: Array 
     """
     values, chosen = _dof_values(model, poses), np.isin(np.arange(model.n_dofs), dofs)
     values[:, list(dofs)] += steps
-    moved = model.clip(model.retract(model.neutral(), values))
+    moved = model.move(model.neutral(), values)
     return np.stack([copy_dofs(model, *pair, chosen) for pair in zip(poses, moved, strict=True)])
 
 

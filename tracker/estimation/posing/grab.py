@@ -54,8 +54,8 @@ class Holds:
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        places = model.points_at(kinematics, self.points)
-        J = self.weights @ model.point_jacobian(kinematics, model.point_parts[self.points], places)
+        places, by_dofs = model.points_with_jacobian(kinematics, self.points)
+        J = self.weights @ by_dofs
         r = np.einsum("nij,nj->ni", self.weights, places - self.targets_world)
         return normal_equations(r.ravel(), J.reshape(-1, model.n_dofs))
 

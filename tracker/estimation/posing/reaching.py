@@ -320,7 +320,7 @@ def _solve_bending(
     if joint == first or is_done(fit.pose):
         return fit
     for bend in (BENT_RAD, -BENT_RAD):
-        start = model.clip(model.retract(pose, np.where(active_dofs & (model.dof_joint == joint), bend, 0.0)))
+        start = model.move(pose, np.where(active_dofs & (model.dof_joint == joint), bend, 0.0))
         bent = solve(model, start, blocks, active_dofs=active_dofs, **_BENT)
         if bent.cost < fit.cost:
             fit = solve(model, bent.pose, blocks, active_dofs=active_dofs, **QUICK)
@@ -338,7 +338,7 @@ def _is_at_limit(model: BodyModel, pose: Array, active_dofs: NDArray[np.bool_]) 
 def _relaxed(model: BodyModel) -> Array:
     """Return the neutral pose with elbows and knees slightly bent, (n_values,)."""
     hinges = np.array([len(joint.axes) == 1 for joint in model.joints])[model.dof_joint]
-    return model.clip(model.retract(model.neutral(), np.where(hinges, BENT_RAD, 0.0)))
+    return model.move(model.neutral(), np.where(hinges, BENT_RAD, 0.0))
 
 
 def _is_near(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_world: Array) -> bool:

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.estimation.by_frame.frame_problem import Bodies
+from tracker.estimation.by_frame.frame_problem import Bodies, trust
 from tracker.estimation.by_frame.pose_score import scorer_without_prediction
-from tracker.estimation.by_frame.settings import OWN_TRUST, EstimationSettings, trust
+from tracker.estimation.by_frame.settings import OWN_TRUST, EstimationSettings
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS
 from tracker.estimation.fitting.limb_exchange import turned_round
 from tracker.estimation.runs.path_assessment import DOUBTFUL_MASS

@@ -10,10 +10,15 @@ from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.threads import kernel_pool
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.appearance.region_residuals import region_residuals
-from tracker.estimation.by_frame.frame_problem import Bodies, with_body
-from tracker.estimation.by_frame.pose_score import PoseScorer, without_prediction
-from tracker.estimation.by_frame.region_scorer import FrameEvidence, RegionScorer, with_regions
-from tracker.estimation.by_frame.settings import OWN_TRUST, EstimationSettings, RecoverSettings, trust
+from tracker.estimation.by_frame.frame_problem import Bodies, trust, with_body
+from tracker.estimation.by_frame.pose_score import (
+    FrameEvidence,
+    PoseScorer,
+    RegionScorer,
+    with_regions,
+    without_prediction,
+)
+from tracker.estimation.by_frame.settings import OWN_TRUST, EstimationSettings, RecoverSettings
 from tracker.estimation.fitting.contour_residuals import PartCosts
 from tracker.estimation.fitting.gauss_newton import ResidualBlock, with_locked_dofs
 from tracker.estimation.fitting.keypoints import keypoint_blocks, keypoints_of
@@ -165,7 +170,8 @@ class FrameHypotheses:
     def _with_locked_dofs(self, proposals: Sequence[Proposal]) -> list[Proposal]:
         """Return proposals with the locked degrees of freedom of the frame; a keyframe beside it may have others."""
         here, active = self.bodies[self.person].values, self._scorer.active_dofs
-        return [p._replace(pose=with_locked_dofs(self.model, p.pose, here, active)) for p in proposals]
+        poses = with_locked_dofs(self.model, np.array([p.pose for p in proposals]), here, active) if proposals else ()
+        return [p._replace(pose=pose) for p, pose in zip(proposals, poses, strict=True)]
 
     def _join(self, new: HypothesisSet) -> None:
         self._found = new if self._found is None else self._found.joined(new)

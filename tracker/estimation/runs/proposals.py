@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.shortest_step import nearest_equivalent
+from tracker.body.motion.velocity import nearest_equivalent
 from tracker.estimation.by_frame.limb_recovery import with_limb
 from tracker.estimation.fitting.hypothesis import limbs_elsewhere
 from tracker.estimation.fitting.limb_exchange import exchanged, paired_limbs, turned_round
@@ -23,7 +23,7 @@ def continued(model: BodyModel, before: Array | None, here: Array) -> list[Propo
     poses = [here]
     if before is not None:
         step = model.difference(here, nearest_equivalent(model, before, here, None))
-        poses.append(model.clip(model.retract(here, step)))
+        poses.append(model.move(here, step))
     return [Proposal(pose, "neighbour") for pose in poses]
 
 

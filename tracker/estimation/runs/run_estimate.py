@@ -15,11 +15,9 @@ import numpy as np
 from tracker.body.model import PosedBody
 from tracker.body.motion.velocity import moving_bodies
 from tracker.compute.progress import mapped
-from tracker.estimation.appearance.region_learning import LearningFrame, learn_regions, learning_frames
-from tracker.estimation.appearance.region_model import RegionModel
+from tracker.estimation.appearance.region_model import LearningFrame, RegionModel, learn_regions, learning_frames
 from tracker.estimation.by_frame.frame_problem import Bodies, with_body
-from tracker.estimation.by_frame.pose_score import common_evidence
-from tracker.estimation.by_frame.region_scorer import FrameEvidence
+from tracker.estimation.by_frame.pose_score import FrameEvidence, common_evidence
 from tracker.estimation.by_frame.settings import EstimationSettings
 from tracker.estimation.fitting.limb_exchange import turned_round
 from tracker.estimation.runs.facing import KNOWN, Facing, turning_nats
@@ -28,7 +26,7 @@ from tracker.estimation.runs.path_assessment import RunPose, assessed_path
 from tracker.estimation.runs.path_search import PathSearch
 from tracker.estimation.runs.proposals import other_sides
 from tracker.estimation.search.chamfer_cost import frame_cost
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.estimation.trajectory.solve import PosedPath, even_blocks, solve_path
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence, with_colors_only

@@ -234,7 +234,7 @@ def _search_stage(
     def poses_at(nodes: list[tuple[int, ...]]) -> Array:
         change = np.zeros((len(nodes), model.n_dofs))
         change[:, dofs] = np.array(nodes) * steps
-        return model.clip(model.retract(center, change))
+        return model.move(center, change)
 
     origin = (0,) * len(dofs)
     queue: list[tuple[float, tuple[int, ...]]] = [(best_px, origin)]

@@ -7,7 +7,7 @@ views. Costs are in undistorted pixels of the footage; the views may have a smal
 
 import os
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -28,9 +28,10 @@ from tracker.estimation.search.chamfer_kernels import (
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.pieces import PIECE_PX, piece_buffer, place_parts
 from tracker.evidence.contours.surfaces import Surfaces, surfaces_of
-from tracker.evidence.view_evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence, outliers_px
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.geometry.segment_distance import RowSortedPoints, segment_buffer, sort_points, stack_rows, within_reach
+from tracker.geometry.cameras import projections
+from tracker.geometry.segment_distance import near_points, segment_buffer
 
 Outliers = Literal["truncated", "paper"]
 
@@ -85,12 +86,10 @@ class ChamferCost:
         self._times = np.array([v.ahead_frames for v in views])
         self._surfaces = surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
-        thetas = [v.outlier_px(theta_px) for v in views]
-        widest = max((v.camera for v in views), key=lambda camera: camera.width)
-        room = occluding_contours.contour_room(widest, len(self.models))
+        room = occluding_contours.contour_room([v.camera for v in views], len(self.models))
         self._contours = self._traced(views, predicted, room)
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
-        self._arrays = scored_views(views, thetas, self._pieces_by_view())
+        self._arrays = scored_views(views, outliers_px(views, theta_px), [*self._pieces_by_view()])
         self._room = max(room, self._arrays.points.shape[1])
         self._own = threading.local()
 
@@ -241,33 +240,33 @@ def score_buffers(surfaces: Surfaces, room: int, n_dofs: int) -> ScoreBuffers:
 
 
 def scored_views(
-    views: Sequence[ViewEvidence], thetas: Sequence[float], contours: Iterable[tuple[FloatArray, NDArray[np.bool_]]]
+    views: Sequence[ViewEvidence], thetas: Array, contours: Sequence[tuple[FloatArray, NDArray[np.bool_]]]
 ) -> ScoredViews:
     """Return the evidence as arrays, with the edge points near predicted contours.
 
     Args:
         views: evidence of each view.
-        thetas: outlier distance of each view, working px.
+        thetas: outlier distance of each view, (V,), working px.
         contours: pieces of the predicted contours in each view, (N, 4), and whether they are occluded, (N,).
     """
-    near = [_near(v, *pieces, theta) for v, pieces, theta in zip(views, contours, thetas, strict=True)]
+    sizes = [v.camera.size for v in views]
+    near = near_points([v.points_px for v in views], sizes, contours, thetas.tolist())
     return ScoredViews(
-        np.stack([v.camera.projection for v in views]),
-        np.stack([v.camera.center_world for v in views]),
-        np.array([v.camera.size for v in views], dtype=np.int64),
+        *projections([v.camera for v in views]),
+        np.array(sizes, dtype=np.int64),
         _distances(tuple(views)),
-        np.concatenate([n.points for n in near], axis=1),
-        stack_rows([n.rows for n in near]),
-        np.concatenate([[0], np.cumsum([n.points.shape[1] for n in near])]).astype(np.int64),
-        np.array([n.n_points for n in near], dtype=np.int64),
-        np.array(thetas),
+        near.points,
+        near.rows,
+        near.firsts,
+        near.counts,
+        thetas,
     )
 
 
 def measure_nothing(views: Sequence[ViewEvidence], models: tuple[BodyModel, ...]) -> None:
     """Call the kernels that measure contours, without a contour; none that traces contours is needed."""
     no_pieces = np.empty((0, 4), np.float32), np.empty(0, np.bool_)
-    arrays = scored_views(views, [v.outlier_px(None) for v in views], [no_pieces] * len(views))
+    arrays = scored_views(views, outliers_px(views, None), [no_pieces] * len(views))
     scratch = score_buffers(surfaces_of(models), arrays.points.shape[1], 1)
     measure_view(0, 0, 0, arrays, False, scratch, np.empty(2))
 
@@ -276,9 +275,3 @@ def measure_nothing(views: Sequence[ViewEvidence], models: tuple[BodyModel, ...]
 def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
     """Return the distance images, one after the other, row by row."""
     return np.concatenate([v.distance.ravel() for v in views])
-
-
-def _near(view: ViewEvidence, pieces_px: FloatArray, occluded: NDArray[np.bool_], theta: float) -> RowSortedPoints:
-    """Return the edge points within theta of the visible model contour."""
-    everything = sort_points(view.points_px, view.camera.size)
-    return within_reach(everything, pieces_px, occluded, theta)

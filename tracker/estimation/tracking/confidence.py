@@ -21,9 +21,9 @@ from tracker.estimation.appearance.part_colors import MIN_SAMPLES, ColorScore
 from tracker.estimation.fitting.contour_residuals import PartCosts
 from tracker.estimation.fitting.gauss_newton import Fit, covariance
 from tracker.estimation.tracking.remarks import uncertain
-from tracker.estimation.tracking.view_regions import px_per_m
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import TINY, Array, IntArray, Mask
+from tracker.geometry.cameras import px_per_m
 
 Status = Literal["good", "doubtful", "lost"]
 
@@ -201,7 +201,8 @@ def quality(
     model, chains, layout = body.model, limbs(body.model), _layout(body.model)
     far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
     n_views = int(np.count_nonzero(costs.length_px.sum(axis=1) > 0))
-    scale, beside_px = px_per_m([v.camera for v in views], body), _beside_px(body, views)
+    scale = _scale(body, views)
+    beside_px = _beside_px(body, scale)
     color = np.full(len(model.parts), np.inf)
     if colors is not None:
         color = np.where(colors.samples >= MIN_SAMPLES, colors.parts, np.inf)
@@ -234,14 +235,18 @@ def views_of_limbs(body: PosedBody, costs: PartCosts, views: Sequence[ViewEviden
         costs: of its parts there.
         views: the evidence of each view.
     """
-    beside_px = _beside_px(body, views)
+    beside_px = _beside_px(body, _scale(body, views))
     return np.stack([_shows(costs, beside_px, limb.parts) for limb in limbs(body.model)], axis=1)
 
 
-def _beside_px(body: PosedBody, views: Sequence[ViewEvidence]) -> Array:
-    """Return the length of each part's contour seen from the side, (n_parts,), working px."""
-    half_axes_m = np.array([s.half_axes[2] for s in body.model.shapes])
-    return np.asarray(4 * px_per_m([v.camera for v in views], body) * half_axes_m)
+def _scale(body: PosedBody, views: Sequence[ViewEvidence]) -> float:
+    """Return the length of a metre at a body in the images, px: the median over the views."""
+    return px_per_m([v.camera for v in views], body.points_world.mean(axis=0))
+
+
+def _beside_px(body: PosedBody, scale: float) -> Array:
+    """Return the length of each part's contour seen from the side, (n_parts,), working px, at a scale, px per metre."""
+    return np.asarray(4 * scale * np.array([s.half_axes[2] for s in body.model.shapes]))
 
 
 def _shows(costs: PartCosts, beside_px: Array, parts: IntArray) -> Mask:

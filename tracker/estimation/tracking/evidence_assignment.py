@@ -129,7 +129,7 @@ class _View:
             np.empty((n_people, len(edges.counts)), np.bool_), np.empty((n_people, len(silhouette.counts)), np.bool_),
             np.zeros(n_people, np.bool_),
         )  # fmt: skip
-        room = occluding_contours.contour_room(view.camera, n_people)
+        room = occluding_contours.contour_room([view.camera], n_people)
         _assign(
             view.camera.projection, view.camera.center_world, self._Ts, self._surfaces,
             piece_buffer(self._surfaces, room), contour_buffer(room), edges, silhouette, view.theta_px, out,

@@ -1,19 +1,18 @@
-"""Regions of the views around posed bodies, the evidence there, visible contours, and the image scale at a body."""
+"""Regions of the views around posed bodies, the evidence there, and visible contours."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.body.model import PosedBody, ahead
+from tracker.body.model import PosedBody
 from tracker.estimation.appearance.region_model import REACH_M
-from tracker.evidence.contours import occluding_contours
-from tracker.evidence.contours.occluding_contours import Contour
+from tracker.evidence.contours.occluding_contours import trace_views
 from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.images.working_view import region_around
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
-from tracker.geometry.cameras import NEAR_PLANE_M, Camera, Region
+from tracker.geometry.cameras import Camera, Region
 
 _MIN_MARGIN_M = 0.19
 """A region chosen ahead is used if at least this margin is left when the frame is predicted again."""
@@ -24,12 +23,12 @@ def regions(cameras: Sequence[Camera], bodies: Sequence[PosedBody], margin_m: fl
     points = np.concatenate([b.points_world for b in bodies])
     out: list[Region | None] = []
     for camera in cameras:
-        depths = camera.depths(points)
+        px, depths = camera.project_with_depths(points)
         if depths.min() < 2 * REACH_M:  # too near for its contour to lie around the joints' images
             out.append(None)
             continue
         margin = margin_m * camera.K[0, 0] / float(np.median(depths))
-        out.append(region_around(camera.project(points), margin, camera.size))
+        out.append(region_around(px, margin, camera.size))
     return out
 
 
@@ -53,11 +52,6 @@ def _contains(outer: Region | None, inner: Region | None) -> bool:
     )
 
 
-def visible_pieces_px(contour: Contour) -> FloatArray:
-    """Return the visible pieces of a contour, x0, y0, x1, y1, (M, 4), px."""
-    return contour.pieces_px[~contour.occluded]
-
-
 def read_views(
     observer: Observer, frame: int, bodies: Sequence[PosedBody], static_edges: Sequence[StaticEdgeModel] | None = None
 ) -> tuple[ViewEvidence, ...]:
@@ -71,14 +65,6 @@ def accepting_pieces_px(observer: Observer, frame: int, guesses: Sequence[Sequen
 
     They are x0, y0, x1, y1, (M, 4), px of the working cameras.
     """
-    views = list(zip(observer.working_cameras, observer.ahead_frames(frame), strict=True))
-    return [
-        np.concatenate([visible_pieces_px(occluding_contours.trace(ahead(g, time), c)) for g in guesses])
-        for c, time in views
-    ]
-
-
-def px_per_m(cameras: Sequence[Camera], body: PosedBody) -> float:
-    """Return the length of a metre at a body in the images, px: the median over the views."""
-    middle = body.points_world.mean(axis=0)
-    return float(np.median([c.K[0, 0] / max(c.depths(middle), NEAR_PLANE_M) for c in cameras]))
+    cameras, times = observer.working_cameras, observer.ahead_frames(frame)
+    of_guesses = [trace_views(g, cameras, times) for g in guesses]
+    return [np.concatenate([c.pieces_px[~c.occluded] for c in of_view]) for of_view in zip(*of_guesses, strict=True)]

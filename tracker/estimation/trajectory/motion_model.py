@@ -8,6 +8,7 @@ Points outnumber the degrees of freedom that move them. The squares of all point
 those of its degrees of freedom: their sum in units of the scale has the mean d.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -59,9 +60,11 @@ class MotionPoints:
         Ts = kinematics.Ts_world_part[self.parts]
         return np.asarray(np.einsum("pij,pj->pi", Ts[:, :3, :3], self.points_part) + Ts[:, :3, 3])
 
-    def jacobian(self, kinematics: Kinematics, points_world: Array) -> Array:
-        """Return the derivatives of their places, (3 P, n_dofs), metres per rad or metre."""
-        return self.model.point_jacobian(kinematics, self.parts, points_world).reshape(-1, self.model.n_dofs)
+    def linearized(self, kinematics: Sequence[Kinematics]) -> tuple[Array, Array]:
+        """Return their places in poses, (T, P, 3), and the derivatives, (T, 3 P, n_dofs), metres per rad or metre."""
+        places = [self.at(k) for k in kinematics]
+        J = [self.model.point_jacobian(k, self.parts, at) for k, at in zip(kinematics, places, strict=True)]
+        return np.array(places), np.array(J).reshape(len(J), -1, self.model.n_dofs)
 
 
 @lru_cache(maxsize=16)

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
@@ -25,9 +26,77 @@ from tracker.estimation.fitting.gauss_newton import (
     pressed_against_limit,
     value_mask,
 )
-from tracker.estimation.trajectory.block_band import factor
 from tracker.estimation.trajectory.motion_model import LEARNING_ROUNDS, MotionModel, acceleration, motion_points
 from tracker.geometry.arrays import Array, Mask
+
+
+class BlockFactor(NamedTuple):
+    """Cholesky factor L of a block-banded matrix L L^T: of square blocks, zero beyond some blocks from the diagonal.
+
+    Normal equations of a path are such matrices: frames that are farther apart than a difference reaches share no
+    residual. The factor is Cholesky's by blocks. Blocks of the inverse within the band follow from it without the
+    others (K. Takahashi, J. Fagan, M.-S. Chin 1973, Proc. 8th PICA Conference: 63).
+    """
+
+    diagonal: Array
+    """Lower triangles of the diagonal blocks, (T, n, n)."""
+    below: Array
+    """Block d of row t + d and column t at [d - 1, t], (m, T, n, n); zero beyond the last row."""
+
+    def solve(self, right: Array) -> Array:
+        """Return the solution for a right side, (T, n)."""
+        T, (m, *_), out = len(self.diagonal), self.below.shape, np.array(right)
+        for t in range(T):
+            for d in range(1, min(m, t) + 1):
+                out[t] -= self.below[d - 1, t - d] @ out[t - d]
+            out[t] = dtrtrs(self.diagonal[t], out[t], lower=1)[0]
+        for t in range(T - 1, -1, -1):
+            for d in range(1, min(m, T - 1 - t) + 1):
+                out[t] -= self.below[d - 1, t].T @ out[t + d]
+            out[t] = dtrtrs(self.diagonal[t], out[t], lower=1, trans=1)[0]
+        return out
+
+    def inverse(self) -> Array:
+        """Return the blocks of the inverse within the band: that of row t + d, column t at [d, t], (m + 1, T, n, n)."""
+        T, n = self.diagonal.shape[:2]
+        m = len(self.below)
+        out, eye = np.zeros((m + 1, T, n, n)), np.eye(n)
+        for t in range(T - 1, -1, -1):
+            reach = min(m, T - 1 - t)
+            unit = [dtrtrs(self.diagonal[t], self.below[d, t].T, lower=1, trans=1)[0].T for d in range(reach)]
+            for i in range(1, reach + 1):
+                for d in range(1, reach + 1):
+                    low, high = min(i, d), max(i, d)
+                    block = out[high - low, t + low]
+                    out[i, t] -= (block if i >= d else block.T) @ unit[d - 1]
+            own = dpotrs(self.diagonal[t], eye, lower=1)[0]
+            for d in range(1, reach + 1):
+                own = own - unit[d - 1].T @ out[d, t]
+            out[0, t] = (own + own.T) / 2
+        return out
+
+
+def factor(blocks: Array) -> BlockFactor | None:
+    """Return the factor of a matrix; None if it is not positive definite.
+
+    Args:
+        blocks: block of row t + d and column t at [d, t], (m + 1, T, n, n); those beyond the last row are not read.
+    """
+    m, T = len(blocks) - 1, blocks.shape[1]
+    diagonal, below = np.array(blocks[0]), np.zeros_like(blocks[1:])
+    for t in range(T):
+        for j in range(1, min(m, t) + 1):
+            diagonal[t] -= below[j - 1, t - j] @ below[j - 1, t - j].T
+        diagonal[t], info = dpotrf(diagonal[t], lower=1, clean=1)
+        if info:
+            return None
+        for d in range(1, min(m, T - 1 - t) + 1):
+            own = np.array(blocks[d, t])
+            for j in range(1, min(m - d, t) + 1):
+                own -= below[d + j - 1, t - j] @ below[j - 1, t - j].T
+            below[d - 1, t] = dtrtrs(diagonal[t], own.T, lower=1)[0].T
+    return BlockFactor(diagonal, below)
+
 
 _BLOCK_FRAMES, _OVERLAP_FRAMES = 120, 20
 """Frames are solved in blocks, because the evidence of one takes 5 to 10 MB. Frames that are seen beyond the overlap
@@ -100,7 +169,7 @@ class _State(NamedTuple):
     gradient: Array
     """(T, n_dofs)."""
     hessian: Array
-    """As `block_band.factor` reads it, (3, T, n_dofs, n_dofs)."""
+    """As `factor` reads it, (3, T, n_dofs, n_dofs)."""
     squares_m2: Array
     """Squared accelerations of the points, (T - 2, P)."""
     jacobians: Array
@@ -133,8 +202,8 @@ class _Solver:
 
     def _within_limits(self, poses: Iterable[Array], before: Sequence[Array]) -> list[Array]:
         """Return poses within the limits, with fixed and locked ones as before."""
-        clip, at = self.path.model.clip, zip(poses, before, self.fixed, strict=True)
-        return [old if fixed else np.where(self.locked_values, old, clip(pose)) for pose, old, fixed in at]
+        at = zip(self.path.model.clip(np.array([*poses])), before, self.fixed, strict=True)
+        return [old if fixed else np.where(self.locked_values, old, pose) for pose, old, fixed in at]
 
     def read(self, t: int) -> None:
         """Read the evidence of the next frame, given by its place in the path."""
@@ -208,8 +277,7 @@ class _Solver:
 
     def _held(self, here: _State) -> Mask:
         """Return the degrees of freedom that stay: locked ones, and those that press against a limit, (T, n_dofs)."""
-        pressed = [pressed_against_limit(self.path.model, *at) for at in zip(here.poses, here.gradient, strict=True)]
-        return self.locked | np.array(pressed)
+        return self.locked | pressed_against_limit(self.path.model, np.array(here.poses), here.gradient)
 
     def _held_equations(self, here: _State, held: Mask, damping: float) -> Array:
         blocks = np.array(here.hessian)
@@ -237,8 +305,7 @@ class _Solver:
             return self._evidence(t, poses[t], kinematics[t], None if before is None else before.frames[t])
 
         frames, equations = zip(*map_parallel(of_frame, range(T)), strict=True)
-        places = np.array([self.points.at(k) for k in kinematics])
-        jacobians = np.array([self.points.jacobian(*at) for at in zip(kinematics, places, strict=True)])
+        places, jacobians = self.points.linearized(kinematics)
         gradient = np.array([e.gradient for e in equations])
         hessian = np.zeros((3, T, model.n_dofs, model.n_dofs))
         hessian[0] = [e.hessian for e in equations]

@@ -6,8 +6,7 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.estimation.tracking.confidence import Status
-from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import PoseEstimate, TrackingRun
 from tracker.estimation.voxel.assessment import assess, unexplained_voxels
 from tracker.estimation.voxel.body_pose import pose_of, state_of
 from tracker.estimation.voxel.figure import N_PARTS, figure_of, part_rotations

@@ -5,7 +5,7 @@ The paper leaves some choices open; docs/log/trackers.md lists them.
 
 from functools import partial
 
-from tracker.estimation.tracking.subjects import require_body
+from tracker.estimation.tracking.tracker import require_body
 from tracker.estimation.voxel.constants import PAPER_BODY
 from tracker.estimation.voxel.measurement import MeasurementNoise
 from tracker.estimation.voxel.motion_model import ProcessNoise

@@ -5,8 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field
 
-from tracker.estimation.tracking.estimate import PoseEstimate
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import PoseEstimate, TrackingRun
 from tracker.estimation.voxel.frame_estimator import VoxelEstimator
 from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette

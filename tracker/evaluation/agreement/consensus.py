@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.body.motion.shortest_step import nearest_equivalent, shortest_step
+from tracker.body.motion.velocity import nearest_equivalent, shortest_step
 from tracker.geometry.arrays import TINY, Array
 
 

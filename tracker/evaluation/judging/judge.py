@@ -1,7 +1,10 @@
 """Judge imported joints limb by limb, and say why."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -12,20 +15,22 @@ from tracker.errors import TrackerError
 from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.estimation.tracking.pose_errors import point_covariances
 from tracker.estimation.tracking.tracker import TrackerSettings
-from tracker.evaluation.judging import reasons
-from tracker.evaluation.judging.best_motion import best_motion
-from tracker.evaluation.judging.verdicts import LIMBS, probability_beyond, with_doubt
+from tracker.evaluation.judging.verdicts import LIMBS, is_exchanged, jumps, outside, probability_beyond, with_doubt
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.formats.joint_maps import JointMap
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
+from tracker.interchange.observations.stored import save_observations, source_path
 from tracker.interchange.plausibility.examine import contradictions
 from tracker.interchange.plausibility.readings import Reading, ReadPoints, read_beside
-from tracker.pipeline.chain import Sink
-from tracker.pipeline.keypoint_evidence import read_points
-from tracker.session.session import Session
-from tracker.session.store.stored_poses import StoredPose
+from tracker.pipeline.chain import ChainPlan, Sink, StoredSession, run_chain
+from tracker.pipeline.find_people import FindSettings
+from tracker.pipeline.keypoint_evidence import assigned_observations, read_points
+from tracker.pipeline.stored_run import TrackPlan
+from tracker.session.session import Session, create_session
+from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.stored_poses import StoredPose, read_stored_poses
 
 _NOTABLE_M = 0.03
 """Constant offset of a joint from which it is worth a sentence, metres: conventions differ by less at most joints."""
@@ -162,7 +167,7 @@ def judge_person(
     frames = [k for k in sorted(tracked) if k < len(imported.joints_world)]
     at = {n: i for i, n in enumerate(imported.names)}
     gaps = np.array([_gaps(imported, tracked[k], k) for k in frames]).reshape(len(frames), len(at), 3)
-    jumps = dict(zip(frames, reasons.jumps(imported.joints_world[frames]), strict=True)) if frames else {}
+    has_jumped = dict(zip(frames, jumps(imported.joints_world[frames]), strict=True)) if frames else {}
     out, usual = dict[int, dict[str, LimbVerdict]](), _usual_errors(tracked)
     for number, (k, of_frame) in enumerate(zip(frames, gaps, strict=True)):
         report("comparing", number / len(frames))
@@ -176,7 +181,7 @@ def judge_person(
         if doubted:
             seen = _Outside(observer, k) if observer is not None else None
             for limb in doubted:
-                reason = _reason(limb, imported, own, k, jumps[k], seen, verdicts[limb])
+                reason = _reason(limb, imported, own, k, has_jumped[k], seen, verdicts[limb])
                 verdicts[limb] = verdicts[limb]._replace(reason=reason)
         out[k] = verdicts
     offsets, spread = _constant(imported, tracked, frames, gaps)
@@ -274,7 +279,7 @@ def _reason(
         imported_places = np.array([imported.joints_world[frame][[at[j] for j in joints]] for joints in pair])
         centers = own.body.joint_centers_world
         places = np.array([centers[[model.point_names.index(j) for j in joints]] for joints in pair])
-        if reasons.is_exchanged(imported_places, places):
+        if is_exchanged(imported_places, places):
             return f"{kind}s exchanged"
     said = [] if outside is None else outside.sentences(limb, imported.joints_world[frame], at)
     if any(jumps[at[j]] for j in LIMBS[limb] if j in at):
@@ -300,7 +305,7 @@ class _Outside:
             points = ends[0] + _ALONG[:, None] * (ends[1] - ends[0])
             views = [n for n, v in zip(self._names, self._views, strict=True) if _is_outside(v, points)]
             if views:
-                out.append(reasons.outside(f"{side}_{part}", views))
+                out.append(outside(f"{side}_{part}", views))
         return out
 
 
@@ -315,3 +320,43 @@ def _is_outside(view: ViewEvidence, points_world: Array) -> bool:
     if np.count_nonzero(within) <= len(points_world) / 2:
         return False
     return bool(np.mean(inside[v[within], u[within]]) < 0.5)
+
+
+def best_motion(
+    session: Session, observer: Observer, name: str, people: tuple[int, ...], settings: TrackerSettings, sink: Sink
+) -> dict[int, dict[int, StoredPose]]:
+    """Track people from the key points' start, with acquired sizes, by contours and key points together.
+
+    Everything is stored in a temporary folder; the session stays as it is.
+
+    Args:
+        session: the session.
+        observer: of its recording.
+        name: of the observations.
+        people: indices of the people.
+        settings: of the tracker.
+        sink: receives progress. An exception that it raises ends the work.
+
+    Returns:
+        The poses of each person, by index and frame.
+
+    Raises:
+        TrackerError: see `run_chain`.
+    """
+    with TemporaryDirectory(prefix="quadrille-judge-") as folder:
+        twin = create_session(
+            Path(folder) / "judged", cameras=session.cameras, people=session.people, fps=session.fps,
+            n_frames=session.n_frames, up=session.up,
+        )  # fmt: skip
+        twin = replace(twin, floor=session.floor)
+        observations = assigned_observations(session, name)
+        files = {s.path: source_path(session, name, s) for s in observations.sources}
+        save_observations(twin, observations, files)
+        plan = ChainPlan(
+            TrackPlan(range(session.n_frames), people, settings, keypoints=name), FindSettings(keypoints=name), people
+        )
+        with closing(AnnotationStore(twin.annotations_path)) as store:
+            opened = StoredSession(twin, store, observer)
+            run_chain(plan, opened, sink)
+        bodies = opened.session.people
+        return {i: read_stored_poses(twin.annotations_path, bodies[i].name, bodies[i].model) for i in people}

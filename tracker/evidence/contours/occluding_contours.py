@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import PosedBody
+from tracker.body.model import PosedBody, ahead
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.evidence.contours.generator import MAX_POINTS, grid_generator, revolved_generator
@@ -68,20 +68,37 @@ def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_P
     return trace_surfaces(surfaces_of(tuple(b.model for b in bodies)), part_poses(bodies), camera, piece_px)
 
 
+def trace_views(bodies: Sequence[PosedBody], cameras: Sequence[Camera], times: Sequence[float]) -> list[Contour]:
+    """Trace the contours of all bodies in several views, (V,), whose pictures are later than the frame; see `ahead`."""
+    surfaces, poses = surfaces_of(tuple(b.model for b in bodies)), {t: part_poses(ahead(bodies, t)) for t in {*times}}
+    pieces = piece_buffer(surfaces, contour_room([c.pinhole for c in cameras], len(bodies)))
+    out = []
+    for camera, time in zip(cameras, times, strict=True):
+        place_parts(poses[time], surfaces, pieces)
+        out.append(_traced(surfaces, camera, PIECE_PX, pieces))
+    return out
+
+
 def trace_surfaces(surfaces: Surfaces, Ts_world_part: Array, camera: Camera, piece_px: float) -> Contour:
     """Trace the contours of shapes, placed by their parts' poses (P, 4, 4), in a view; see `trace`."""
     n_bodies = int(surfaces.people.max()) + 1
-    pieces = piece_buffer(surfaces, contour_room(camera.pinhole, n_bodies, piece_px))
+    pieces = piece_buffer(surfaces, contour_room([camera.pinhole], n_bodies, piece_px))
     place_parts(Ts_world_part, surfaces, pieces)
+    return _traced(surfaces, camera, piece_px, pieces)
+
+
+def _traced(surfaces: Surfaces, camera: Camera, piece_px: float, pieces: Pieces) -> Contour:
+    """Return the contours of placed parts in a view."""
     n = trace_pieces(camera.projection, camera.center_world, surfaces, float(piece_px), pieces)
     out = contour_buffer(n)
     store_contour(pieces, out)
     return out
 
 
-def contour_room(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) -> int:
-    """Return the largest number of pieces of a view."""
-    return int(MAX_PIECES * max(1.0, PIECE_PX / piece_px) * max(1.0, camera.width / 640) * n_bodies)
+def contour_room(cameras: Sequence[Camera], n_bodies: int, piece_px: float = PIECE_PX) -> int:
+    """Return the largest number of pieces of one of several views."""
+    width = max(c.size[0] for c in cameras)
+    return int(MAX_PIECES * max(1.0, PIECE_PX / piece_px) * max(1.0, width / 640) * n_bodies)
 
 
 def contour_buffer(room: int) -> Contour:

@@ -15,7 +15,7 @@ from tracker.compute.numba_options import FAST_MATH
 from tracker.evidence.contours.generator import MAX_POINTS
 from tracker.evidence.contours.surfaces import Surfaces
 from tracker.evidence.contours.visibility import LANES
-from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray
 
 PIECE_PX = 4.0
 """Longest piece of contour that is scored or occluded as a whole, px."""
@@ -79,6 +79,54 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
         np.empty((3, MAX_POINTS), np.float32), np.empty(grid_size, np.float32),
         np.empty((n_parts, n_parts, 3, 5), np.float32), np.empty((n_parts, n_parts), np.bool_), np.empty(3),
         np.empty((2, room + LANES), np.float32), np.empty(n_parts, np.bool_),
+    )  # fmt: skip
+
+
+class StaticContours(NamedTuple):
+    """Contours of the static parts in all views; without room if all parts move."""
+
+    moves: NDArray[np.bool_]
+    """Which parts move, (P,). The others are expected to be static; if they move, the cache is refilled."""
+    Ts: Array
+    """Poses of all parts when the cache was filled, (P, 4, 4), metres; NaN before."""
+    ends: FloatArray
+    """See `Pieces`, as the next three; one view after the other, (4, room), undistorted px."""
+    middles: FloatArray
+    """(3, room)."""
+    edges: NDArray[np.int32]
+    """(room,)."""
+    occluded: NDArray[np.bool_]
+    """Whether another static part occludes the piece, (room,)."""
+    firsts: IntArray
+    """Index of the first piece of each part in each view, then the index after the last, (V, P + 1)."""
+    boxes: Array
+    """Bounds u0, v0, u1, v1 of each part in each view, (V, P, 4), px."""
+    segments: NDArray[np.int32]
+    """Index, within its view, of the segment that each visible piece is joined to, (room,)."""
+    covered: NDArray[np.bool_]
+    """Whether moving parts occlude some of each segment of one view, (room,)."""
+    best: FloatArray
+    """Squared distance of each image point to the nearest segment, (N,); see `contour_arrays.Scratch`."""
+    nearest: NDArray[np.int32]
+    """Index of that segment within its view, (N,)."""
+
+
+def static_contours_buffer(n_views: int, room: int, n_points: int, moves: NDArray[np.bool_]) -> StaticContours:
+    """Return room for the static contours of views with a number of pieces each.
+
+    Args:
+        n_views: number of views.
+        room: largest number of pieces of a view.
+        n_points: number of image points of all views.
+        moves: which parts move, (P,).
+    """
+    n_parts, any_static = len(moves), not moves.all()
+    pieces, points = (n_views * room, n_points) if any_static else (0, 0)
+    return StaticContours(
+        moves, np.full((n_parts, 4, 4), np.nan), np.empty((4, pieces), np.float32), np.empty((3, pieces), np.float32),
+        np.empty(pieces, np.int32), np.empty(pieces, np.bool_), np.zeros((n_views, n_parts + 1), np.int64),
+        np.empty((n_views, n_parts, 4)), np.empty(pieces, np.int32), np.zeros(room if any_static else 0, np.bool_),
+        np.empty(points, np.float32), np.empty(points, np.int32),
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Turn pixels into features: undistortion, background subtraction, edges, segments, distance transforms, histograms.
 
 The room knows neither bodies nor footage and imports only `compute` and `geometry`. Callers use `working_view`,
-`background_subtraction`, `image_statistics`, `edges`, `edge_segments`, `silhouette_contour`, `static_edges`,
+`background_subtraction`, `edges`, `edge_segments`, `silhouette_contour`, `static_edges`,
 `distance_transform` and `color_histogram`.
 """
 
@@ -13,7 +13,6 @@ __all__ = [
     "distance_transform",
     "edge_segments",
     "edges",
-    "image_statistics",
     "silhouette_cleaning",
     "silhouette_contour",
     "static_edges",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
 from tracker.compute.quantiles import median
-from tracker.evidence.images.change import NOISE_SIGMAS
+from tracker.evidence.images.change import MIN_DIFFERENCE, NOISE_SIGMAS
 from tracker.geometry.arrays import FloatArray, Image, Mask
 
 SMOOTHING_PX = 1.0
@@ -57,6 +57,28 @@ def exposure_gain(colors: NDArray[np.float32], empty_colors: NDArray[np.float32]
         empty_colors: colours of the empty scene at the same samples, (n, 3), all usable (`has_usable_exposure`).
     """
     return np.ones(3, np.float32) if len(colors) < _MIN_SAMPLES else median(colors / empty_colors).astype(np.float32)
+
+
+def change_threshold(differences: NDArray[np.float32]) -> float:
+    """Return the difference above which a pixel has changed, gray levels.
+
+    The threshold follows the noise of the view. Most pixels show the background, so the median difference measures the
+    noise of an unchanged pixel.
+
+    Args:
+        differences: largest difference over the channels between smoothed frame and smoothed background, at samples
+            spread over the whole image, (n,).
+    """
+    return max(MIN_DIFFERENCE, NOISE_SIGMAS * float(median(differences)))
+
+
+def exposure_and_threshold(
+    colors: NDArray[np.float32], empty_colors: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], float]:
+    """Return `exposure_gain` by the usable samples, (3,), and `change_threshold` by all, both as (n, 3)."""
+    usable = has_usable_exposure(empty_colors)
+    gain = exposure_gain(colors[usable], empty_colors[usable])
+    return gain, change_threshold(np.abs(colors - gain * empty_colors).max(axis=-1))
 
 
 def apply_gain(image: Image, gain: NDArray[np.float32]) -> Image:

@@ -64,6 +64,14 @@ def link_edges(
     return EdgeSegments(points, normals, firsts[: count + 1].copy())
 
 
+def link_and_sample(
+    found: NDArray[np.uint8], gradients: NDArray[np.int16], max_length: int | None
+) -> tuple[EdgeSegments, "Samples"]:
+    """Link the pixels of edges into segments, see `link_edges`, and sample them."""
+    segments = link_edges(found, gradients, max_length)
+    return segments, sample_segments(segments)
+
+
 def accept_segments(
     samples: "Samples", pieces_px: FloatArray, threshold_px: float, max_angle_rad: float = MAX_ANGLE_RAD
 ) -> NDArray[np.bool_]:
@@ -101,7 +109,7 @@ class Samples(NamedTuple):
         out = np.empty(self.pixels.points.shape[1], np.float32)
         pieces = np.ascontiguousarray(pieces_px, np.float32)
         nearest_parallel_segment(self.pixels.points, self.pixels.rows, pieces, reach_px, max_angle_rad, out)
-        return out[: self.pixels.n_points]
+        return out[: self.counts.sum()]
 
     def means(self, distances: FloatArray) -> NDArray[np.float64]:
         """Return the mean of each segment's samples, (n,) to (S,)."""

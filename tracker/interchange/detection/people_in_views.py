@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.footage.mask_image import ANYONE, UNKNOWN
+from tracker.footage.image_file import ANYONE, UNKNOWN
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
 from tracker.geometry.robust_triangulation import Views

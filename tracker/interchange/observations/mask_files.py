@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.footage.mask_image import ANYONE, LabelImage
+from tracker.footage.image_file import ANYONE, LabelImage
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.interchange.observations.sources import FileGroup
 

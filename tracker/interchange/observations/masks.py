@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tracker.errors import FormatError, TrackerError
-from tracker.footage.mask_image import UNKNOWN
+from tracker.footage.image_file import UNKNOWN
 from tracker.formats.keypoints.detections import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.geometry.arrays import IntArray

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.footage.mask_image import LabelImage, read_label_image
+from tracker.footage.image_file import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import patch_c3d, read_c3d
 from tracker.formats.joint_tables.layouts import SCENES, Scenes, find_layout, patch_table, read_joint_files

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.files import IrregularFileError, refuse_links, sync_folder
 from tracker.session.store import backups, checksums, identities, recovery, schema, verification
-from tracker.session.store.query_limit import EndlessQueryError, limited
+from tracker.session.store.verification import EndlessQueryError, limited
 
 T = TypeVar("T")
 

@@ -1,10 +1,64 @@
-"""Check a store when it is opened: sound for SQLite, and as it was written."""
+"""Check a store when it is opened: sound for SQLite, and as it was written. Bound the steps of queries.
 
+Odd rows cannot keep the program busy for ever, and signals end a query.
+"""
+
+import re
 import sqlite3
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from functools import cache
 
 from tracker.session.store import checksums, rows, schema
-from tracker.session.store.definitions import foreign_definition
-from tracker.session.store.query_limit import EndlessQueryError, limited
+
+_TICK_STEPS = 10_000
+"""Steps of SQLite's virtual machine between two looks at the limit: less than a millisecond."""
+_FREE_STEPS = 20_000_000
+"""Steps that any query may take: about a second."""
+_STEPS_PER_BYTE = 50
+"""Steps that a query may take for each byte of the file. Queries of the program visit each row a few times."""
+
+
+class EndlessQueryError(Exception):
+    """A query took more steps than the rows of the store can need."""
+
+
+@contextmanager
+def limited(db: sqlite3.Connection, n_bytes: Callable[[], int]) -> Generator[None, None, None]:
+    """Limit the steps of the queries within a `with` block, together.
+
+    Args:
+        db: connection that runs them.
+        n_bytes: returns the size of the store; called once if they take long.
+
+    Raises:
+        EndlessQueryError: they took too many steps.
+        BaseException: that a signal raised meanwhile, which SQLite would hide.
+    """
+    n_ticks, raised = 0, list[BaseException]()
+
+    def tick() -> int:
+        nonlocal n_ticks
+        try:
+            n_ticks += 1
+            n_steps = n_ticks * _TICK_STEPS
+            return int(n_steps > _FREE_STEPS and n_steps > _FREE_STEPS + _STEPS_PER_BYTE * n_bytes())
+        except BaseException as error:
+            raised.append(error)
+            return 1
+
+    db.set_progress_handler(tick, _TICK_STEPS)
+    try:
+        yield
+    except sqlite3.OperationalError as error:
+        if raised:
+            raise raised[0] from error
+        if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
+            raise EndlessQueryError("a query took more steps than its rows can need") from error
+        raise
+    finally:
+        db.set_progress_handler(None, 0)
+
 
 _BROKEN = (
     sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_MISMATCH, sqlite3.SQLITE_TOOBIG,
@@ -89,3 +143,44 @@ def _unreadable(db: sqlite3.Connection) -> str | None:
         if not rows.is_readable(numbers, sources) or (numbers is not None and revision not in revisions):
             return f"the pose of {person!r} in frame {frame} cannot be read"
     return None
+
+
+_WORD = re.compile(r'"(\w+)"|--[^\n]*|(\w+)|(\S)')
+"""A quoted or bare word, a comment, or another character."""
+_BY_SQLITE = {"CREATE TABLE sqlite_sequence(name,seq)"}
+"""Definitions that SQLite adds by itself; those of primary keys have no text."""
+
+
+def foreign_definition(db: sqlite3.Connection) -> str | None:
+    """Return what a store of this version or an older one defines that no version of the program does; None if nothing.
+
+    It is checked before anything else is asked of the store. A trigger or view of somebody else would run with the
+    program's own statements: it could delete poses behind an edit that is shown as saved, or never end.
+
+    Raises:
+        sqlite3.Error: the definitions cannot be read.
+    """
+    allowed, names = _own_words()
+    for kind, name, text in db.execute("SELECT type, name, sql FROM sqlite_master"):
+        is_own_table = kind == "table" and name in names and _words(str(text)) <= allowed
+        is_of_key = kind == "index" and text is None and str(name).startswith("sqlite_autoindex_")
+        if not (is_own_table or is_of_key or text in _BY_SQLITE or (kind, text) in _OWN_INDICES):
+            return f"its definitions are not as they were written: the {kind!s:.20} {name!r:.60} is none of the program"
+    return None
+
+
+def _words(text: str) -> set[str]:
+    """Return the words and other characters of a definition, without comments, in capitals."""
+    words = {(quoted or bare or other).upper() for quoted, bare, other in _WORD.findall(text)}
+    return words - {""}
+
+
+@cache
+def _own_words() -> tuple[set[str], set[str]]:
+    """Return the words that definitions of the program consist of, and the names of its tables."""
+    text = "; ".join(schema.STATEMENTS)
+    named = re.findall(r"(?:CREATE TABLE|RENAME TO) (\w+)", text)
+    return _words(text), set(named)
+
+
+_OWN_INDICES = {("index", text) for text in schema.STATEMENTS if text.startswith("CREATE INDEX")}

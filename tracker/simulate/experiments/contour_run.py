@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.fitting.observability import ContourNoise, observe_pose
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackerSettings, TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackerSettings, TrackingRun
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.pieces import PIECE_PX
 from tracker.evidence.view_evidence import ViewEvidence

@@ -8,7 +8,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.estimation.by_frame.settings import TOLERANCE, prior_blocks
+from tracker.estimation.by_frame.frame_problem import prior_blocks
+from tracker.estimation.by_frame.settings import TOLERANCE
 from tracker.estimation.contour.paper import paper_settings
 from tracker.estimation.contour.paper_fit import (
     FitIteration,
@@ -125,7 +126,7 @@ def fit_from_guess(scene: Scene, seed: int = 0) -> tuple[tuple[RoughStep, ...], 
     """
     model, truth, rng = scene.model, scene.truth[0], np.random.default_rng([seed, 9])
     step = np.where(model.dof_is_length, ROUGH_M, ROUGH_RAD) * rng.normal(size=model.n_dofs)
-    start, settings = model.clip(model.retract(truth, step)), paper_settings("edges")
+    start, settings = model.move(truth, step), paper_settings("edges")
     observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
     unlimited = unlimited_views(observer.evidence(0), settings)
     residuals = paper_residuals(unlimited, [PosedBody(model, start)], 0, settings)

@@ -135,7 +135,7 @@ class StagedObserver(Observer):
         columns, rows = np.rint(points).astype(np.intp).T
         found[rows, columns] = 1
         first = thin_points(points, camera.height, camera.width)
-        limit_px = 2 * default_theta_px(camera)
+        limit_px = 2 * default_theta_px(camera.size)
         contour = trace_silhouette(silhouette)
         kept = thin_points(contour.points_px, camera.height, camera.width)
         return ViewEvidence(

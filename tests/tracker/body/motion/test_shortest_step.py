@@ -5,8 +5,7 @@ import pytest
 from bodies import MODELS
 
 from tracker.body.motion.interpolation import interpolate_pose
-from tracker.body.motion.prediction import PredictSettings, predict
-from tracker.body.motion.shortest_step import nearest_equivalent, shortest_step
+from tracker.body.motion.velocity import PredictSettings, nearest_equivalent, predict, shortest_step
 from tracker.formats.model_toml import load_model
 
 BODY = load_model("gavrila38")

@@ -9,8 +9,14 @@ from tracker.calibration.check.fault_search import as_tracked, prior_sigmas
 from tracker.calibration.check.viewed_frames import seen_people
 from tracker.estimation.acquisition.contour_bundle import ContourBundle
 from tracker.estimation.acquisition.part_motions import N_MOTIONS, motions_by_unknowns
-from tracker.estimation.acquisition.piece_kernels import OF_CAMERA, OF_PART, _camera_motions
-from tracker.estimation.acquisition.piece_sums import GroupSums, SeenPieces, sums_of_views
+from tracker.estimation.acquisition.piece_sums import (
+    OF_CAMERA,
+    OF_PART,
+    GroupSums,
+    SeenPieces,
+    _camera_motions,
+    sums_of_views,
+)
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.geometry.camera_columns import project_with_columns

@@ -5,7 +5,7 @@ import pytest
 from staging import camera_at
 
 from tracker.estimation.appearance.background_density import learn_background
-from tracker.estimation.appearance.region_cells import CellView
+from tracker.estimation.appearance.part_drawing import CellView
 
 SHAPE, N = (48, 64), 20
 CAMERA = camera_at("front", (4.0, 0.0, 0.0), size=(64, 48))

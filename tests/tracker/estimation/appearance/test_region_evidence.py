@@ -7,12 +7,10 @@ from staging import SUIT
 
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.estimation.appearance.part_drawing import draw_bodies
-from tracker.estimation.appearance.region_cells import CELL_PX, cells_of
+from tracker.estimation.appearance.part_drawing import CELL_PX, cells_of, draw_bodies
 from tracker.estimation.appearance.region_deficit import elsewhere_nats, worst_parts
-from tracker.estimation.appearance.region_learning import isotonic
 from tracker.estimation.appearance.region_limb_scorer import RegionLimbScorer
-from tracker.estimation.appearance.region_model import SAMPLE_M
+from tracker.estimation.appearance.region_model import SAMPLE_M, isotonic
 from tracker.evidence.contours.label_image import part_labels
 from tracker.evidence.images.color_histogram import BINS
 
@@ -29,7 +27,7 @@ def plain_score(known, frame, bodies):
     nats, samples = np.zeros((2, *known.tables.trust.shape[:2]))
     for i, view in enumerate(frame.views):
         labels = part_labels(bodies, view.camera)
-        nearness = draw_bodies(bodies, view).nearness
+        nearness = draw_bodies(bodies, [view])[0].nearness
         for v, u in np.argwhere((labels > 0) & (nearness > 0)):
             p = labels[v, u] - 1
             r, g, b = view.colors[v, u].astype(int) * BINS // 256

@@ -9,8 +9,7 @@ from staging import Shown, cameras_around, own_evidence, posed
 from tracker.body.model import PosedBody
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.chamfer.tracker import ChamferTracker
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 
 LATE, N_FRAMES = 1, 6
 

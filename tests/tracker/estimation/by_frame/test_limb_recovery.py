@@ -7,6 +7,7 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
+from tracker.compute.sampling import even_points
 from tracker.estimation.appearance.part_colors import Colors
 from tracker.estimation.by_frame import limb_recovery
 from tracker.estimation.by_frame.limb_recovery import search_limbs
@@ -15,7 +16,6 @@ from tracker.estimation.by_frame.settings import RecoverSettings
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import PosePrior, solve
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS
-from tracker.estimation.search.even_points import even_points
 from tracker.formats.model_toml import load_model
 
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from staging import SUIT, Shown, cameras_around, dressed, in_posture, shaken
-from tracking_runs import track
+from tracking_runs import track, with_reference
 
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
@@ -12,15 +12,11 @@ from tracker.estimation.by_frame import start_pose
 from tracker.estimation.by_frame.start_pose import StartFrame, settle_starts
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.contour.settings import ContourSettings
-from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.fitting.limb_exchange import exchanged
 from tracker.estimation.tracking.person_memory import PersonMemory
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
-from tracker.evaluation.references import read_joints
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.observer import open_observer
-from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.session.assemble import NewSession, assemble
 
 N_SEEDS, N_FRAMES = 20, 11
 OFF_RAD, OFF_M = np.radians(10), 0.06
@@ -144,16 +140,9 @@ def test_a_keyframe_beside_the_person_stays_and_the_next_frames_are_good(gavrila
 @pytest.mark.parametrize("settings", [TrackSettings(), ContourSettings()], ids=lambda s: s.method)
 def test_twenty_bad_starts(data_folder, tmp_path, settings):
     """From keyframes 10 degrees and 6 cm beside the reference: at most 30 mm by frame 5, and good at frame 10."""
-    folder = data_folder("walk")
-    session = assemble(
-        NewSession(
-            tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")),
-            background=folder / "background", heights=1.75,
-        )
-    )  # fmt: skip
-    model, reference = session.people[0].model, read_joints(folder / "ground_truth.trc", session.fps)
-    places = dict(zip(reference.names, reference.points[0], strict=True))
-    right = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
+    data, sides = data_folder("walk"), ("background",)
+    session, reference, right = with_reference(data, tmp_path / "s", sides=sides, heights=1.75)
+    model = session.people[0].model
 
     def tracked(start):
         """The error on each frame after the first, mm, and the status of the last."""

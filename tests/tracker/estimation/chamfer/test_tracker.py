@@ -3,21 +3,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid, view_evidence
-from tracking_runs import track
+from tracking_runs import track, with_reference
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.prediction import PredictSettings
+from tracker.body.motion.velocity import PredictSettings
 from tracker.estimation.chamfer.settings import TrackSettings, pose_cost, search_frame
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.search import chamfer_cost
 from tracker.estimation.search.best_first import SearchSettings
-from tracker.estimation.tracking.subjects import Subjects
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.observer import Observer, open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 
 COARSE = TrackSettings(
@@ -337,21 +336,11 @@ def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypa
 @pytest.mark.slow
 def test_a_real_recording(data_folder, tmp_path):
     """Three frames of a cluttered room from the reference's pose, as `init --method joints` sets it."""
-    folder = data_folder("balance_real")
-    session = assemble(
-        NewSession(
-            tmp_path / "s",
-            calibration=folder / "Calib.toml",
-            videos=sorted(folder.glob("*.mp4")),
-            background=folder / "background",
-        )
-    )
+    joints, sides = "reference_joints.trc", ("background",)
+    session, reference, start = with_reference(data_folder("balance_real"), tmp_path / "s", joints, sides)
     model = session.people[0].model
-    reference = read_joints(folder / "reference_joints.trc", session.fps)
-    places = dict(zip(reference.names, reference.points[0], strict=True))
-    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS})
     with open_observer(session.cameras) as observer:
-        found = list(track(observer, [model], [start.pose], range(3), TrackSettings()))
+        found = list(track(observer, [model], [start], range(3), TrackSettings()))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, range(3))
     assert errors.mpjpe_mm < 90
@@ -361,14 +350,8 @@ def test_a_real_recording(data_folder, tmp_path):
 @pytest.mark.slow
 def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folder, tmp_path):
     """Without a background: an arm swings before a patterned picture and along a skirting board."""
-    folder = data_folder("walk")
-    session = assemble(
-        NewSession(tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75)
-    )
+    session, reference, start = with_reference(data_folder("walk"), tmp_path / "s", heights=1.75)
     model, frames = session.people[0].model, range(12)
-    reference = read_joints(folder / "ground_truth.trc", session.fps)
-    places = dict(zip(reference.names, reference.points[0], strict=True))
-    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
     with open_observer(session.cameras) as observer:
         found = list(track(observer, [model], [start], frames, TrackSettings(), keyframes={0: {0: start}}))
     poses = {f.frame: f.poses[0] for f in found}
@@ -383,14 +366,13 @@ def test_contours_are_traced_once_per_pose(gavrila, monkeypatch, segments):
     """Those of the prediction and those of the result, in each view; the cost of the result traces nothing."""
     truth = dancing(gavrila, 3)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
-    predicted, found, scored = [], [], []
-    trace, trace_views, score = (occluding_contours.trace, chamfer_cost.ChamferCost._traced, chamfer_cost.score_traced)
-    monkeypatch.setattr(occluding_contours, "trace", lambda *a: predicted.append(a) or trace(*a))
-    monkeypatch.setattr(chamfer_cost.ChamferCost, "_traced", lambda *a: found.append(a) or trace_views(*a))
+    traced, scored = [], []
+    trace, score = occluding_contours.trace_pieces, chamfer_cost.score_traced
+    monkeypatch.setattr(occluding_contours, "trace_pieces", lambda *a: traced.append(a) or trace(*a))
     monkeypatch.setattr(chamfer_cost, "score_traced", lambda *a: scored.append(a) or score(*a))
     for estimate in track(Shown(views), [gavrila], truth[:1], range(3), TrackSettings(segments=segments)):
         assert estimate.statuses == ("good",)
-        assert (len(predicted), len(found), len(scored)) == (3, 1, 1)  # of three views, at one and all at once
+        assert (len(traced), len(scored)) == (3 + 3, 1)
         assert len(scored[0][0].firsts) == 3 + 1  # it is given the contours of all views
-        for calls in (predicted, found, scored):
-            calls.clear()
+        traced.clear()
+        scored.clear()

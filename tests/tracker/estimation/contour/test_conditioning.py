@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tracker.estimation.contour.frame_estimator import conditioning
+from tracker.estimation.contour.tracker import conditioning
 from tracker.estimation.fitting.gauss_newton import NormalEquations
 
 

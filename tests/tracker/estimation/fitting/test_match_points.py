@@ -5,7 +5,7 @@ import pytest
 from staging import at, camera_at, cameras_around, own_evidence, posed, solid
 
 from tracker.body.model import PosedBody
-from tracker.estimation.fitting.match_points import N_COLUMNS, points_to_match
+from tracker.estimation.fitting.contour_arrays import N_COLUMNS, points_to_match
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.images.silhouette_contour import SilhouetteContour
 from tracker.evidence.view_evidence import Silhouette, ViewEvidence

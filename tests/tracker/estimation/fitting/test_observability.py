@@ -11,8 +11,7 @@ from tracker.estimation.fitting.added_camera import rank_added_cameras
 from tracker.estimation.fitting.contour_residuals import ContourResiduals, MatchSettings
 from tracker.estimation.fitting.observability import OBSERVABLE_RAD, ContourNoise, observe_pose
 from tracker.estimation.fitting.observability_reasons import describe_all
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.evidence.observer import open_observer
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table

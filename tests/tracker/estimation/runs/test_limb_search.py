@@ -10,7 +10,7 @@ from staging import SUIT
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.estimation.by_frame.limb_recovery import search_limbs
-from tracker.estimation.by_frame.region_scorer import FrameEvidence
+from tracker.estimation.by_frame.pose_score import FrameEvidence
 from tracker.estimation.by_frame.settings import RecoverSettings
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M

@@ -186,7 +186,7 @@ def test_moving_off_the_evidence_never_lowers_the_cost(real_frame, outliers, evi
         views = own_evidence([PosedBody(model, values)], [v.camera for v in views])
     cost = ChamferCost(views, [PosedBody(model, values)], outliers=outliers)
     here = cost([values]).total_px
-    theta = default_theta_px(views[0].camera)
+    theta = default_theta_px(views[0].camera.size)
     for move in away([v.camera for v in views]):
         moved = cost([moved_by(model, values, move)])
         assert here < moved.total_px <= theta + 1e-4, move
@@ -241,7 +241,7 @@ def test_fast_cost_against_the_oracle(real_frame, n_poses):
     """
     model, values, views = real_frame
     cost = ChamferCost(views, [PosedBody(model, values)])
-    theta = default_theta_px(views[0].camera)
+    theta = default_theta_px(views[0].camera.size)
     scene = [near_contour(v, oracle.visible_contour(model, values, v.camera)[0], theta) for v in views]
     rng = np.random.default_rng(25)
     poses = [shaken(model, values, rng, np.radians(20), 0.08) for _ in range(n_poses)]
@@ -276,7 +276,7 @@ def by_hand(cost, views, model, values, piece_px):
     """The truncated cost from contours of pieces of any length."""
     total = []
     for view in range(len(views)):
-        v, theta = views[view], default_theta_px(views[view].camera)
+        v, theta = views[view], default_theta_px(views[view].camera.size)
         contour = occluding_contours.trace([PosedBody(model, values)], v.camera, piece_px)
         pieces = contour.pieces_px[~contour.occluded]
         middles, lengths = (pieces[:, :2] + pieces[:, 2:]) / 2, np.linalg.norm(pieces[:, 2:] - pieces[:, :2], axis=1)

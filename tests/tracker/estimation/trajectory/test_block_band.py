@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.estimation.trajectory.block_band import factor
+from tracker.estimation.trajectory.solve import factor
 
 
 def band(T, n, m, seed=0):

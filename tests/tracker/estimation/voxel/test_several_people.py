@@ -8,8 +8,7 @@ from moving_figure import ADULT, FIGURE, cameras, joints_at, pose_at
 from solids import ellipsoid, silhouettes_of
 
 from tracker.estimation.fitting.gauss_newton import fit_to_points
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.estimation.voxel.assessment import unexplained_voxels
 from tracker.estimation.voxel.body_pose import state_of
 from tracker.estimation.voxel.figure import chain_centers

@@ -9,8 +9,7 @@ from figures import hide_legs
 from moving_figure import ADULT, CHILD, cameras, joints_at, views_at
 
 from tracker.estimation.fitting.gauss_newton import fit_to_points
-from tracker.estimation.tracking.subjects import Subjects
-from tracker.estimation.tracking.tracker import TrackingRun
+from tracker.estimation.tracking.tracker import Subjects, TrackingRun
 from tracker.estimation.voxel import tracker
 from tracker.estimation.voxel.frame_estimator import VoxelEstimator
 from tracker.estimation.voxel.paper import paper_settings

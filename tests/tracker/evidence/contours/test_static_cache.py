@@ -9,11 +9,10 @@ from tracker.body.model import PosedBody
 from tracker.estimation.fitting.contour_residuals import ContourResiduals, MatchSettings
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.occluding_contours import contour_room, part_poses
-from tracker.evidence.contours.pieces import PIECE_PX, piece_buffer, place_parts
+from tracker.evidence.contours.pieces import PIECE_PX, piece_buffer, place_parts, static_contours_buffer
 from tracker.evidence.contours.static_cache import (
     copy_poses,
     is_static_unchanged,
-    static_contours_buffer,
     store_pieces,
     trace_moving_parts,
     trace_static,
@@ -44,7 +43,7 @@ def traced_with_kept(bodies, then, moves):
     """Contours of some people in each view: moving parts are traced, static parts come from the cache of another
     pose."""
     surfaces = surfaces_of(tuple(b.model for b in bodies))
-    room = contour_room(CAMERAS[0], len(bodies))
+    room = contour_room(CAMERAS[:1], len(bodies))
     out, static = piece_buffer(surfaces, room), static_contours_buffer(len(CAMERAS), room, 1, moves)
     views = [(i, c.projection, c.center_world) for i, c in enumerate(CAMERAS)]
     place_parts(part_poses(bodies), surfaces, out)

@@ -3,13 +3,14 @@ import pytest
 
 from tracker.evidence.images.background_subtraction import (
     apply_gain,
+    change_threshold,
     dilate,
     exposure_gain,
     has_usable_exposure,
     smooth_image,
     subtract_background,
 )
-from tracker.evidence.images.change import MIN_DIFFERENCE, change_threshold
+from tracker.evidence.images.change import MIN_DIFFERENCE
 
 
 def room(seed=0, noise=0.0):

@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 
 from tracker.evidence.images.background_subtraction import smooth_image
-from tracker.evidence.images.edges import Levels, detect_edges, levels
-from tracker.evidence.images.image_statistics import SampleGrid
+from tracker.evidence.images.edges import Levels, SampleGrid, detect_edges, levels
 
 COLUMN = 30
 

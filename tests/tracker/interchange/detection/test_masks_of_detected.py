@@ -8,7 +8,7 @@ from fake_detector import FakeDetector, box_of
 from observed_people import make_session, seen, walking
 
 from tracker.errors import TrackerError
-from tracker.footage.mask_image import ANYONE, UNKNOWN
+from tracker.footage.image_file import ANYONE, UNKNOWN
 from tracker.footage.recording import read_mask
 from tracker.interchange.detection.detect import DetectionPlan, detect_people
 from tracker.interchange.observations.stored_masks import list_masks, load_masks, masks_folder

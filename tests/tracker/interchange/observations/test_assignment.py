@@ -7,7 +7,7 @@ import pytest
 from observed_people import BODY_25, make_session, seen, write_openpose
 
 from tracker.body.model import PosedBody
-from tracker.evaluation.judging import best_motion as judged
+from tracker.evaluation.judging import judge as judged
 from tracker.formats.keypoints.detections import read_openpose
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import write_trc

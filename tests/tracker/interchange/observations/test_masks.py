@@ -11,7 +11,7 @@ from observed_people import make_session
 from PIL import Image
 
 from tracker.errors import FormatError, SessionError, TrackerError
-from tracker.footage.mask_image import UNKNOWN
+from tracker.footage.image_file import UNKNOWN
 from tracker.footage.recording import read_mask
 from tracker.interchange.observations.importing import plan_import, store_import
 from tracker.interchange.observations.plans import ImportRequest

@@ -92,7 +92,7 @@ class _Search:
         Ts = model.kinematics(pose).Ts_world_part
         costs = 1 + self._overlap.cover(Ts[trunk], trunk, covered)
         for limb, changes in zip(self._limbs, limb_poses.changes_within_limits(model), strict=True):
-            poses = self._with_limb(pose, limb, model.clip(model.retract(model.neutral(), changes)))
+            poses = self._with_limb(pose, limb, model.move(model.neutral(), changes))
             totals, view_costs = self._costs(pose, limb, poses, covered, costs)
             best = int(np.argmin(totals))
             pose, costs = poses[best], view_costs[best]
@@ -104,13 +104,13 @@ class _Search:
         model, best = self.model, self._total(pose[None])[0]
         for spread, trunk_rad, trunk_m in _spreads():
             steps = limb_poses.changes_around(model, self._root, _N_FINER, trunk_rad, trunk_m)
-            poses = model.clip(model.retract(pose, steps))
+            poses = model.move(pose, steps)
             totals = self._total(poses)
             if totals.min() < best:
                 pose, best = poses[int(np.argmin(totals))], totals.min()
             for limb in self._limbs:
                 steps = limb_poses.changes_around(model, np.flatnonzero(limb.dofs), _N_FINER, spread)
-                near, cost = self._best_of_limb(pose, limb, model.clip(model.retract(pose, steps)))
+                near, cost = self._best_of_limb(pose, limb, model.move(pose, steps))
                 if cost < best:
                     pose, best = near, cost
         return pose, float(best)

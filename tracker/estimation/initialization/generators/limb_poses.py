@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb, limb_display_name, limbs
 from tracker.body.model import BodyModel
-from tracker.estimation.search.even_points import even_points
+from tracker.compute.sampling import even_points
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 
@@ -67,7 +67,7 @@ def _within_limits(model: BodyModel, limb: Limb) -> Array:
     held = np.isfinite(model.spreads[dofs])
     steps[:, held] = _HELD * normal[:, held] * model.spreads[dofs][held]
     changes = _of_dofs(model, dofs, steps)
-    return changes[~_in_trunk(model, limb, model.clip(model.retract(model.neutral(), changes)))]
+    return changes[~_in_trunk(model, limb, model.move(model.neutral(), changes))]
 
 
 def _kind(limb: Limb) -> str:

@@ -9,12 +9,11 @@ from clips import SIZE, N, encode, write_images
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracker.footage import passed_frames
+from tracker.footage import video_decoder
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.frame_reader import FrameReader
 from tracker.footage.recording import Recording
 from tracker.footage.video import VideoFile
-from tracker.footage.video_decoder import VideoDecoder
+from tracker.footage.video_decoder import FrameReader, VideoDecoder
 from tracker.geometry.cameras import Camera
 
 YUV_BYTES = (128 + 64) * SIZE[1]
@@ -60,7 +59,7 @@ def test_a_group_that_does_not_fit_is_decoded_in_parts(tmp_path, decoded):
 
 
 def test_the_cache_is_bounded_for_all_cameras_together(tmp_path, decoded, monkeypatch):
-    monkeypatch.setattr(passed_frames, "MAX_BYTES", 20 * YUV_BYTES)
+    monkeypatch.setattr(video_decoder, "MAX_PASSED_BYTES", 20 * YUV_BYTES)
     path = encode(tmp_path / "a.mp4", gop=N)
     with Recording([CameraSource(CAMERA, path)] * 2, cache_bytes=0) as recording:
         for k in range(N - 1, -1, -1):

@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 
 from tracker.evidence.images.background_subtraction import smooth_image
-from tracker.evidence.images.edges import Levels, detect_edges
-from tracker.evidence.images.image_statistics import SPACING_PX, SampleGrid
+from tracker.evidence.images.edges import SPACING_PX, Levels, SampleGrid, detect_edges
 
 
 def picture(size, blur=1.5, seed=0):
