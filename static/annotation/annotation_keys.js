@@ -8,8 +8,7 @@ import { inArea } from "../widgets/key_matching.js";
  * @param {(row?: HTMLElement) => void} reveal opens the section; focuses a control of the row, by default of the section
  */
 export function annotationBindings(section, review, reveal) {
-  const noTask = () => review.whyNoTask;
-  const noVerdict = () => review.whyNoVerdict;
+  const { whyNoTask: noTask, whyNoVerdict: noVerdict } = review;
   const words = "dataset plan annotation task";
   return inArea("Annotation", [
     { label: "Plan, tasks and comments", words, run: () => reveal() },
@@ -21,7 +20,7 @@ export function annotationBindings(section, review, reveal) {
       words: `${words} reviewer comment`,
       why: noVerdict,
       run: () => {
-        if (review.whyNoVerdict) return;
+        if (noVerdict()) return;
         reveal(section.click.text);
         section.askReason();
       },

@@ -10,7 +10,7 @@ import { makeEpipolarCheck } from "./epipolar_check.js";
 import { mountFrameCard } from "./frame_card.js";
 import { mountJointBar } from "./joint_bar.js";
 import { mountPinBar } from "./pin_bar.js";
-import { Pinning } from "./pinning.js";
+import { makePinning } from "./pinning.js";
 import { Posing } from "./posing.js";
 import { depthBindings, epipolarBindings, pinBindings, posingBindings } from "./posing_keys.js";
 
@@ -23,7 +23,7 @@ import { depthBindings, epipolarBindings, pinBindings, posingBindings } from "./
  * @param {import("../panes/index.js").Panes} panes
  */
 export function mount({ store, send, say, reasons }, { grid }) {
-  const pinning = new Pinning(store, send, say);
+  const pinning = makePinning(store, send, say);
   grid.addPointerTarget(pinning);
   const epipolar = makeEpipolarCheck(store, send);
   grid.addPointerTarget(epipolar); // before pins and joints

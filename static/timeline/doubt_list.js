@@ -49,7 +49,7 @@ export function mountDoubtList(store, queue) {
   });
 
   function show() {
-    const { doubts } = queue;
+    const doubts = queue.doubts();
     const shown = doubts.slice(0, limit);
     const known = rowsByKey;
     rowsByKey = new Map(shown.map((doubt) => [keyOf(doubt), known.get(keyOf(doubt)) ?? makeRow(doubt)]));
@@ -83,7 +83,7 @@ export function mountDoubtList(store, queue) {
 
   /** Mark the entry of the current frame. */
   function mark() {
-    const current = queue.current;
+    const current = queue.current();
     const key = current ? keyOf(current) : null;
     for (const [own, row] of rowsByKey) {
       const isCurrent = own === key;

@@ -73,14 +73,14 @@ export function curveBindings(edits) {
  * @param {() => string | null} away
  */
 export function queueBindings(queue, away) {
-  const why = () => away() ?? queue.why;
+  const why = () => away() ?? queue.why();
   return inArea("Timeline", [
     { label: "Next doubtful or lost pose by severity", why, run: () => queue.step(1) },
     { label: "Previous doubtful or lost pose by severity", why, run: () => queue.step(-1) },
     {
       label: "Accept the doubtful or lost poses here: mark them as reviewed",
-      why: () => away() ?? queue.whyNotAccept,
-      run: () => queue.accept(queue.current),
+      why: () => away() ?? queue.whyNotAccept(),
+      run: () => queue.accept(queue.current()),
     },
   ]);
 }
