@@ -68,7 +68,7 @@ export function costMap({ store, send }, posing) {
   };
   const draw = () => {
     const found = shown();
-    const { person } = posing;
+    const { person } = posing.joint();
     const width = canvas.parentElement?.clientWidth ?? 0;
     if (!isOpen || width === 0) return;
     canvas.style.height = `${HEIGHT_PX}px`;
@@ -102,8 +102,7 @@ export function costMap({ store, send }, posing) {
 
   /** @param {boolean} [isChosen] whether the angles may have changed */
   const update = (isChosen = false) => {
-    const { person, limb } = posing;
-    const own = posing.dofs;
+    const { person, limb, dofs: own } = posing.joint();
     // A joint of one angle is shown with those of its limb.
     const offered = own.length > 1 ? own : [...new Set([...own, ...limb.dofs])];
     open.hidden = isOpen || own.length === 0 || offered.length < 2;

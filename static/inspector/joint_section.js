@@ -60,7 +60,7 @@ export function jointSection(context, { posing }) {
   };
 
   const show = () => {
-    const { person, point, dofs } = posing;
+    const { person, point, dofs } = posing.joint();
     const { state } = store.facts;
     if (!person || !state || !point) return;
     const shape = JSON.stringify([state.person, point, dofs]);

@@ -41,7 +41,7 @@ export function placedPins({ overlay, heldPin }, view, camera) {
 
 /**
  * @param {{camera: number, person: number, point: string}} a
- * @param {{camera: number, person: number, point: string} | null} b
+ * @param {{camera: number, person: number, point: string | null} | null} b
  */
 export function isSame(a, b) {
   return a.camera === b?.camera && a.person === b.person && a.point === b.point;

@@ -59,7 +59,7 @@ export function drawerBindings(drawer) {
 /** @param {import("../posing/curve_edits.js").CurveEdits} edits */
 export function curveBindings(edits) {
   const { why } = edits;
-  const whyNone = () => (edits.choices.length > 0 ? null : "No curve can be edited here. Open the curves, and choose Arms, Torso or Legs.");
+  const whyNone = () => (edits.choices().length > 0 ? null : "No curve can be edited here. Open the curves, and choose Arms, Torso or Legs.");
   return inArea("Posing", [
     { label: "Curves: choose the next curve (U in the curves)", why: whyNone, run: () => edits.next(false) },
     { label: "Curves: choose one more curve (Shift+U in the curves)", why: whyNone, run: () => edits.next(true) },
