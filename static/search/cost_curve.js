@@ -29,13 +29,9 @@ export function mountCostCurve(store, send) {
   let curvePlot = /** @type {Plot | null} */ (null);
   box.append(lines, read);
   new ResizeObserver(() => draw()).observe(box);
+  store.onTab("search", ["searchSteps", "searchRuns", "searchRun"], draw);
   store.on(["theme"], () => draw());
   listen();
-
-  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  function update(changed) {
-    if (["drawer", "searchSteps", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"drawer"} */ (f)))) draw();
-  }
 
   function getRun() {
     return selectedRun(store.facts);
@@ -153,8 +149,6 @@ export function mountCostCurve(store, send) {
     const costs = `tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
     read.textContent = `${where}${count(steps.evaluations[at])} poses · ${costs}`;
   }
-
-  return { update };
 }
 
 /**

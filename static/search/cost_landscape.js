@@ -25,7 +25,6 @@ export function mountCostLandscape(store, send) {
   const waiting = make("p", "landscape-waiting");
   let hovered = /** @type {number | null} */ (null);
   let lastPlot = /** @type {Plot | null} */ (null);
-  let isShown = false;
   /** The names that the list of degrees of freedom was built for. */
   let listed = "";
   onChange(choice, () => send({ type: "landscape", dof: choice.value }));
@@ -35,27 +34,11 @@ export function mountCostLandscape(store, send) {
   });
   controls.append(choice, toMinimum, legend);
   element.append(canvas, waiting);
-  store.subscribe((changed) => {
-    if (changed.has("drawer")) open();
-    if (!isShown) return;
-    if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "landscape" });
-    if (changed.has("drawer") || changed.has("dof") || changed.has("connected")) followSelection();
-    if (changed.has("landscape") || changed.has("session")) show();
-  });
+  store.onTab("landscape", ["dof", "connected"], followSelection);
+  store.onTab("landscape", ["landscape", "session"], show);
   new ResizeObserver(() => draw()).observe(element);
   store.on(["theme"], show);
   listen();
-  open();
-
-  function open() {
-    const { drawer, connected } = store.facts;
-    const isOpen = drawer === "landscape";
-    element.hidden = controls.hidden = !isOpen;
-    if (isOpen === isShown) return;
-    isShown = isOpen;
-    if (connected && (isOpen || drawer !== "search")) send({ type: "watch", tab: isOpen ? "landscape" : null });
-    if (isOpen) show();
-  }
 
   /** Show the degree of freedom that the keys change, if a joint is selected. */
   function followSelection() {
@@ -112,7 +95,7 @@ export function mountCostLandscape(store, send) {
 
   function draw() {
     const { clientWidth, clientHeight } = element;
-    if (clientWidth === 0 || !isShown) return;
+    if (clientWidth === 0 || store.facts.drawer !== "landscape") return;
     const context = prepare(canvas, clientWidth, clientHeight, true);
     const found = store.facts.landscape;
     if (!found) return;

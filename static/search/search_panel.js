@@ -22,11 +22,10 @@ const MEASURED = "The cost uses the edges near the start pose; the final cost in
  * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
  */
 export function mountSearchPanel(store, actions, send) {
-  const panel = byId("search-panel", HTMLElement);
   const controls = byId("search-controls", HTMLElement);
   const speedField = make("select", { "aria-label": "Expansions per second" }, ...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
   const figures = make("output", { className: "search-figures", "aria-label": "Progress of the search" });
-  let isShown = false;
+  let wasOpen = false;
   const buttons = makeButtons();
   const theta = makeNumber({
     label: "θ, px",
@@ -35,21 +34,17 @@ export function mountSearchPanel(store, actions, send) {
     change: (value) => set({ theta_px: value }),
   });
   build();
-  const views = [
-    mountSearchTree(store, (changes) => set(changes)),
-    mountCostCurve(store, send),
-    mountRunList(store, send),
-    mountReplayBar(store, send),
-    mountCandidateStrip(store, send),
-  ];
-  store.subscribe((changed) => {
-    if (changed.has("drawer")) open();
-    if (!isShown) return;
-    if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "search" });
-    if (["state", "connected", "settings", "searchSetup", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"state"} */ (f)))) show();
-    for (const view of views) view.update(changed);
+  store.on(["drawer"], () => {
+    const isOpen = store.facts.drawer === "search";
+    if (wasOpen && !isOpen && store.facts.connected) actions.leaveReplay();
+    wasOpen = isOpen;
   });
-  open();
+  store.onTab("search", ["state", "connected", "settings", "searchSetup", "searchRuns", "searchRun"], show);
+  mountSearchTree(store, (changes) => set(changes));
+  mountCostCurve(store, send);
+  mountRunList(store, send);
+  mountReplayBar(store, send);
+  mountCandidateStrip(store, send);
 
   function makeButtons() {
     const search = (/** @type {"step" | "stage" | "frame" | "contours" | "chains" | "stop"} */ action) => () => actions.search(action);
@@ -83,17 +78,6 @@ export function mountSearchPanel(store, actions, send) {
     const title = "Search speed in expansions per second. Changes take effect immediately";
     onChange(speedField, () => send({ type: "search_speed", per_second: Number(speedField.value) || null }));
     controls.append(group, make("label", { className: "search-field", title }, "Speed", speedField), theta.element, figures);
-  }
-
-  function open() {
-    const { drawer, connected } = store.facts;
-    const isOpen = drawer === "search";
-    panel.hidden = controls.hidden = !isOpen;
-    if (isOpen === isShown) return;
-    isShown = isOpen;
-    if (!isOpen && connected) actions.leaveReplay();
-    if (connected && (isOpen || drawer !== "landscape")) send({ type: "watch", tab: isOpen ? "search" : null });
-    if (isOpen) show();
   }
 
   /** @param {Record<string, unknown>} changes */

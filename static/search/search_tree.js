@@ -36,14 +36,11 @@ export function mountSearchTree(store, change) {
   /** @type {{field: ReturnType<typeof makeNumber>, read: (setup: Setup) => number | null}[]} */
   let rowFields = [];
 
-  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  function update(changed) {
+  store.onTab("search", ["searchSetup", "settings", "session"], () => {
     const { searchSetup, settings, session } = store.facts;
-    if (!searchSetup || !settings || !session) return;
-    const isOther = ["searchSetup", "settings", "session", "drawer"].some((fact) => changed.has(/** @type {"session"} */ (fact)));
-    if (isOther) build({ ...settings.search, ...searchSetup }, session);
-    showRun();
-  }
+    if (searchSetup && settings && session) build({ ...settings.search, ...searchSetup }, session);
+  });
+  store.onTab("search", ["searchSetup", "settings", "session", "searchRuns", "searchRun"], showRun);
 
   /**
    * @param {Setup} setup
@@ -189,8 +186,6 @@ export function mountSearchTree(store, change) {
       element.title = stage && text ? describe(stage) : "Not searched";
     }
   }
-
-  return { update };
 }
 
 /** @param {import("../model/protocol.js").SearchStage} stage */

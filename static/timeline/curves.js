@@ -91,7 +91,6 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
   function open() {
     const { drawer } = store.facts;
     const group = CURVE_GROUPS.find((one) => one === drawer) ?? null;
-    stage.hidden = legend.hidden = group === null;
     if (group === null) personName.hidden = true;
     if (group === shownGroup) return;
     shownGroup = group;
