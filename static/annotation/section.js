@@ -86,15 +86,6 @@ export function annotationSection(context, review, visits) {
     showHere();
     comments.showPlace();
   });
-  return {
-    id: "annotation",
-    title: "Annotation",
-    hint: "The plan of a dataset: tasks, verdicts, the next best click, comments",
-    body,
-    click,
-    plan,
-    comments,
-    askReason,
-    /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  };
+  const hint = "The plan of a dataset: tasks, verdicts, the next best click, comments";
+  return { id: "annotation", title: "Annotation", hint, body, click, plan, comments, askReason };
 }

@@ -27,17 +27,10 @@ export function acquisitionView({ store, send }) {
   const start = textButton("Acquire from footage", "Fit all sizes to several frames; nothing changes until you apply them", () =>
     send({ type: "acquire", action: "start", person, method }),
   );
-  const choice = choiceRow({
-    label: "Fit to",
-    title:
-      "Contours: fit all sizes to the contours of several frames in all views. " +
-      "Voxels first: fit lengths and girths to the labelled voxels of the silhouettes, and start the fit to contours there",
-    options: [
-      ["contours", "Contours"],
-      ["voxels", "Voxels first"],
-    ],
-    change: (/** @type {Method} */ value) => (method = value),
-  });
+  const how =
+    "Contours: fit all sizes to the contours of several frames in all views. " +
+    "Voxels first: fit lengths and girths to the labelled voxels of the silhouettes, and start the fit to contours there";
+  const choice = choiceRow("Fit to", how, { contours: "Contours", voxels: "Voxels first" }, (value) => (method = value));
   const work = workRow("Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }), { className: "section-note acquisition-status", "aria-live": "polite" });
   const result = make("div");
   element.append(choice.element, start, work.element, work.status, result);

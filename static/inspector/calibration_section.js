@@ -34,7 +34,7 @@ const NUMBERS = {
 
 /**
  * @param {import("../model/index.js").Context} context
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
+ * @returns {import("./inspector.js").Section}
  */
 export function calibrationSection({ store, send }) {
   const act = (/** @type {Action} */ action) => send({ type: "calibration_check", action });
@@ -80,32 +80,27 @@ export function calibrationSection({ store, send }) {
   };
 
   store.on(["calibration", "showsMisfits", "state", "timeline", "lanes"], () => store.facts.calibration && show(store.facts.calibration));
-  return {
-    id: "calibration",
-    title: "Calibration",
-    hint: "Check the cameras by the tracked people, and correct them",
-    body,
-    bindings(reveal) {
-      const noCamera = () => (isNamed() ? null : "No camera is known to be off. Check the cameras first.");
-      const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
-        command(label, `${words} calibration`, () => (reveal(), run()), why);
-      const notChecked = () => (store.facts.calibration?.is_checked ? null : "There is no check. Check the cameras first.");
-      /** @type {[string, string, Action | (() => Action), () => string | null][]} */
-      const actions = [
-        ["Check the cameras", "contours body wrong moved turned", "start", () => (store.facts.calibration?.running ? "The check is at work." : null)],
-        ["Preview the corrected cameras (toggle)", "", () => (store.facts.calibration?.is_previewed ? "leave" : "preview"), noCamera],
-        ["Apply the correction of the cameras", "repair", "apply", () => noCamera() ?? (capital(store.facts.calibration?.refused ?? "") || null)],
-        ["Track again what is of an earlier calibration", "retrack", "track_again", () =>
-          earlierPoses(store.facts).tracked ? null : "No tracked pose is of an earlier calibration."],
-      ]; // prettier-ignore
-      return [
-        ...actions.map(([label, words, action, why]) => binding(label, words, why, () => act(typeof action === "string" ? action : action()))),
-        binding("Show where contours miss the edges (toggle)", "misfits residuals arrows field", notChecked, () =>
-          store.set({ showsMisfits: !store.facts.showsMisfits }),
-        ),
-      ];
-    },
+  const bindings = (/** @type {() => void} */ reveal) => {
+    const noCamera = () => (isNamed() ? null : "No camera is known to be off. Check the cameras first.");
+    const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
+      command(label, `${words} calibration`, () => (reveal(), run()), why);
+    const notChecked = () => (store.facts.calibration?.is_checked ? null : "There is no check. Check the cameras first.");
+    /** @type {[string, string, Action | (() => Action), () => string | null][]} */
+    const actions = [
+      ["Check the cameras", "contours body wrong moved turned", "start", () => (store.facts.calibration?.running ? "The check is at work." : null)],
+      ["Preview the corrected cameras (toggle)", "", () => (store.facts.calibration?.is_previewed ? "leave" : "preview"), noCamera],
+      ["Apply the correction of the cameras", "repair", "apply", () => noCamera() ?? (capital(store.facts.calibration?.refused ?? "") || null)],
+      ["Track again what is of an earlier calibration", "retrack", "track_again", () =>
+        earlierPoses(store.facts).tracked ? null : "No tracked pose is of an earlier calibration."],
+    ]; // prettier-ignore
+    return [
+      ...actions.map(([label, words, action, why]) => binding(label, words, why, () => act(typeof action === "string" ? action : action()))),
+      binding("Show where contours miss the edges (toggle)", "misfits residuals arrows field", notChecked, () =>
+        store.set({ showsMisfits: !store.facts.showsMisfits }),
+      ),
+    ];
   };
+  return { id: "calibration", title: "Calibration", hint: "Check the cameras by the tracked people, and correct them", body, bindings };
 }
 
 /**

@@ -20,7 +20,7 @@ const NO_COPY = "No copy is compared. Open one first.";
  * @param {import("../model/index.js").Context} context
  * @param {import("../timeline/index.js").TimelineRoom} timeline
  * @param {import("./import_form.js").PathFields} paths
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
+ * @returns {import("./inspector.js").Section}
  */
 export function copySection({ store, send, say, navigation, actions }, { jumps }, paths) {
   const decide = (/** @type {Action} */ action) => {
@@ -38,9 +38,7 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
 
   const summary = sectionNote();
   const here = sectionNote();
-  const tolerance = numberRow({
-    label: "Tolerance",
-    title: "Distance of a joint up to which two poses count as one",
+  const tolerance = numberRow("Tolerance", "Distance of a joint up to which two poses count as one", {
     unit: "mm",
     low: 0,
     high: 10000,
@@ -138,28 +136,24 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
   refuse("");
   show();
   store.on(["otherCopy", "state", "session", "connected"], show);
-  return {
-    id: "copy",
-    title: "Other copy",
-    hint: "Compare with another annotator's copy of this session, and decide where both differ",
-    body,
-    bindings(reveal) {
-      const noCopy = () => (store.facts.otherCopy ? null : NO_COPY);
-      const none = () => noCopy() ?? (copyDifferences(store.facts).length ? null : "The copies differ nowhere by more than the tolerance.");
-      const off = (/** @type {HTMLButtonElement} */ which) => () => noCopy() ?? (which.disabled ? here.textContent : null);
-      const words = "annotator agreement copy compare disagreement difference";
-      return [
-        command("Compare with another copy of the session…", words, () => (reveal(), input.focus())),
-        command("Other copy: keep my pose", words, () => decide("keep"), off(keep)),
-        command("Other copy: take their pose", words, () => decide("take"), off(take)),
-        command("Other copy: take the mean of both poses", words, () => decide("mean"), off(mean)),
-        command("Other copy: go to the largest difference", words, () => {
-          reveal();
-          const [largest] = copyDifferences(store.facts).sort((a, b) => b.distance_mm - a.distance_mm);
-          visit(largest);
-        }, none),
-        command("End the comparison with the other copy", words, leaveCopy, noCopy),
-      ];
-    },
+  const bindings = (/** @type {() => void} */ reveal) => {
+    const noCopy = () => (store.facts.otherCopy ? null : NO_COPY);
+    const none = () => noCopy() ?? (copyDifferences(store.facts).length ? null : "The copies differ nowhere by more than the tolerance.");
+    const off = (/** @type {HTMLButtonElement} */ which) => () => noCopy() ?? (which.disabled ? here.textContent : null);
+    const words = "annotator agreement copy compare disagreement difference";
+    return [
+      command("Compare with another copy of the session…", words, () => (reveal(), input.focus())),
+      command("Other copy: keep my pose", words, () => decide("keep"), off(keep)),
+      command("Other copy: take their pose", words, () => decide("take"), off(take)),
+      command("Other copy: take the mean of both poses", words, () => decide("mean"), off(mean)),
+      command("Other copy: go to the largest difference", words, () => {
+        reveal();
+        const [largest] = copyDifferences(store.facts).sort((a, b) => b.distance_mm - a.distance_mm);
+        visit(largest);
+      }, none),
+      command("End the comparison with the other copy", words, leaveCopy, noCopy),
+    ];
   };
+  const hint = "Compare with another annotator's copy of this session, and decide where both differ";
+  return { id: "copy", title: "Other copy", hint, body, bindings };
 }

@@ -22,7 +22,7 @@ const NO_SET = "No observations were imported. Import them first.";
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
  * @param {import("./import_form.js").PathFields} sessions
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
+ * @returns {import("./inspector.js").Section}
  */
 export function observationsSection({ store, send, say, navigation, actions, layers }, panes, sessions) {
   const act = (/** @type {Action} */ action, name = "") => send({ type: "observations", action, name });
@@ -157,32 +157,28 @@ export function observationsSection({ store, send, say, navigation, actions, lay
 
   store.on(["observations", "session"], showAll);
   store.on(["finding"], () => found() && showWork(/** @type {Observations} */ (found())));
-  return {
-    id: "observations",
-    title: "Observations",
-    hint: "Key points, joints and masks of other programs: import, judge, mend",
-    body,
-    bindings(reveal) {
-      const noSet = () => (current() ? null : NO_SET);
-      const busy = () => (found()?.running ? "Work on observations is under way." : store.facts.finding?.running ? "A search for people is under way." : noSet());
-      const noEntry = () => (found()?.worst.length ? null : found()?.judged ? "No imported limb is off." : "Nothing was judged. Judge the observations first.");
-      const step = (/** @type {1 | -1} */ way) => visit(Math.max(0, Math.min((found()?.worst.length ?? 0) - 1, at + way)));
-      const own = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
-        command(label, `${words} observations imported detector`, () => (reveal(), run()), why);
-      return [
-        { label: "Observations of other programs", words: "imported key points joints openpose trc judge detector", run: reveal },
-        { label: "Next imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(1) },
-        { label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(-1) },
-        own("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
-        own("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
-        own("Take the observations as poses", "store mend correct", busy, () => act("take", current())),
-        own("Track with the observations", "contours evidence find people", busy, startTrack),
-        own("Send the observations back as they came", "export save file mended", noSet, () => void save(`export/like/${encodeURIComponent(current())}`, "The export")),
-        own("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
-        own("Import observations…", "key points joints masks files openpose trc", () => null, form.open),
-      ];
-    },
+  const bindings = (/** @type {() => void} */ reveal) => {
+    const noSet = () => (current() ? null : NO_SET);
+    const busy = () => (found()?.running ? "Work on observations is under way." : store.facts.finding?.running ? "A search for people is under way." : noSet());
+    const noEntry = () => (found()?.worst.length ? null : found()?.judged ? "No imported limb is off." : "Nothing was judged. Judge the observations first.");
+    const step = (/** @type {1 | -1} */ way) => visit(Math.max(0, Math.min((found()?.worst.length ?? 0) - 1, at + way)));
+    const own = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
+      command(label, `${words} observations imported detector`, () => (reveal(), run()), why);
+    return [
+      { label: "Observations of other programs", words: "imported key points joints openpose trc judge detector", run: reveal },
+      { label: "Next imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(1) },
+      { label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(-1) },
+      own("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
+      own("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
+      own("Take the observations as poses", "store mend correct", busy, () => act("take", current())),
+      own("Track with the observations", "contours evidence find people", busy, startTrack),
+      own("Send the observations back as they came", "export save file mended", noSet, () => void save(`export/like/${encodeURIComponent(current())}`, "The export")),
+      own("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
+      own("Import observations…", "key points joints masks files openpose trc", () => null, form.open),
+    ];
   };
+  const hint = "Key points, joints and masks of other programs: import, judge, mend";
+  return { id: "observations", title: "Observations", hint, body, bindings };
 }
 
 /**
