@@ -4,7 +4,8 @@ import { make, textButton } from "../widgets/elements.js";
 import { KEYFRAME } from "../model/cells.js";
 import { earlierCalibration, hasTrack } from "../model/selectors.js";
 import { count } from "../widgets/text.js";
-import { command, group, workRow } from "./parts.js";
+import { group, workRow } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
 import { sectionNote } from "./rows.js";
 
 /**

@@ -2,7 +2,8 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
-import { command, workRow } from "./parts.js";
+import { workRow } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
 import { NO_OPTIONS, choiceRow, sectionNote } from "./rows.js";
 
 /**

@@ -4,7 +4,8 @@ import { make, onSubmit, textButton } from "../widgets/elements.js";
 import { postJson } from "../widgets/post_json.js";
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
-import { command, frameRow, group, labelled, longList } from "./parts.js";
+import { frameRow, group, labelled, longList } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
 import { numberRow, sectionNote } from "./rows.js";
 
 /**

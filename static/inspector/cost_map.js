@@ -1,5 +1,6 @@
 /** Picture of the cost over two degrees of freedom around the shown pose. A click or Enter takes the pose there. */
 
+import { fillRect } from "../widgets/canvas.js";
 import { make, textButton } from "../widgets/elements.js";
 import { nearest } from "../widgets/plot.js";
 import { prepare } from "../panes/drawing.js";
@@ -157,20 +158,17 @@ function drawMap(context, map, width, cursor, style) {
   const { across, up, nats } = map;
   const [w, h] = [width / across.length, HEIGHT_PX / up.length];
   const best = Math.min(...nats.flat());
-  context.fillStyle = style.getPropertyValue("--plot");
-  context.fillRect(0, 0, width, HEIGHT_PX);
-  context.fillStyle = style.getPropertyValue("--accent");
+  fillRect(context, style.getPropertyValue("--plot"), 0, 0, width, HEIGHT_PX);
+  const color = style.getPropertyValue("--accent");
   const range = Math.max(NEAR_NATS, Math.max(...nats.flat()) - best);
   nats.forEach((costs, row) =>
     costs.forEach((cost, column) => {
-      context.globalAlpha = 0.85 * (1 - Math.sqrt((cost - best) / range));
       // Whole pixels: seams would look like a grid.
       const [left, right] = [column * w, (column + 1) * w].map(Math.round);
       const [top, bottom] = [HEIGHT_PX - (row + 1) * h, HEIGHT_PX - row * h].map(Math.round);
-      context.fillRect(left, top, right - left, bottom - top);
+      fillRect(context, color, left, top, right - left, bottom - top, 0.85 * (1 - Math.sqrt((cost - best) / range)));
     }),
   );
-  context.globalAlpha = 1;
   context.strokeStyle = style.getPropertyValue("--text");
   context.lineWidth = 1.25;
   context.stroke(outline(nats, best + NEAR_NATS, w, h));

@@ -5,7 +5,7 @@
  */
 
 import { button } from "../widgets/elements.js";
-import { inArea } from "../widgets/key_matching.js";
+import { command, inArea } from "../widgets/key_matching.js";
 import { capital } from "../widgets/text.js";
 import { calibrationSection } from "./calibration_section.js";
 import { clocksSection } from "./clocks_section.js";
@@ -14,7 +14,6 @@ import { findSection } from "./find_section.js";
 import { bodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
 import { jointSection } from "./joint_section.js";
-import { command } from "./parts.js";
 import { observationsSection } from "./observations_section.js";
 import { provenanceSection } from "./provenance_section.js";
 import { reasonSection } from "./reason_section.js";

@@ -5,7 +5,8 @@ import { download } from "../widgets/downloads.js";
 import { capital, count, displayName, percent } from "../widgets/text.js";
 import { importForm } from "./import_form.js";
 import { zoomOnArrival } from "../panes/arrival_zoom.js";
-import { command, frameRow, group, longList, workRow } from "./parts.js";
+import { frameRow, group, longList, workRow } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
 import { sectionNote } from "./rows.js";
 
 /**

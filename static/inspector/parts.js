@@ -101,16 +101,3 @@ export function longList(list, few, title, row) {
 export function labelled(kind, text, title, field) {
   return make("label", { className: kind, title }, make("span", {}, text), field);
 }
-
-/**
- * Make a command that only the palette has.
- *
- * @param {string} label
- * @param {string} words further words that it is found by
- * @param {() => void} run
- * @param {() => string | null} [why] why it is unavailable
- * @returns {import("../widgets/key_matching.js").Command}
- */
-export function command(label, words, run, why) {
-  return { label, words, run, why };
-}

@@ -4,7 +4,8 @@ import { make, textButton } from "../widgets/elements.js";
 import { KINDS, annotatorName, pointPhrases, poseLines } from "../model/provenance.js";
 import { tasksAt } from "../model/tasks.js";
 import { capital, count, displayName } from "../widgets/text.js";
-import { command, group } from "./parts.js";
+import { group } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
 import { NO_OPTIONS, choiceRow, sectionNote } from "./rows.js";
 
 /** @typedef {import("../model/provenance.js").Filter} Filter */

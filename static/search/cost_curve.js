@@ -94,8 +94,7 @@ export function mountCostCurve(store, send) {
     if (runs.length === 0) {
       curvePlot = null;
       read.textContent = "";
-      context.font = "12px system-ui, sans-serif";
-      context.textAlign = "center";
+      setText(context, "center", "alphabetic", "12px");
       context.fillStyle = style.getPropertyValue("--muted");
       context.fillText("Start a search: Step, Stage or Frame", clientWidth / 2, clientHeight / 2);
       return;

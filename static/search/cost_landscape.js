@@ -1,6 +1,6 @@
 /** Plot of the cost over the range of one degree of freedom. Hovering reads values, a click sets the value. */
 
-import { fillRect } from "../widgets/canvas.js";
+import { circlePath, fillRect, setText } from "../widgets/canvas.js";
 import { colorName, dashOf, lineSwatch } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
 import { byId, make, onChange, textButton } from "../widgets/elements.js";
@@ -140,17 +140,13 @@ export function mountCostLandscape(store, send) {
     const now = plot.x(found.current * factor);
     context.fillStyle = context.strokeStyle = style.getPropertyValue("--text");
     context.fillRect(now - 0.5, plot.top, 1, height);
-    context.font = "600 10.5px system-ui, sans-serif";
-    context.textBaseline = "top";
     const isRight = now > (plot.left + plot.right) / 2;
-    context.textAlign = isRight ? "right" : "left";
+    setText(context, isRight ? "right" : "left", "top", "600 10.5px");
     context.fillText("now", now + (isRight ? -4 : 4), plot.top + 2);
     const min = indexOfMin(found.total);
     const [x, y] = [plot.x(found.values[min] * factor), plot.y(found.total[min])];
-    context.beginPath();
-    context.arc(x, y, 4.5, 0, 2 * Math.PI);
     context.lineWidth = 2;
-    context.stroke();
+    context.stroke(circlePath(x, y, 4.5));
     if (hovered !== null) {
       fillRect(context, style.getPropertyValue("--text"), plot.x(found.values[hovered] * factor) - 0.5, plot.top, 1, height, 0.5);
     }

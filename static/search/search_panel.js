@@ -27,12 +27,8 @@ export function mountSearchPanel(store, actions, send) {
   const figures = make("output", { className: "search-figures", "aria-label": "Progress of the search" });
   let wasOpen = false;
   const buttons = makeButtons();
-  const theta = makeNumber({
-    label: "θ, px",
-    title: "Outlier distance theta in pixels: edges farther away are ignored. Empty: 3% of the longer image side",
-    placeholder: "auto",
-    change: (value) => set({ theta_px: value }),
-  });
+  const limiting = "Outlier distance theta in pixels: edges farther away are ignored. Empty: 3% of the longer image side";
+  const theta = makeNumber("θ, px", limiting, (value) => set({ theta_px: value }), "auto");
   build();
   store.on(["drawer"], () => {
     const isOpen = store.facts.drawer === "search";

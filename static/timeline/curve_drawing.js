@@ -1,6 +1,6 @@
 /** Draw plots of curves below one another, on the axis of the timeline. Sizes are CSS pixels. */
 
-import { drawWithin, setText } from "../widgets/canvas.js";
+import { circlePath, drawWithin, fillRect, setText } from "../widgets/canvas.js";
 import { roundUp } from "../widgets/frame_axis.js";
 import { SOURCES, keyframesOf } from "../model/cells.js";
 import { extent, trace } from "../model/series.js";
@@ -125,11 +125,7 @@ export function pointAt({ curves, scales, chosen }, axis, { x, y }) {
 export function drawRings(context, points, color) {
   context.strokeStyle = color;
   context.lineWidth = 2;
-  for (const { x, y } of points) {
-    context.beginPath();
-    context.arc(x, y, 6, 0, 2 * Math.PI);
-    context.stroke();
-  }
+  for (const { x, y } of points) context.stroke(circlePath(x, y, 6));
 }
 
 /**
@@ -168,14 +164,12 @@ export function toY({ top, bottom, min, max }, value) {
  * @param {CSSStyleDeclaration} style
  */
 function drawFrame(context, axis, scale, style) {
-  context.fillStyle = style.getPropertyValue("--plot");
-  context.fillRect(axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
+  fillRect(context, style.getPropertyValue("--plot"), axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
   const step = roundUp(((scale.max - scale.min) * TICK_GAP) / (scale.bottom - scale.top));
   setText(context, "right", "middle");
   for (let value = Math.ceil(scale.min / step) * step; value <= scale.max; value += step) {
     const y = Math.round(toY(scale, value));
-    context.fillStyle = style.getPropertyValue("--line");
-    context.fillRect(axis.left, y, axis.right - axis.left, 1);
+    fillRect(context, style.getPropertyValue("--line"), axis.left, y, axis.right - axis.left, 1);
     // Labels at the edges would touch those of the next plot.
     if (y < scale.top + 5 || y > scale.bottom - 4) continue;
     context.fillStyle = style.getPropertyValue("--muted");
@@ -193,10 +187,7 @@ function drawFrame(context, axis, scale, style) {
 function drawTitle(context, axis, top, text, style) {
   setText(context, "left", "top", "600 11px");
   const width = context.measureText(text).width;
-  context.fillStyle = style.getPropertyValue("--plot");
-  context.globalAlpha = 0.8;
-  context.fillRect(axis.left, top, width + 12, 16);
-  context.globalAlpha = 1;
+  fillRect(context, style.getPropertyValue("--plot"), axis.left, top, width + 12, 16, 0.8);
   context.fillStyle = style.getPropertyValue("--muted");
   context.fillText(text, axis.left + 6, top + 3);
 }
@@ -208,10 +199,7 @@ function drawTitle(context, axis, top, text, style) {
  * @param {CSSStyleDeclaration} style
  */
 function drawKeyframes(context, xs, { top, bottom }, style) {
-  context.fillStyle = style.getPropertyValue("--muted");
-  context.globalAlpha = 0.35;
-  for (const x of xs) context.fillRect(x - 0.5, top, 1, bottom - top);
-  context.globalAlpha = 1;
+  for (const x of xs) fillRect(context, style.getPropertyValue("--muted"), x - 0.5, top, 1, bottom - top, 0.35);
 }
 
 /**

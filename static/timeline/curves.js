@@ -6,6 +6,7 @@
 import { drawCurves, drawRings, pointAt, scalesOf, toY } from "./curve_drawing.js";
 import { CURVE_GROUPS } from "./drawer.js";
 import { prepare } from "../panes/drawing.js";
+import { fillRect } from "../widgets/canvas.js";
 import { button, byId, make } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { factorOf, numberField } from "../widgets/number_field.js";
@@ -243,13 +244,9 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
     const axis = axisNow();
     const { target } = store.facts;
     if (store.facts.range) drawRange(context, axis, store.facts.range, style, clientHeight);
-    context.fillStyle = style.getPropertyValue("--text");
-    if (axis.shows(target)) context.fillRect(axis.middle(target) - 0.5, 0, 1, clientHeight);
-    if (hovered !== null) {
-      context.globalAlpha = 0.5;
-      context.fillRect(axis.middle(hovered) - 0.5, 0, 1, clientHeight);
-      context.globalAlpha = 1;
-    }
+    const ink = style.getPropertyValue("--text");
+    if (axis.shows(target)) fillRect(context, ink, axis.middle(target) - 0.5, 0, 1, clientHeight);
+    if (hovered !== null) fillRect(context, ink, axis.middle(hovered) - 0.5, 0, 1, clientHeight, 0.5);
     readOut(hovered ?? target);
     const look = looked();
     if (!look) return;
@@ -257,7 +254,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
       const frames = [...(look.chosen.includes(dof ?? -1) ? [target] : []), ...(point && point.dof === dof ? [point.frame] : [])];
       return frames.map((frame) => ({ x: axis.middle(frame), y: toY(look.scales[plot], values[frame]) }));
     });
-    drawRings(context, ringed, style.getPropertyValue("--text"));
+    drawRings(context, ringed, ink);
   }
 
   /** @param {number} frame */

@@ -1,6 +1,6 @@
 /** Keys of navigation, tracking, timeline and drawer. */
 
-import { inArea } from "../widgets/key_matching.js";
+import { command, inArea } from "../widgets/key_matching.js";
 import { KINDS } from "./jumps.js";
 
 /**
@@ -77,11 +77,9 @@ export function queueBindings(queue, away) {
   return inArea("Timeline", [
     { label: "Next doubtful or lost pose by severity", why, run: () => queue.step(1) },
     { label: "Previous doubtful or lost pose by severity", why, run: () => queue.step(-1) },
-    {
-      label: "Accept the doubtful or lost poses here: mark them as reviewed",
-      why: () => away() ?? queue.whyNotAccept(),
-      run: () => queue.accept(queue.current()),
-    },
+    command("Accept the doubtful or lost poses here: mark them as reviewed", "", () => queue.accept(queue.current()), () =>
+      away() ?? queue.whyNotAccept(),
+    ),
   ]);
 }
 
@@ -119,12 +117,7 @@ function markBindings(store, actions, reasons) {
     { label: "Remove the marks of this frame", run: () => actions.unmark() },
     { keys: ["E"], label: "Reviewed (toggle)", run: () => actions.toggleMark("reviewed") },
     { label: "Interpolate the marked range", why: reasons.range, run: interpolate },
-    {
-      label: "Estimate the poses here again",
-      words: "marked range, or the poses around this frame",
-      why: reasons.away,
-      run: () => actions.estimateAgain(),
-    },
+    command("Estimate the poses here again", "marked range, or the poses around this frame", () => actions.estimateAgain(), reasons.away),
   ];
 }
 

@@ -55,6 +55,19 @@ export function diamondPath(x, y, radius) {
 }
 
 /**
+ * Make the path of a circle.
+ *
+ * @param {number} x middle
+ * @param {number} y
+ * @param {number} radius
+ */
+export function circlePath(x, y, radius) {
+  const path = new Path2D();
+  path.arc(x, y, radius, 0, 2 * Math.PI);
+  return path;
+}
+
+/**
  * Draw inside a box only.
  *
  * @param {CanvasRenderingContext2D} context

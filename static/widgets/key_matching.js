@@ -89,3 +89,16 @@ export function keyOf(event) {
 export function inArea(area, commands, why) {
   return commands.map((command) => ({ area, why, keys: [], ...command }));
 }
+
+/**
+ * Make a command that only the palette has.
+ *
+ * @param {string} label
+ * @param {string} words further words that it is found by
+ * @param {() => void} run
+ * @param {() => string | null} [why] why it is unavailable
+ * @returns {Command}
+ */
+export function command(label, words, run, why) {
+  return { label, words, run, why };
+}
