@@ -50,7 +50,6 @@ export function mount() {
   return {
     store,
     send,
-    notify,
     say,
     latency,
     recentImages,

@@ -4,7 +4,7 @@
  */
 
 import { button, byId, make, onSubmit } from "../widgets/elements.js";
-import { CameraCards } from "./camera_cards.js";
+import { makeCameraCards } from "./camera_cards.js";
 import { DialogForm } from "./dialog_form.js";
 import { drawRig } from "./rig_drawing.js";
 import { postJson } from "../widgets/post_json.js";
@@ -40,7 +40,7 @@ export class NewSession extends DialogForm {
    */
   constructor(picker, open) {
     super("new-session", picker);
-    this.#cards = new CameraCards(
+    this.#cards = makeCameraCards(
       () => this.#begin(),
       (from, take) => picker.show("footage", from || this.value("footage"), take),
     );
@@ -163,7 +163,7 @@ export class NewSession extends DialogForm {
       folder: this.value("folder"),
       calibration: this.value("calibration"),
       footage: this.value("footage"),
-      cameras: this.#cards.chosen,
+      cameras: this.#cards.chosen(),
       people: this.list("people"),
       heights: this.list("heights").map(Number),
       models: this.list("models"),
