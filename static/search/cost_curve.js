@@ -6,7 +6,7 @@ import { fillRect, setText } from "../widgets/canvas.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
 import { byId, make } from "../widgets/elements.js";
-import { Plot } from "../widgets/plot.js";
+import { Plot, nearest } from "../widgets/plot.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count } from "../widgets/text.js";
 
@@ -72,15 +72,7 @@ export function mountCostCurve(store, send) {
   function stepUnder(event) {
     const steps = getSteps();
     if (!curvePlot || !steps || steps.count === 0) return null;
-    const value = curvePlot.valueAt(event.clientX - box.getBoundingClientRect().left);
-    let [low, high] = [0, steps.count - 1];
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (steps.evaluations[middle] < value) low = middle + 1;
-      else high = middle;
-    }
-    const isFormerNearer = low > 0 && value - steps.evaluations[low - 1] < steps.evaluations[low] - value;
-    return isFormerNearer ? low - 1 : low;
+    return nearest(steps.evaluations, curvePlot.valueAt(event.clientX - box.getBoundingClientRect().left));
   }
 
   function draw() {

@@ -1,7 +1,7 @@
 /** Draw plots of curves below one another, on the axis of the timeline. Sizes are CSS pixels. */
 
 import { circlePath, drawWithin, fillRect, setText } from "../widgets/canvas.js";
-import { roundUp } from "../widgets/frame_axis.js";
+import { drawValues, toY } from "../widgets/plot.js";
 import { SOURCES, keyframesOf } from "../model/cells.js";
 import { extent, trace } from "../model/series.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
@@ -11,12 +11,11 @@ import { markPositions } from "./timeline_drawing.js";
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
  * @typedef {import("../model/series.js").Curves} Curves
- * @typedef {{top: number, bottom: number, min: number, max: number}} Scale
+ * @typedef {import("../widgets/plot.js").Scale} Scale
  */
 
 const TICKS_HEIGHT = 16;
 const PLOT_GAP = 6;
-const TICK_GAP = 22;
 /** Distance of the pointer within which it takes a point. */
 const REACH = 8;
 /** Least distance of frames whose poses are dots. */
@@ -44,7 +43,8 @@ export function drawCurves(context, axis, { curves, labels, scales, cells, chose
   const isPosed = (/** @type {number} */ frame) => cells.sources[frame] !== INTERPOLATED;
   curves.plots.forEach((plot, index) => {
     const scale = scales[index];
-    drawFrame(context, axis, scale, style);
+    // Labels at the edges would touch those of the next plot.
+    drawValues(context, style, axis, scale, (y) => y >= scale.top + 5 && y <= scale.bottom - 4);
     drawKeyframes(context, keys, scale, style);
     drawWithin(context, { ...scale, left: axis.left, right: axis.right }, () => {
       context.lineJoin = "round";
@@ -145,36 +145,6 @@ function scaleOf(unit, curves, top, bottom) {
   max += unit === "px" ? lacking : lacking / 2;
   const margin = 0.06 * (max - min);
   return { top, bottom, min: unit === "px" ? 0 : min - margin, max: max + margin };
-}
-
-/**
- * @param {Scale} scale
- * @param {number} value
- */
-export function toY({ top, bottom, min, max }, value) {
-  return bottom - ((bottom - top) * (value - min)) / (max - min);
-}
-
-/**
- * Draw the background of a plot, grid lines at round values and their labels.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {FrameAxis} axis
- * @param {Scale} scale
- * @param {CSSStyleDeclaration} style
- */
-function drawFrame(context, axis, scale, style) {
-  fillRect(context, style.getPropertyValue("--plot"), axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
-  const step = roundUp(((scale.max - scale.min) * TICK_GAP) / (scale.bottom - scale.top));
-  setText(context, "right", "middle");
-  for (let value = Math.ceil(scale.min / step) * step; value <= scale.max; value += step) {
-    const y = Math.round(toY(scale, value));
-    fillRect(context, style.getPropertyValue("--line"), axis.left, y, axis.right - axis.left, 1);
-    // Labels at the edges would touch those of the next plot.
-    if (y < scale.top + 5 || y > scale.bottom - 4) continue;
-    context.fillStyle = style.getPropertyValue("--muted");
-    context.fillText(String(Number(value.toPrecision(6))), axis.left - 6, y);
-  }
 }
 
 /**

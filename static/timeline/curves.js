@@ -3,13 +3,14 @@
  * Shift a drag marks a range. Points of angles and lengths can be dragged. The program sends curves only while they are open.
  */
 
-import { drawCurves, drawRings, pointAt, scalesOf, toY } from "./curve_drawing.js";
+import { drawCurves, drawRings, pointAt, scalesOf } from "./curve_drawing.js";
 import { CURVE_GROUPS } from "./drawer.js";
 import { prepare } from "../panes/drawing.js";
 import { fillRect } from "../widgets/canvas.js";
 import { button, byId, make } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { factorOf, numberField } from "../widgets/number_field.js";
+import { toY } from "../widgets/plot.js";
 import { lineSwatch } from "../widgets/series_lines.js";
 import { zoomByWheel } from "./frame_window.js";
 import { drawRange } from "./timeline_drawing.js";
@@ -42,7 +43,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
   let hovered = /** @type {number | null} */ (null);
   /** The point under the pointer that can be dragged, and the values of the plots, as they were at the start of a drag. */
   let point = /** @type {ReturnType<typeof pointAt>} */ (null);
-  let scales = /** @type {import("./curve_drawing.js").Scale[]} */ ([]);
+  let scales = /** @type {import("../widgets/plot.js").Scale[]} */ ([]);
   /** Start of the range that is being marked, or of the drag of a point, CSS pixels. */
   let [marked, heldY] = /** @type {[number | null, number]} */ ([null, 0]);
   /** The labels that the legend was built for. */
