@@ -3,7 +3,7 @@
 import { hasSearch, hasTrack, stopTitle } from "../model/selectors.js";
 import { mountCandidateStrip } from "./candidate_strip.js";
 import { mountCostCurve } from "./cost_curve.js";
-import { byId, make, onChange, textButton } from "../widgets/elements.js";
+import { button, byId, make, onChange } from "../widgets/elements.js";
 import { mountReplayBar } from "./replay_bar.js";
 import { mountRunList } from "./run_list.js";
 import { mountSearchTree } from "./search_tree.js";
@@ -13,6 +13,8 @@ import { count, px } from "../widgets/text.js";
 
 /** Speeds in expansions per second; 0 for no limit. */
 const SPEEDS = [1, 2, 5, 10, 30, 0];
+/** Searches that its buttons start. */
+const STARTS = /** @type {const} */ (["step", "stage", "frame", "contours", "chains"]);
 /** Why the cost changes when a search ends. */
 const MEASURED = "The cost uses the edges near the start pose; the final cost in the top bar may differ";
 
@@ -26,7 +28,10 @@ export function mountSearchPanel(store, actions, send) {
   const speedField = make("select", { "aria-label": "Expansions per second" }, ...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
   const figures = make("output", { className: "search-figures", "aria-label": "Progress of the search" });
   let wasOpen = false;
-  const buttons = makeButtons();
+  const starts = STARTS.map((action) => button(`panel-${action}`, () => actions.search(action)));
+  const again = button("panel-again", () => actions.searchAgain());
+  const track = button("panel-track", () => (hasTrack(store.facts.state) ? actions.togglePause() : actions.track("forward")));
+  const stop = button("panel-stop", () => (hasTrack(store.facts.state) ? actions.stopTracking() : actions.search("stop")));
   const limiting = "Outlier distance theta in pixels: edges farther away are ignored. Empty: 3% of the longer image side";
   const theta = makeNumber("θ, px", limiting, (value) => set({ theta_px: value }), "auto");
   build();
@@ -42,38 +47,10 @@ export function mountSearchPanel(store, actions, send) {
   mountReplayBar(store, send);
   mountCandidateStrip(store, send);
 
-  function makeButtons() {
-    const search = (/** @type {"step" | "stage" | "frame" | "contours" | "chains" | "stop"} */ action) => () => actions.search(action);
-    const track = () => (hasTrack(store.facts.state) ? actions.togglePause() : actions.track("forward"));
-    return {
-      step: textButton("Step", "Run one expansion of the search (S)", search("step")),
-      stage: textButton("Stage", "Run to the end of the current stage", search("stage")),
-      frame: textButton("Frame", "Run the whole search of this frame (F)", search("frame")),
-      contours: textButton(
-        "Contours",
-        "Fit the contours of this frame by Gauss-Newton; each iteration can be replayed",
-        search("contours"),
-      ),
-      chains: textButton(
-        "Chains",
-        "Fit the contours of a rough pose chain by chain: root, trunk, each limb, then the whole body; each iteration can be replayed",
-        search("chains"),
-      ),
-      again: textButton("Rerun", "Repeat the selected run from its start pose with the current settings", () =>
-        actions.searchAgain(),
-      ),
-      track: textButton("Track", "Track forward from this frame, pause or continue (T)", track),
-      stop: textButton("Stop", "Stop the search or tracking and keep the best pose (Esc)", () =>
-        hasTrack(store.facts.state) ? actions.stopTracking() : actions.search("stop"),
-      ),
-    };
-  }
-
   function build() {
-    const group = make("div", { className: "group", role: "group", "aria-label": "Search" }, ...Object.values(buttons));
     const title = "Search speed in expansions per second. Changes take effect immediately";
     onChange(speedField, () => send({ type: "search_speed", per_second: Number(speedField.value) || null }));
-    controls.append(group, make("label", { className: "search-field", title }, "Speed", speedField), theta.element, figures);
+    controls.append(make("label", { className: "search-field", title }, "Speed", speedField), theta.element, figures);
   }
 
   /** @param {Record<string, unknown>} changes */
@@ -85,8 +62,7 @@ export function mountSearchPanel(store, actions, send) {
     const { state, connected, settings, searchSetup } = store.facts;
     const isReady = connected && !!state;
     const isRunning = !!state?.job.running;
-    const { step, stage, frame, contours, chains, again, track, stop } = buttons;
-    step.disabled = stage.disabled = frame.disabled = contours.disabled = chains.disabled = !isReady || isRunning;
+    for (const start of starts) start.disabled = !isReady || isRunning;
     const run = selectedRun(store.facts);
     again.disabled = !isReady || isRunning || run === null;
     track.disabled = !isReady;
