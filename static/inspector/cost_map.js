@@ -1,9 +1,8 @@
 /** Picture of the cost over two degrees of freedom around the shown pose. A click or Enter takes the pose there. */
 
-import { fillRect } from "../widgets/canvas.js";
+import { fillRect, prepare } from "../widgets/canvas.js";
 import { make, textButton } from "../widgets/elements.js";
 import { nearest } from "../widgets/plot.js";
-import { prepare } from "../panes/drawing.js";
 import { displayName } from "../widgets/text.js";
 
 /**

@@ -67,28 +67,6 @@ export const LINE_STYLES = {
 };
 
 /**
- * Resize a canvas to its pane in device pixels. Return its cleared context, scaled to CSS pixels.
- *
- * @param {HTMLCanvasElement} canvas
- * @param {number} width
- * @param {number} height
- * @param {boolean} onProcessor whether to draw on the processor, which is faster for many short lines that change each
- *   time, especially without a graphics card
- */
-export function prepare(canvas, width, height, onProcessor) {
-  const ratio = devicePixelRatio;
-  const [deviceWidth, deviceHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
-  if (canvas.width !== deviceWidth || canvas.height !== deviceHeight) {
-    canvas.width = deviceWidth;
-    canvas.height = deviceHeight;
-  }
-  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: onProcessor }));
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  context.clearRect(0, 0, width, height);
-  return context;
-}
-
-/**
  * Draw a dark background, so that translucent layers look the same in both colour schemes.
  *
  * @param {CanvasRenderingContext2D} context

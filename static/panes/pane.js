@@ -1,5 +1,6 @@
 /** Pane of one camera: two canvases, labels in the corners, zoom and pan. */
 
+import { prepare } from "../widgets/canvas.js";
 import { make } from "../widgets/elements.js";
 import * as drawing from "./drawing.js";
 import { drawPins, isSame } from "./pin_drawing.js";
@@ -172,7 +173,7 @@ export function makePane(store, camera, info, { viewChanged, openToneMenu }) {
     const { state, session, overlay, layers, placeholder, bare } = store.facts;
     if (width === 0 || height === 0) return;
     if (withPictures) drawPictures();
-    const context = drawing.prepare(surface, width, height, true);
+    const context = prepare(surface, width, height, true);
     if (IN_SOFTWARE) context.drawImage(image, 0, 0, width, height);
     if (layers.shown.faces) drawing.drawGrains(context, image, placeholder?.pictures ? null : heads());
     corner.showPlaceholder(placeholder);
@@ -196,7 +197,7 @@ export function makePane(store, camera, info, { viewChanged, openToneMenu }) {
     const { width, height } = size;
     const { shown, placeholder, layers, imageTones, bare } = store.facts;
     const pictures = placeholder?.pictures ?? shown?.pictures;
-    const context = drawing.prepare(image, width, height, IN_SOFTWARE);
+    const context = prepare(image, width, height, IN_SOFTWARE);
     drawing.drawBackground(context, view);
     /** @type {number | null} */
     let limitPx = null;

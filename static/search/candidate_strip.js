@@ -1,6 +1,7 @@
 /** Best candidates of a search as stick figures, in the view where they differ most. */
 
-import { prepare, stroke } from "../panes/drawing.js";
+import { stroke } from "../panes/drawing.js";
+import { prepare } from "../widgets/canvas.js";
 import { byId, make } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
 import { selectedRun } from "../model/search_runs.js";

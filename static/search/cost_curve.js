@@ -2,9 +2,8 @@
  * Plot of best and tested costs by number of poses evaluated, with stages and other runs. A click replays that step.
  */
 
-import { fillRect, setText } from "../widgets/canvas.js";
+import { fillRect, prepare, setText } from "../widgets/canvas.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
-import { prepare } from "../panes/drawing.js";
 import { byId, make } from "../widgets/elements.js";
 import { Plot, nearest } from "../widgets/plot.js";
 import { selectedRun } from "../model/search_runs.js";

@@ -1,8 +1,7 @@
 /** Plot of the cost over the range of one degree of freedom. Hovering reads values, a click sets the value. */
 
-import { circlePath, fillRect, setText } from "../widgets/canvas.js";
+import { circlePath, fillRect, prepare, setText } from "../widgets/canvas.js";
 import { colorName, dashOf, lineSwatch } from "../widgets/series_lines.js";
-import { prepare } from "../panes/drawing.js";
 import { byId, make, onChange, textButton } from "../widgets/elements.js";
 import { Plot, nearest } from "../widgets/plot.js";
 import { displayName } from "../widgets/text.js";

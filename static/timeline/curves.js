@@ -5,8 +5,7 @@
 
 import { drawCurves, drawRings, pointAt, scalesOf } from "./curve_drawing.js";
 import { CURVE_GROUPS } from "./drawer.js";
-import { prepare } from "../panes/drawing.js";
-import { fillRect } from "../widgets/canvas.js";
+import { fillRect, prepare } from "../widgets/canvas.js";
 import { button, byId, make } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { factorOf, numberField } from "../widgets/number_field.js";
