@@ -4,6 +4,7 @@ import { make, textButton } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
 import { workRow } from "./parts.js";
 import { command } from "../widgets/key_matching.js";
+import { sentence } from "../widgets/text.js";
 import { NO_OPTIONS, choiceRow, sectionNote } from "./rows.js";
 
 /**
@@ -93,7 +94,7 @@ export function clocksSection({ store, send, navigation }) {
     find.disabled = found.running || names().length < 2;
     work.show(found);
     estimates.replaceChildren(...found.cameras.flatMap(({ found: estimate }, i) => (estimate ? [entry(found.way, estimate, i)] : [])));
-    notes.textContent = found.notes.map((text) => `${text[0].toUpperCase()}${text.slice(1)}.`).join(" ");
+    notes.textContent = found.notes.map(sentence).join(" ");
     const hasArrived = isAsked && !found.running && found.moment && !found.failed;
     if (!found.running) isAsked = false;
     draw();

@@ -4,7 +4,7 @@ import { make, onSubmit, textButton } from "../widgets/elements.js";
 import { postJson } from "../widgets/post_json.js";
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
-import { frameRow, group, labelled, longList } from "./parts.js";
+import { group, jointRow, labelled, longList } from "./parts.js";
 import { command } from "../widgets/key_matching.js";
 import { numberRow, sectionNote } from "./rows.js";
 
@@ -56,12 +56,9 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
   const ways = group(previous, next, textButton("End", "End the comparison; nothing is changed", leaveCopy));
   const worst = make("ol", { className: "observed-worst", "aria-label": "Differences, largest first" });
   const differences = longList(worst, FEW_LISTED, "List smaller differences too", (/** @type {Difference} */ one) => {
-    const { frame, person, joint, distance_mm } = one;
-    const people = store.facts.session?.people ?? [];
-    const who = people.length > 1 ? `${people[person].name}, ` : "";
-    const title = `Go to frame ${frame} and select the ${displayName(joint)}`;
-    const apart = make("span", "quiet", `${Math.round(distance_mm)} mm`);
-    return frameRow(frame, frame === store.facts.state?.frame, title, () => visit(one), make("span", {}, who + displayName(joint)), apart);
+    const { session, state } = store.facts;
+    const cells = /** @type {[string, string]} */ ([displayName(one.joint), `${Math.round(one.distance_mm)} mm`]);
+    return jointRow(session?.people ?? [], one, one.frame === state?.frame, () => visit(one), cells);
   });
   const compared = make("div", "acquisition", summary, tolerance.element, ways, here, buttons, ...differences.elements);
   const body = make("div", "acquisition", form, answer, compared);

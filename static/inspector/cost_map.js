@@ -2,6 +2,7 @@
 
 import { fillRect, prepare } from "../widgets/canvas.js";
 import { make, textButton } from "../widgets/elements.js";
+import { ARROWS } from "../widgets/key_matching.js";
 import { nearest } from "../widgets/plot.js";
 import { displayName } from "../widgets/text.js";
 
@@ -14,7 +15,6 @@ const HEIGHT_PX = 190;
 /** Poses up to so many nats above the best have a line around them: they are about as good. */
 const NEAR_NATS = 6;
 const UNITS = { deg: "°", cm: " cm" };
-const STEPS = new Map([["ArrowLeft", [-1, 0]], ["ArrowRight", [1, 0]], ["ArrowUp", [0, 1]], ["ArrowDown", [0, -1]]]); // prettier-ignore
 
 /**
  * @param {import("../model/index.js").Context} context
@@ -89,7 +89,7 @@ export function costMap({ store, send }, posing) {
   });
   canvas.addEventListener("click", () => cursor && take(cursor));
   canvas.addEventListener("keydown", (event) => {
-    const [found, step] = [shown(), STEPS.get(event.key)];
+    const [found, step] = [shown(), ARROWS.get(event.key)];
     if (!found || event.altKey || event.ctrlKey || event.metaKey || !(step || event.key === "Enter")) return;
     event.preventDefault();
     event.stopPropagation(); // arrows move joints elsewhere

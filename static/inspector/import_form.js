@@ -1,7 +1,7 @@
 /** Form that imports results of other programs: paths are read and checked, shown over the pictures, then stored. */
 
 import { make, onSubmit, textButton } from "../widgets/elements.js";
-import { capital, count } from "../widgets/text.js";
+import { count, sentence } from "../widgets/text.js";
 import { postJson } from "../widgets/post_json.js";
 import { labelled } from "./parts.js";
 
@@ -163,7 +163,7 @@ function describe(plan) {
     list,
     ...(plan.are_masks ? [] : [points]),
     ...plan.notes.map((text) => line(`Note: ${text}.`)),
-    ...plan.problems.map((text) => line(`${capital(text.replace(/\.$/, ""))}.`, "is-failed")),
+    ...plan.problems.map((text) => line(sentence(text), "is-failed")),
     line(plan.problems.length ? "Nothing can be imported." : plan.are_masks ? "The views show their outlines. The cameras will use these masks as silhouettes. Nothing was stored yet." : "The views show these points. Nothing was stored yet."),
   ];
 }

@@ -2,10 +2,10 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { download } from "../widgets/downloads.js";
-import { capital, count, displayName, percent } from "../widgets/text.js";
+import { capital, count, percent } from "../widgets/text.js";
 import { importForm } from "./import_form.js";
 import { zoomOnArrival } from "../panes/arrival_zoom.js";
-import { frameRow, group, longList, workRow } from "./parts.js";
+import { group, jointRow, longList, workRow } from "./parts.js";
 import { command } from "../widgets/key_matching.js";
 import { sectionNote } from "./rows.js";
 
@@ -52,12 +52,8 @@ export function observationsSection({ store, send, say, navigation, actions, lay
   const work = workRow("Stop this work", () => (found()?.running ? act("stop") : send({ type: "find_people", action: "stop" })));
   const verdict = make("div");
   const worst = make("ol", "observed-worst");
-  const entryRow = (/** @type {JudgedLimb} */ { frame, person, joint, reason, probability }, /** @type {number} */ rank) => {
-    const people = store.facts.session?.people ?? [];
-    const who = people.length > 1 ? `${people[person]?.name}, ` : "";
-    const title = `Go to frame ${frame} and select the ${displayName(joint)}`;
-    return frameRow(frame, rank === at, title, () => visit(rank), make("span", {}, who + reason), make("span", "quiet", percent(probability)));
-  };
+  const entryRow = (/** @type {JudgedLimb} */ entry, /** @type {number} */ rank) =>
+    jointRow(store.facts.session?.people ?? [], entry, rank === at, () => visit(rank), [entry.reason, percent(entry.probability)]);
   const entries = longList(worst, FEW_LISTED, "List less severe entries too", entryRow);
   const form = importForm(store, sessions, () => act("discard"));
   const body = make("div", "acquisition", none, list, detecting, buttons, tracking, work.element, work.status, verdict, ...entries.elements, form.element);

@@ -1,7 +1,7 @@
 /** Pieces that sections share: work that goes on, long lists of frames, and commands of the palette. */
 
 import { make, textButton } from "../widgets/elements.js";
-import { count } from "../widgets/text.js";
+import { count, displayName } from "../widgets/text.js";
 
 /** @param {HTMLElement[]} children in one line */
 export function group(...children) {
@@ -50,6 +50,21 @@ export function frameRow(frame, isHere, title, visit, ...cells) {
   const go = textButton("", title, visit, { className: "frame-row", "data-no-command": "", ...(isHere ? { "aria-current": "true" } : {}) });
   go.append(make("span", "observed-frame", String(frame)), ...cells);
   return make("li", {}, go);
+}
+
+/**
+ * Make a row of a joint of a person on a frame.
+ *
+ * @param {readonly {name: string}[]} people of the session, of whom the person is named if there are several
+ * @param {{frame: number, person: number, joint: string}} at
+ * @param {boolean} isHere
+ * @param {() => void} visit
+ * @param {[text: string, figure: string]} cells
+ */
+export function jointRow(people, { frame, person, joint }, isHere, visit, [text, figure]) {
+  const who = people.length > 1 ? `${people[person]?.name}, ` : "";
+  const title = `Go to frame ${frame} and select the ${displayName(joint)}`;
+  return frameRow(frame, isHere, title, visit, make("span", {}, who + text), make("span", "quiet", figure));
 }
 
 /**

@@ -14,6 +14,8 @@
  * @typedef {Command & {keys: string[]}} Binding
  */
 
+/** Steps of the arrow keys, to the right and up. */
+export const ARROWS = new Map([["ArrowLeft", [-1, 0]], ["ArrowRight", [1, 0]], ["ArrowUp", [0, 1]], ["ArrowDown", [0, -1]]]); // prettier-ignore
 /** Characters of keys, where they are not the displayed name. @type {Record<string, string>} */
 const CHARACTERS = { Space: " ", "Shift ,": "<", "Shift .": ">" };
 /** Positions of keys, where they are not the displayed name. @type {Record<string, string>} */
