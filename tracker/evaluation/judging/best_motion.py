@@ -1,6 +1,5 @@
 """The best poses that the footage shows near imported observations, tracked without a change of the session."""
 
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -50,7 +49,7 @@ def best_motion(
         plan = ChainPlan(
             TrackPlan(range(session.n_frames), people, settings, keypoints=name), FindSettings(keypoints=name), people
         )
-        with closing(AnnotationStore(twin.annotations_path)) as store:
+        with AnnotationStore(twin.annotations_path) as store:
             opened = StoredSession(twin, store, observer)
             run_chain(plan, opened, sink)
         bodies = opened.session.people
