@@ -41,9 +41,9 @@ _ID = "store_id"
 
 
 class AnnotationStore:
-    """The annotations of a session; a context manager. Safe to use from several threads; one program may write at a time.
+    """The annotations of a session; a context manager. Safe to use from several threads.
 
-    When a method returns, its changes are on the disk.
+    One program may write at a time. When a method returns, its changes are on the disk.
     """
 
     def __init__(self, path: str | Path, read_only: bool = False, author: str | None = None) -> None:
