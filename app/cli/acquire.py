@@ -1,6 +1,5 @@
 """`quadrille acquire`: acquire the sizes of a person's body from the footage."""
 
-from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -156,7 +155,7 @@ def acquire(
             )
         changes = size_changes(found)
         if store:
-            with closing(AnnotationStore(session.annotations_path)) as annotations:
+            with AnnotationStore(session.annotations_path) as annotations:
                 poses = dict(zip(found.frames, found.poses, strict=True))
                 store_body(session, annotations, person, found.body, poses, f"acquire sizes of {name}")
     return {

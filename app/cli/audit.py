@@ -1,7 +1,6 @@
 """`quadrille audit`: assess stored poses by all frames and cameras together."""
 
 from collections import Counter
-from contextlib import closing
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -73,7 +72,7 @@ def audit(at: Target, frames: range, replaces: bool, progress: Reporter) -> dict
     with (
         SessionLock(session.folder),
         Recording(session.cameras) as recording,
-        closing(AnnotationStore(session.annotations_path)) as store,
+        AnnotationStore(session.annotations_path) as store,
     ):
         people = tuple(i for i in people if store.frames(session.people[i].name)) or people
         plan = AuditPlan(frames, people, TrackSettings(), replaces)

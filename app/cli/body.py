@@ -1,6 +1,5 @@
 """`quadrille body`: move a person to another body, such as one with feet."""
 
-from contextlib import closing
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -51,7 +50,7 @@ def move_to(at: Target, to: str) -> dict[str, Any]:
     from tracker.session.store.annotation_store import AnnotationStore
 
     session, (person,) = at
-    with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+    with SessionLock(session.folder), AnnotationStore(session.annotations_path) as store:
         found = change_body(session, store, person, to)
     return {
         "person": session.people[person].name,

@@ -1,7 +1,6 @@
 """`quadrille info`: show the contents of a session."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +51,7 @@ def summarize(
     missing = missing_files(session)
     poses: dict[str, list[FrameRow]] = {p.name: [] for p in session.people}
     if session.annotations_path.exists():
-        with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+        with AnnotationStore(session.annotations_path, read_only=True) as store:
             poses = {name: store.frames(name) for name in poses}
     revisions = read_posed_revisions(session.annotations_path, list(poses))
     outdated = {

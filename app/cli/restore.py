@@ -1,7 +1,6 @@
 """`quadrille restore`: go back to a backup of damaged annotations, and write the edits of a rescue file."""
 
 import os
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,13 +88,13 @@ def _replayed(folder: Path, path: Path, chosen: Path | None) -> tuple[int, list[
     from app.storage import rescue
     from tracker.session.store.annotation_store import AnnotationStore
 
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         files = rescue.find(folder, store.id)
     own = [found.path for found in files if not found.origin] if chosen is None else [chosen]
     offers = [command_line_text(*found.offer) for found in files if found.origin and found.path not in own]
     if not own:
         return 0, offers
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         return sum(rescue.replay(each, folder, store) for each in own), offers
 
 

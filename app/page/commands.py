@@ -10,6 +10,7 @@ from app.messages import client as wire
 from app.messages import pose as pose_wire
 from app.messages.base import Command
 from app.messages.parsing import MessageError
+from app.page.by_action import by_action
 from app.page.inspector_commands import INSPECTOR_COMMANDS
 from app.page.pose_commands import POSE_COMMANDS, check_point, display_factor
 from app.page.search_commands import SEARCH_COMMANDS
@@ -82,23 +83,10 @@ def _pin(controller: Controller, page: int, message: pose_wire.DragPin) -> None:
         pinning.end(page)
 
 
-def _unpin(controller: Controller, _: int, message: pose_wire.RemovePins) -> None:
-    controller.pinning.remove(message.frame, message.person, message.point, message.camera)
-
-
 def _fit(controller: Controller, _: int, message: pose_wire.FitPose) -> None:
     if message.person is not None:
         check_point(controller, message.person, message.point)
     controller.pinning.fit(message.frame, message.person, message.point)
-
-
-def _control_tracking(controller: Controller, _: int, message: wire.ControlTracking) -> None:
-    actions: dict[str, Callable[[], None]] = {
-        "pause": controller.tracking.pause,
-        "resume": controller.tracking.resume,
-        "stop": controller.activities.stop,
-    }
-    actions[message.action]()
 
 
 def _range(controller: Controller, _: int, message: wire.EditRange) -> None:
@@ -119,6 +107,11 @@ def _range(controller: Controller, _: int, message: wire.EditRange) -> None:
             ranges.mark(first, last, mark, people)
 
 
+def _mark(controller: Controller, _: int, message: wire.ToggleMark) -> None:
+    ranges = controller.ranges
+    {"keyframe": ranges.toggle_keyframe, "reviewed": ranges.toggle_reviewed}[message.toggle]()
+
+
 def _curves(controller: Controller, _: int, message: wire.EditCurves) -> None:
     factors = np.array([display_factor(controller, message.person, dof) for dof in message.dofs])
     amount = message.amount / (1.0 if message.action == "smooth" else factors)
@@ -132,25 +125,6 @@ def _compare_range(controller: Controller, _: int, message: wire.CompareRange) -
         controller.comparing_runs.compare(message.first, message.last)
 
 
-def _mark(controller: Controller, _: int, message: wire.ToggleMark) -> None:
-    ranges = controller.ranges
-    {"keyframe": ranges.toggle_keyframe, "reviewed": ranges.toggle_reviewed}[message.toggle]()
-
-
-def _floor(controller: Controller, _: int, message: wire.EditFloor) -> None:
-    floor = controller.floor
-    actions: dict[str, Callable[[], None]] = {
-        "begin": floor.begin,
-        "next": floor.next_point,
-        "take_back": floor.take_back,
-        "apply": floor.apply,
-        "cancel": floor.cancel,
-        "from_feet": floor.set_from_feet,
-        "revert": floor.revert,
-    }
-    actions[message.action]()
-
-
 COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.Seek: lambda controller, _, m: controller.navigation.seek(m.frame),
     wire.Select: lambda controller, _, m: controller.navigation.select(m.person, m.point),
@@ -161,11 +135,15 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.Pause3d: lambda controller, page, m: controller.view_3d.pause(page, m.pause),
     pose_wire.Drag: _drag,
     pose_wire.DragPin: _pin,
-    pose_wire.RemovePins: _unpin,
+    pose_wire.RemovePins: lambda controller, _, m: controller.pinning.remove(m.frame, m.person, m.point, m.camera),
     pose_wire.FitPose: _fit,
     pose_wire.TakeLimbBack: lambda controller, _, m: controller.pinning.take_limb_back(m.frame, m.every),
     wire.StartTracking: lambda controller, _, m: controller.tracking.start(m.action == "backward", m.until),
-    wire.ControlTracking: _control_tracking,
+    wire.ControlTracking: by_action(
+        pause=lambda controller, _: controller.tracking.pause(),
+        resume=lambda controller, _: controller.tracking.resume(),
+        stop=lambda controller, _: controller.activities.stop(),
+    ),
     wire.EditRange: _range,
     wire.EditCurves: _curves,
     wire.CompareRange: _compare_range,
@@ -173,7 +151,15 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.ToggleMark: _mark,
     wire.ConfirmKeyframe: lambda controller, _, m: controller.inconsistent_frames.confirm(m.person, m.frame),
     wire.FollowTracking: lambda controller, _, m: controller.tracking.follow(m.follow),
-    wire.EditFloor: _floor,
+    wire.EditFloor: by_action(
+        begin=lambda controller, _: controller.floor.begin(),
+        next=lambda controller, _: controller.floor.next_point(),
+        take_back=lambda controller, _: controller.floor.take_back(),
+        apply=lambda controller, _: controller.floor.apply(),
+        cancel=lambda controller, _: controller.floor.cancel(),
+        from_feet=lambda controller, _: controller.floor.set_from_feet(),
+        revert=lambda controller, _: controller.floor.revert(),
+    ),
     wire.MarkFloor: lambda controller, _, m: controller.floor.mark(m.camera, (m.u, m.v)),
     wire.Undo: lambda controller, _, __: controller.history.undo(),
     wire.Redo: lambda controller, _, __: controller.history.redo(),

@@ -13,6 +13,7 @@ from app.messages.base import Command
 from app.messages.cameras import CheckCalibration, UseClocks
 from app.messages.observation import SetCopyTolerance, UseCopy, UseObservations
 from app.messages.parsing import MessageError
+from app.page.by_action import by_action
 from tracker.annotation.frame_choice import FrameChoice
 from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.formats.model_toml import PRESETS
@@ -70,60 +71,20 @@ def _draft(controller: Controller, _: int, message: wire.DraftSizes) -> None:
         controller.body_sizes.recall(message.person)
 
 
-def _acquire(controller: Controller, _: int, message: wire.AcquireSizes) -> None:
-    if message.action == "start":
-        controller.body_acquisition.start(message.person, message.method)
-    else:
-        controller.body_acquisition.stop()
-
-
-def _find_people(controller: Controller, _: int, message: wire.FindPeople) -> None:
-    finding = controller.finding
-    {"start": finding.start, "stop": finding.stop, "take": finding.take_best}[message.action]()
-
-
-def _calibration(controller: Controller, _: int, message: CheckCalibration) -> None:
-    calibrating = controller.calibrating
-    actions: dict[str, Callable[[], None]] = {
-        "start": calibrating.start,
-        "stop": calibrating.stop,
-        "preview": lambda: calibrating.preview(True),
-        "leave": lambda: calibrating.preview(False),
-        "apply": calibrating.apply,
-        "track_again": calibrating.track_again,
-    }
-    actions[message.action]()
-
-
-def _clocks(controller: Controller, _: int, message: UseClocks) -> None:
-    clocks, n_cameras = controller.clocks, len(controller.session.cameras)
+def _clocks(controller: Controller, page: int, message: UseClocks) -> None:
     for camera in (message.camera, message.other):
-        if camera >= n_cameras:
-            raise MessageError(f"a camera below {n_cameras}", str(camera))
-    actions: dict[str, Callable[[], None]] = {
-        "nudge": lambda: clocks.nudge(message.camera, message.frames),
-        "estimate": lambda: clocks.estimate(message.way),
-        "take": lambda: clocks.take(message.camera),
-        "moment": lambda: clocks.find_moment((message.camera, message.other)),
-        "stop": clocks.stop,
-    }
-    actions[message.action]()
+        if camera >= len(controller.session.cameras):
+            raise MessageError(f"a camera below {len(controller.session.cameras)}", str(camera))
+    _CLOCKS(controller, page, message)
 
 
-def _observations(controller: Controller, _: int, message: UseObservations) -> None:
-    observing = controller.observing
-    actions: dict[str, Callable[[], None]] = {
-        "show": lambda: observing.show(message.name),
-        "judge": lambda: observing.judge(message.name),
-        "take": lambda: observing.take(message.name),
-        "track": lambda: observing.track(message.name, as_evidence=True),
-        "detect": observing.detect,
-        "detect_track": lambda: observing.detect(then_track=True),
-        "track_contours": lambda: observing.track(message.name, as_evidence=False),
-        "stop": observing.stop,
-        "discard": observing.discard,
-    }
-    actions[message.action]()
+_CLOCKS = by_action(
+    nudge=lambda controller, m: controller.clocks.nudge(m.camera, m.frames),
+    estimate=lambda controller, m: controller.clocks.estimate(m.way),
+    take=lambda controller, m: controller.clocks.take(m.camera),
+    moment=lambda controller, m: controller.clocks.find_moment((m.camera, m.other)),
+    stop=lambda controller, _: controller.clocks.stop(),
+)
 
 
 def _plan(controller: Controller, _: int, message: plan_wire.PlanTasks) -> None:
@@ -134,16 +95,6 @@ def _plan(controller: Controller, _: int, message: plan_wire.PlanTasks) -> None:
         message.by == "doubted",
     )
     controller.annotating.plan(choice, message.person, message.to, message.each)
-
-
-def _decide(controller: Controller, _: int, message: plan_wire.DecideTask) -> None:
-    annotating, person, frame = controller.annotating, message.person, message.frame
-    actions: dict[str, Callable[[], None]] = {
-        "verify": lambda: annotating.verify(person, frame, message.pose),
-        "reject": lambda: annotating.reject(person, frame, message.comment, message.pose),
-        "withdraw": lambda: annotating.withdraw(person, frame),
-    }
-    actions[message.action]()
 
 
 def _comment(controller: Controller, _: int, message: plan_wire.WriteComment) -> None:
@@ -169,13 +120,41 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.ApplySizes: lambda controller, _, m: controller.body_sizes.apply(m.person, m.refit),
     wire.ChangeBody: _change_body,
     wire.DraftSizes: _draft,
-    wire.AcquireSizes: _acquire,
-    wire.FindPeople: _find_people,
-    CheckCalibration: _calibration,
+    wire.AcquireSizes: by_action(
+        start=lambda controller, m: controller.body_acquisition.start(m.person, m.method),
+        stop=lambda controller, _: controller.body_acquisition.stop(),
+    ),
+    wire.FindPeople: by_action(
+        start=lambda controller, _: controller.finding.start(),
+        stop=lambda controller, _: controller.finding.stop(),
+        take=lambda controller, _: controller.finding.take_best(),
+    ),
+    CheckCalibration: by_action(
+        start=lambda controller, _: controller.calibrating.start(),
+        stop=lambda controller, _: controller.calibrating.stop(),
+        preview=lambda controller, _: controller.calibrating.preview(True),
+        leave=lambda controller, _: controller.calibrating.preview(False),
+        apply=lambda controller, _: controller.calibrating.apply(),
+        track_again=lambda controller, _: controller.calibrating.track_again(),
+    ),
     UseClocks: _clocks,
-    UseObservations: _observations,
+    UseObservations: by_action(
+        show=lambda controller, m: controller.observing.show(m.name),
+        judge=lambda controller, m: controller.observing.judge(m.name),
+        take=lambda controller, m: controller.observing.take(m.name),
+        track=lambda controller, m: controller.observing.track(m.name, as_evidence=True),
+        track_contours=lambda controller, m: controller.observing.track(m.name, as_evidence=False),
+        detect=lambda controller, _: controller.observing.detect(),
+        detect_track=lambda controller, _: controller.observing.detect(then_track=True),
+        stop=lambda controller, _: controller.observing.stop(),
+        discard=lambda controller, _: controller.observing.discard(),
+    ),
     plan_wire.PlanTasks: _plan,
-    plan_wire.DecideTask: _decide,
+    plan_wire.DecideTask: by_action(
+        verify=lambda controller, m: controller.annotating.verify(m.person, m.frame, m.pose),
+        reject=lambda controller, m: controller.annotating.reject(m.person, m.frame, m.comment, m.pose),
+        withdraw=lambda controller, m: controller.annotating.withdraw(m.person, m.frame),
+    ),
     plan_wire.WriteComment: _comment,
     plan_wire.ResolveComment: lambda controller, _, m: controller.annotating.resolve(m.uid, m.action == "resolve"),
     plan_wire.AskNextClick: lambda controller, _, m: controller.proposing.start(),

@@ -119,7 +119,7 @@ def _page_sources() -> tuple[str, str, str]:
     folder = static_folder()
     files = {
         path.relative_to(folder).as_posix(): path.read_text("utf-8")
-        for path in [*folder.glob("share/*"), folder / "styles" / "tokens.css"]
+        for path in [*folder.glob("share/*"), *folder.glob("widgets/*.js"), folder / "styles" / "tokens.css"]
     }
     script = f'"use strict";\n(() => {{\n{bundle_script("share/index.js", files)}}})();\n'
     return script, bundle_styles("share/share.css", files), files["share/share.html"]

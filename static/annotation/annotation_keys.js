@@ -1,6 +1,6 @@
 /** Keys of the plan: tasks, verdicts, the next best click, comments. */
 
-import { inArea } from "../widgets/key_matching.js";
+import { command, inArea } from "../widgets/key_matching.js";
 
 /**
  * @param {ReturnType<typeof import("./section.js").annotationSection>} section
@@ -8,48 +8,18 @@ import { inArea } from "../widgets/key_matching.js";
  * @param {(row?: HTMLElement) => void} reveal opens the section; focuses a control of the row, by default of the section
  */
 export function annotationBindings(section, review, reveal) {
-  const noTask = () => review.whyNoTask;
-  const noVerdict = () => review.whyNoVerdict;
+  const { whyNoTask: noTask, whyNoVerdict: noVerdict } = review;
   const words = "dataset plan annotation task";
+  /** @param {() => void} run what is done in the section, with the proposal of the next click in sight */
+  const there = (run) => () => (reveal(section.click.text), run());
   return inArea("Annotation", [
-    { label: "Plan, tasks and comments", words, run: () => reveal() },
-    { keys: ["Alt T"], label: "Next task", words, why: noTask, run: () => review.step(1) },
-    { label: "Previous task", words, why: noTask, run: () => review.step(-1) },
-    { keys: ["Alt K"], label: "Accept the planned pose", words: `${words} verify reviewer next`, why: noVerdict, run: () => review.accept() },
-    {
-      label: "Reject the planned pose",
-      words: `${words} reviewer comment`,
-      why: noVerdict,
-      run: () => {
-        if (review.whyNoVerdict) return;
-        reveal(section.click.text);
-        section.askReason();
-      },
-    },
-    {
-      label: "Next best click",
-      words: `${words} propose where a correction lowers the expected error most`,
-      why: section.click.why,
-      run: () => {
-        reveal(section.click.text);
-        section.click.ask();
-      },
-    },
-    {
-      label: "Comment on the selected limb",
-      words: `${words} remark`,
-      run: () => {
-        reveal(section.click.text);
-        section.comments.input.focus();
-      },
-    },
-    {
-      label: "Plan frames to annotate",
-      words: `${words} assign every diverse doubted`,
-      run: () => {
-        reveal();
-        section.plan.open();
-      },
-    },
+    command("Plan, tasks and comments", words, () => reveal()),
+    { keys: ["Alt T"], ...command("Next task", words, () => review.step(1), noTask) },
+    command("Previous task", words, () => review.step(-1), noTask),
+    { keys: ["Alt K"], ...command("Accept the planned pose", `${words} verify reviewer next`, () => review.accept(), noVerdict) },
+    command("Reject the planned pose", `${words} reviewer comment`, () => noVerdict() || there(section.askReason)(), noVerdict),
+    command("Next best click", `${words} propose where a correction lowers the expected error most`, there(section.click.ask), section.click.why),
+    command("Comment on the selected limb", `${words} remark`, there(() => section.comments.input.focus())),
+    command("Plan frames to annotate", `${words} assign every diverse doubted`, () => (reveal(), section.plan.open())),
   ]);
 }

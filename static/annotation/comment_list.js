@@ -20,13 +20,13 @@ export function commentList({ store, send }, review, visits) {
     return index < 0 ? null : index;
   };
   const place = () => {
-    const { person, frame } = review.here;
+    const { person, frame } = review.here();
     const people = store.facts.session?.people ?? [];
     const limb = limbHere();
     const words = [people.length > 1 ? people[person]?.name : "", limb === null ? "whole body" : people[person]?.limbs[limb], `frame ${frame}`];
     return words.filter(Boolean).join(", ");
   };
-  const line = lineForm("Comment", "Comment", (text) => send({ type: "annotation", action: "comment", ...review.here, limb: limbHere(), text }));
+  const line = lineForm("Comment", "Comment", (text) => send({ type: "annotation", action: "comment", ...review.here(), limb: limbHere(), text }));
   const list = make("ul", "plan-comments");
   const resolved = textButton("Show resolved", "List resolved comments too (toggle)", () => {
     showsResolved = !showsResolved;

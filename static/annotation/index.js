@@ -5,7 +5,7 @@
  */
 
 import { annotationBindings } from "./annotation_keys.js";
-import { Review } from "./review.js";
+import { makeReview } from "./review.js";
 import { annotationSection } from "./section.js";
 import { makeVisits } from "./visits.js";
 
@@ -19,7 +19,7 @@ import { makeVisits } from "./visits.js";
  */
 export function mount(context, { panes, inspector: { inspector } }) {
   const visits = makeVisits(context, panes);
-  const review = new Review(context, visits);
+  const review = makeReview(context, visits);
   const section = annotationSection(context, review, visits);
   inspector.add(section, "calibration");
   return { bindings: annotationBindings(section, review, (row) => inspector.reveal("annotation", row)) };

@@ -6,73 +6,42 @@ import { filterTasks, nextTask, tasksAt } from "../model/tasks.js";
 
 const NO_PLAN = "Nothing is planned. Plan frames in the inspector, section Annotation.";
 
-export class Review {
-  #context;
-  #visits;
+/** @typedef {ReturnType<typeof makeReview>} Review */
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("./visits.js").Visits} visits
+ */
+export function makeReview(context, visits) {
   /** @type {Filter} tasks that are listed and gone through */
-  filter = "mine";
-
-  /**
-   * @param {import("../model/index.js").Context} context
-   * @param {import("./visits.js").Visits} visits
-   */
-  constructor(context, visits) {
-    this.#context = context;
-    this.#visits = visits;
-  }
-
-  get #facts() {
-    return this.#context.store.facts;
-  }
-
-  get tasks() {
-    return this.#facts.annotation?.tasks ?? [];
-  }
+  let filter = "mine";
+  const { facts } = context.store;
+  const tasks = () => facts.annotation?.tasks ?? [];
 
   /** The tasks of the filter, by frame. */
-  get listed() {
-    return filterTasks(this.tasks, this.filter, this.#facts.annotation?.annotator ?? "");
-  }
+  const listed = () => filterTasks(tasks(), filter, facts.annotation?.annotator ?? "");
 
   /** The active person on the requested frame. */
-  get here() {
-    return { person: this.#facts.state?.person ?? 0, frame: this.#facts.target };
-  }
-
-  get tasksHere() {
-    return tasksAt(this.tasks, this.here);
-  }
+  const here = () => ({ person: facts.state?.person ?? 0, frame: facts.target });
+  const tasksHere = () => tasksAt(tasks(), here());
 
   /** Why there is no task to go to; null if there is one. */
-  get whyNoTask() {
-    if (!this.tasks.length) return NO_PLAN;
-    return this.listed.length ? null : "No task is listed. Choose other tasks in the inspector, section Annotation.";
+  function whyNoTask() {
+    if (!tasks().length) return NO_PLAN;
+    return listed().length ? null : "No task is listed. Choose other tasks in the inspector, section Annotation.";
   }
 
   /** Why there is nothing to decide on; null if there is something. */
-  get whyNoVerdict() {
-    if (!this.tasks.length) return NO_PLAN;
-    return this.tasksHere.length ? null : "No task of the active person is planned on this frame.";
+  function whyNoVerdict() {
+    if (!tasks().length) return NO_PLAN;
+    return tasksHere().length ? null : "No task of the active person is planned on this frame.";
   }
 
   /** @param {1 | -1} way */
-  step(way) {
-    const task = nextTask(this.listed, this.here, way);
-    if (task) this.#visits.go(task);
-    else this.#context.say("This is the only listed task.");
-  }
-
-  accept() {
-    this.#decide("verify", "");
-  }
-
-  /** @param {string} comment what is to be corrected */
-  reject(comment) {
-    this.#decide("reject", comment);
-  }
-
-  withdraw() {
-    this.#decide("withdraw", "");
+  function step(way) {
+    const task = nextTask(listed(), here(), way);
+    if (task) visits.go(task);
+    else context.say("This is the only listed task.");
   }
 
   /**
@@ -81,14 +50,29 @@ export class Review {
    * @param {"verify" | "reject" | "withdraw"} action
    * @param {string} comment
    */
-  #decide(action, comment) {
-    const { person, frame } = this.here;
-    if (!this.tasksHere.length) return;
-    const [{ pose }] = this.tasksHere; // of all tasks here
-    this.#context.send({ type: "annotation", action, person, frame, comment, pose });
+  function decide(action, comment) {
+    const [place, task] = [here(), tasksHere()[0]];
+    if (!task) return;
+    context.send({ type: "annotation", action, ...place, comment, pose: task.pose }); // the pose of all tasks here
     if (action === "withdraw") return;
-    const next = nextTask(filterTasks(this.tasks, "review", ""), { person, frame }, 1);
-    if (next) this.#visits.go(next);
-    else this.#context.say("No annotated pose is left to review.");
+    const next = nextTask(filterTasks(tasks(), "review", ""), place, 1);
+    if (next) visits.go(next);
+    else context.say("No annotated pose is left to review.");
   }
+
+  return {
+    tasks,
+    listed,
+    here,
+    tasksHere,
+    whyNoTask,
+    whyNoVerdict,
+    step,
+    /** @param {Filter} chosen */
+    list: (chosen) => (filter = chosen),
+    accept: () => decide("verify", ""),
+    /** @param {string} comment what is to be corrected */
+    reject: (comment) => decide("reject", comment),
+    withdraw: () => decide("withdraw", ""),
+  };
 }

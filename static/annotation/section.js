@@ -37,7 +37,7 @@ export function annotationSection(context, review, visits) {
     reason.input.blur();
   });
   const askReason = () => {
-    if (!review.tasksHere.length) return;
+    if (!review.tasksHere().length) return;
     reason.form.hidden = false;
     reason.input.focus();
   };
@@ -53,21 +53,21 @@ export function annotationSection(context, review, visits) {
   ); // prettier-ignore
 
   const showHere = () => {
-    const own = review.tasksHere;
+    const own = review.tasksHere();
     here.textContent = own
       .map(({ state, by, comment, annotator }) => `${capital(state)}${by ? ` by ${by}` : annotator ? `, for ${annotator}` : ""}${comment ? `: ${comment}` : ""}.`)
       .join(" ");
     here.hidden = !own.length;
     here.classList.toggle("is-failed", own.some(({ state }) => state === "rejected"));
     accept.disabled = refuse.disabled = leave.disabled = !own.length;
-    next.disabled = !!review.whyNoTask;
+    next.disabled = !!review.whyNoTask();
     if (!own.length) reason.form.hidden = true;
   };
   const showAll = () => {
-    none.hidden = review.tasks.length > 0;
+    none.hidden = review.tasks().length > 0;
     buttons.hidden = !none.hidden;
     tasks.show();
-    reason.offer(review.tasks.map((task) => task.comment));
+    reason.offer(review.tasks().map((task) => task.comment));
     comments.show();
     speed.show();
     click.show();
@@ -76,25 +76,16 @@ export function annotationSection(context, review, visits) {
   };
   tasks.filter.addEventListener("change", showHere);
   showAll();
-  let marked = review.here.person; // whose task the list marks
+  let marked = review.here().person; // whose task the list marks
 
   store.on(["annotation", "session"], showAll);
   store.on(["target"], () => tasks.show());
   store.on(["target", "state"], () => {
-    if (review.here.person !== marked) tasks.show();
-    marked = review.here.person;
+    if (review.here().person !== marked) tasks.show();
+    marked = review.here().person;
     showHere();
     comments.showPlace();
   });
-  return {
-    id: "annotation",
-    title: "Annotation",
-    hint: "The plan of a dataset: tasks, verdicts, the next best click, comments",
-    body,
-    click,
-    plan,
-    comments,
-    askReason,
-    /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  };
+  const hint = "The plan of a dataset: tasks, verdicts, the next best click, comments";
+  return { id: "annotation", title: "Annotation", hint, body, click, plan, comments, askReason };
 }

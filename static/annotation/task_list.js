@@ -32,12 +32,12 @@ export function taskList(store, review, visits) {
   const strip = make("div", { className: "plan-strip", role: "img" });
   const filter = make("select", { "aria-label": "Tasks to list and to go through", title: "Tasks to list and to go through" }, ...FILTERS.map(([value, text]) => new Option(text, value)));
   filter.addEventListener("change", () => {
-    review.filter = /** @type {Filter} */ (filter.value);
+    review.list(/** @type {Filter} */ (filter.value));
     show(true);
   });
   const list = make("ol", "plan-tasks");
   const tasks = longList(list, FEW_LISTED, "List more tasks", (/** @type {Task} */ task) => {
-    const { person, frame } = review.here;
+    const { person, frame } = review.here();
     const people = store.facts.session?.people ?? [];
     const who = [people.length > 1 ? people[task.person]?.name : "", task.annotator || "anybody"].filter(Boolean).join(", ");
     const words = `${who}${task.is_disagreement ? ", two copies disagree" : ""}${task.comment ? `: ${task.comment}${task.by ? ` (${task.by})` : ""}` : ""}`;
@@ -47,8 +47,8 @@ export function taskList(store, review, visits) {
   });
 
   const showProgress = () => {
-    const counts = countStates(review.tasks);
-    const total = review.tasks.length;
+    const counts = countStates(review.tasks());
+    const total = review.tasks().length;
     const details = TASK_STATES.filter((state) => state !== "verified" && counts[state]).map((state) => `${count(counts[state])} ${state}`);
     counter.replaceChildren(make("b", "", `${count(counts.verified)} of ${count(total)} verified`), make("span", "quiet", details.join(", ")));
     strip.setAttribute("aria-label", TASK_STATES.map((state) => `${counts[state]} ${state}`).join(", "));
@@ -64,7 +64,7 @@ export function taskList(store, review, visits) {
 
   const show = (isNew = false) => {
     showProgress();
-    tasks.show(review.listed, isNew);
+    tasks.show(review.listed(), isNew);
     list.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
   };
 

@@ -1,6 +1,6 @@
 /** Sizes from the footage: start and stop an acquisition, its progress, and the body before and after. */
 
-import { make, makeSvg, tableRow, textButton } from "../widgets/elements.js";
+import { make, makeSvg, makeTable, tableRow, textButton } from "../widgets/elements.js";
 import { capital } from "../widgets/text.js";
 import { workRow } from "./parts.js";
 import { choiceRow } from "./rows.js";
@@ -27,17 +27,10 @@ export function acquisitionView({ store, send }) {
   const start = textButton("Acquire from footage", "Fit all sizes to several frames; nothing changes until you apply them", () =>
     send({ type: "acquire", action: "start", person, method }),
   );
-  const choice = choiceRow({
-    label: "Fit to",
-    title:
-      "Contours: fit all sizes to the contours of several frames in all views. " +
-      "Voxels first: fit lengths and girths to the labelled voxels of the silhouettes, and start the fit to contours there",
-    options: [
-      ["contours", "Contours"],
-      ["voxels", "Voxels first"],
-    ],
-    change: (/** @type {Method} */ value) => (method = value),
-  });
+  const how =
+    "Contours: fit all sizes to the contours of several frames in all views. " +
+    "Voxels first: fit lengths and girths to the labelled voxels of the silhouettes, and start the fit to contours there";
+  const choice = choiceRow("Fit to", how, { contours: "Contours", voxels: "Voxels first" }, (value) => (method = value));
   const work = workRow("Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }), { className: "section-note acquisition-status", "aria-live": "polite" });
   const result = make("div");
   element.append(choice.element, start, work.element, work.status, result);
@@ -88,12 +81,11 @@ function picture({ size_px: [width, height] }, { before, after }, name) {
 
 /** @param {Result} result */
 function table({ sizes }) {
-  const head = ["Changed most, cm", "before", "after", "±"].map((text) => make("th", { scope: "col" }, text));
   const rows = sizes.slice(0, LISTED).map(({ name, before_m, after_m, sigma_m }) => {
     const row = tableRow(capital(name), [before_m, after_m, sigma_m].map((metres) => (100 * metres).toFixed(1)));
     row.cells[0].title = capital(name);
     row.cells[3].title = "Standard deviation of the size after the acquisition";
     return row;
   });
-  return make("table", "acquisition-sizes number-table", make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows));
+  return makeTable("acquisition-sizes number-table", [["Changed most, cm"], ["before"], ["after"], ["±"]], rows);
 }

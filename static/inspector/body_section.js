@@ -3,7 +3,7 @@
 import { make, textButton } from "../widgets/elements.js";
 import { capital, displayName } from "../widgets/text.js";
 import { acquisitionView } from "./acquisition_view.js";
-import { boundedField, checkRow, choiceRow, numberRow } from "./rows.js";
+import { NO_OPTIONS, boundedField, checkRow, choiceRow, numberRow } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").BodySizesMessage} BodySizes
@@ -31,17 +31,11 @@ export function bodySection(context) {
   let built = "";
   const { store, send, say } = context;
   const acquisition = acquisitionView(context);
-  const model = choiceRow({
-    label: "Body",
-    title:
-      "Joints and parts of the person, such as feet. Sizes that both bodies have stay, and keyframes are fitted. " +
-      "Tracked poses keep the former body until tracked again. Can be undone",
-    options: /** @type {[string, string][]} */ ([]),
-    change: (to) => edit({ action: "body", to }),
-  });
-  const height = numberRow({
-    label: "Height",
-    title: "Body height; all other sizes scale with it",
+  const kinds =
+    "Joints and parts of the person, such as feet. Sizes that both bodies have stay, and keyframes are fitted. " +
+    "Tracked poses keep the former body until tracked again. Can be undone";
+  const model = choiceRow("Body", kinds, NO_OPTIONS, (to) => edit({ action: "body", to }));
+  const height = numberRow("Height", "Body height; all other sizes scale with it", {
     unit: "cm",
     low: 30,
     high: 300,
@@ -49,22 +43,11 @@ export function bodySection(context) {
     change: (value) => value !== null && edit({ action: "height", height_m: value / 100 }),
     refuse: say,
   });
-  const alike = checkRow({
-    label: "Both sides alike",
-    title: "Change left and right together",
-    change: (on) => send({ type: "body_sizes", action: "couple", on }),
-  });
-  const keyframes = choiceRow({
-    label: "Keyframes",
-    title:
-      "Refit: fit each keyframe to its joints and pins in the new body, as one entry of the history. " +
-      "Keep: leave all stored poses in the body that they were made with",
-    options: [
-      ["refit", "Refit"],
-      ["keep", "Keep as they are"],
-    ],
-    change: () => {},
-  });
+  const alike = checkRow("Both sides alike", "Change left and right together", (on) => send({ type: "body_sizes", action: "couple", on }));
+  const fates =
+    "Refit: fit each keyframe to its joints and pins in the new body, as one entry of the history. " +
+    "Keep: leave all stored poses in the body that they were made with";
+  const keyframes = choiceRow("Keyframes", fates, { refit: "Refit", keep: "Keep as they are" }, () => {});
   const apply = textButton("Apply", "Make these the sizes of the body; undo restores the present ones", () =>
     edit({ action: "apply", refit: keyframes.select.value === "refit" }), { className: "is-primary" }
   );
@@ -92,8 +75,7 @@ export function bodySection(context) {
     personName.style.setProperty("--person", person.color);
     // A body of the session's own is listed, too.
     const names = sizes.bodies.includes(sizes.body) ? sizes.bodies : [sizes.body, ...sizes.bodies];
-    const listed = [...model.select.options].map(({ value }) => value);
-    if (listed.join() !== names.join()) model.fill(names.map((name) => [name, name]));
+    model.fill(names.map((name) => [name, name]));
     model.show(sizes.body);
     height.limits(100 * sizes.height_limits_m[0], 100 * sizes.height_limits_m[1]);
     height.show(tenths(100 * sizes.height_m));
@@ -178,12 +160,7 @@ export function bodySection(context) {
     return field.element;
   }
 
-  return {
-    id: "body",
-    title: "Body sizes",
-    hint: "Lengths and girths of the active person; acquire them from the footage",
-    body,
-  };
+  return { id: "body", title: "Body sizes", hint: "Lengths and girths of the active person; acquire them from the footage", body };
 }
 
 /**

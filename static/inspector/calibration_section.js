@@ -1,10 +1,11 @@
 /** Calibration: check the cameras by the tracked people, preview the corrections, apply them, and track again. */
 
-import { make, textButton } from "../widgets/elements.js";
+import { make, makeTable, tableRow, textButton } from "../widgets/elements.js";
 import { KEYFRAME } from "../model/cells.js";
 import { earlierCalibration, hasTrack } from "../model/selectors.js";
-import { count } from "../widgets/text.js";
-import { command, group, workRow } from "./parts.js";
+import { count, sentence } from "../widgets/text.js";
+import { group, workRow } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
 import { sectionNote } from "./rows.js";
 
 /**
@@ -15,6 +16,12 @@ import { sectionNote } from "./rows.js";
 
 /** @type {Record<string, string>} */
 const WORDS = { rotation: "turned", position: "moved", focal: "zoomed", time: "shifted in time", drift: "drifting in time" };
+const COLUMNS = [
+  ["Camera", "Cameras of the session"],
+  ["px", "Distance by which the body is off in the pictures"],
+  ["mm", "The same at the body"],
+  ["Mended by", "Correction with its standard deviation"],
+];
 /** Names of the numbers of each kind, their unit and decimals. @type {Record<string, {names: [string, string][], unit: string, digits: number}>} */
 const NUMBERS = {
   rotation: {
@@ -34,7 +41,7 @@ const NUMBERS = {
 
 /**
  * @param {import("../model/index.js").Context} context
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
+ * @returns {import("./inspector.js").Section}
  */
 export function calibrationSection({ store, send }) {
   const act = (/** @type {Action} */ action) => send({ type: "calibration_check", action });
@@ -71,7 +78,7 @@ export function calibrationSection({ store, send }) {
     preview.setAttribute("aria-pressed", String(found.is_previewed));
     apply.disabled = found.refused !== "";
     fit.hidden = !named;
-    fit.textContent = found.refused ? capital(found.refused) : fitText(found, store.facts.state?.frame ?? -1);
+    fit.textContent = found.refused ? sentence(found.refused) : fitText(found, store.facts.state?.frame ?? -1);
     const { tracked, keyframes } = earlierPoses(store.facts);
     outdated.hidden = tracked + keyframes === 0;
     again.hidden = tracked === 0;
@@ -80,32 +87,27 @@ export function calibrationSection({ store, send }) {
   };
 
   store.on(["calibration", "showsMisfits", "state", "timeline", "lanes"], () => store.facts.calibration && show(store.facts.calibration));
-  return {
-    id: "calibration",
-    title: "Calibration",
-    hint: "Check the cameras by the tracked people, and correct them",
-    body,
-    bindings(reveal) {
-      const noCamera = () => (isNamed() ? null : "No camera is known to be off. Check the cameras first.");
-      const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
-        command(label, `${words} calibration`, () => (reveal(), run()), why);
-      const notChecked = () => (store.facts.calibration?.is_checked ? null : "There is no check. Check the cameras first.");
-      /** @type {[string, string, Action | (() => Action), () => string | null][]} */
-      const actions = [
-        ["Check the cameras", "contours body wrong moved turned", "start", () => (store.facts.calibration?.running ? "The check is at work." : null)],
-        ["Preview the corrected cameras (toggle)", "", () => (store.facts.calibration?.is_previewed ? "leave" : "preview"), noCamera],
-        ["Apply the correction of the cameras", "repair", "apply", () => noCamera() ?? (capital(store.facts.calibration?.refused ?? "") || null)],
-        ["Track again what is of an earlier calibration", "retrack", "track_again", () =>
-          earlierPoses(store.facts).tracked ? null : "No tracked pose is of an earlier calibration."],
-      ]; // prettier-ignore
-      return [
-        ...actions.map(([label, words, action, why]) => binding(label, words, why, () => act(typeof action === "string" ? action : action()))),
-        binding("Show where contours miss the edges (toggle)", "misfits residuals arrows field", notChecked, () =>
-          store.set({ showsMisfits: !store.facts.showsMisfits }),
-        ),
-      ];
-    },
+  const bindings = (/** @type {() => void} */ reveal) => {
+    const noCamera = () => (isNamed() ? null : "No camera is known to be off. Check the cameras first.");
+    const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
+      command(label, `${words} calibration`, () => (reveal(), run()), why);
+    const notChecked = () => (store.facts.calibration?.is_checked ? null : "There is no check. Check the cameras first.");
+    /** @type {[string, string, Action | (() => Action), () => string | null][]} */
+    const actions = [
+      ["Check the cameras", "contours body wrong moved turned", "start", () => (store.facts.calibration?.running ? "The check is at work." : null)],
+      ["Preview the corrected cameras (toggle)", "", () => (store.facts.calibration?.is_previewed ? "leave" : "preview"), noCamera],
+      ["Apply the correction of the cameras", "repair", "apply", () => noCamera() ?? (sentence(store.facts.calibration?.refused ?? "") || null)],
+      ["Track again what is of an earlier calibration", "retrack", "track_again", () =>
+        earlierPoses(store.facts).tracked ? null : "No tracked pose is of an earlier calibration."],
+    ]; // prettier-ignore
+    return [
+      ...actions.map(([label, words, action, why]) => binding(label, words, why, () => act(typeof action === "string" ? action : action()))),
+      binding("Show where contours miss the edges (toggle)", "misfits residuals arrows field", notChecked, () =>
+        store.set({ showsMisfits: !store.facts.showsMisfits }),
+      ),
+    ];
   };
+  return { id: "calibration", title: "Calibration", hint: "Check the cameras by the tracked people, and correct them", body, bindings };
 }
 
 /**
@@ -148,30 +150,16 @@ function fitText(found, frame) {
 
 /** @param {Calibration} found */
 function describe(found) {
-  const said = found.sentences.length ? found.sentences.map(capital) : ["No camera is off: the contours agree with the calibration."];
+  const said = found.sentences.length ? found.sentences.map(sentence) : ["No camera is off: the contours agree with the calibration."];
   const notes = said.map((text) => sectionNote(text));
-  const table = make("table", "calibration-cameras");
-  const head = table.createTHead().insertRow();
-  for (const [text, title] of [
-    ["Camera", "Cameras of the session"],
-    ["px", "Distance by which the body is off in the pictures"],
-    ["mm", "The same at the body"],
-    ["Mended by", "Correction with its standard deviation"],
-  ]) {
-    head.append(make("th", { title, scope: "col" }, text));
-  }
-  const rows = table.createTBody();
-  for (const camera of found.cameras) {
-    const row = rows.insertRow();
+  const rows = found.cameras.map((camera) => {
+    const misfits = camera.is_seen ? [camera.misfit_px.toFixed(1), camera.misfit_mm.toFixed(0)] : ["–", "–"];
+    const row = tableRow(camera.name, misfits);
     row.classList.toggle("is-off", camera.kinds.length > 0);
-    row.append(make("th", { scope: "row" }, camera.name));
-    row.insertCell().textContent = camera.is_seen ? camera.misfit_px.toFixed(1) : "–";
-    row.insertCell().textContent = camera.is_seen ? camera.misfit_mm.toFixed(0) : "–";
-    const cell = row.insertCell();
-    const lines = mended(camera);
-    cell.replaceChildren(...lines.map(({ text, title }) => make("div", { title }, text)));
-  }
-  return [...notes, table, sectionNote(`Frames used: ${found.frames.join(", ")}`)];
+    row.append(make("td", {}, ...mended(camera).map(({ text, title }) => make("div", { title }, text))));
+    return row;
+  });
+  return [...notes, makeTable("calibration-cameras", COLUMNS, rows), sectionNote(`Frames used: ${found.frames.join(", ")}`)];
 }
 
 /**
@@ -215,10 +203,4 @@ function mended(camera) {
  */
 function signed(value, digits) {
   return value.toFixed(digits).replace("-", "−");
-}
-
-/** @param {string} text */
-function capital(text) {
-  if (!text) return "";
-  return `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
 }

@@ -2,16 +2,18 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
-import { command, workRow } from "./parts.js";
-import { choiceRow, sectionNote } from "./rows.js";
+import { workRow } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
+import { sentence } from "../widgets/text.js";
+import { NO_OPTIONS, choiceRow, sectionNote } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").UseClocks} Use
  * @typedef {NonNullable<Use["way"]>} Way
  */
 
-/** @type {[Way, string][]} */
-const WAYS = [["motion", "Motion"], ["sound", "Sound"], ["flash", "Flash"], ["time code", "Time code"]]; // prettier-ignore
+/** @type {Record<Way, string>} */
+const WAYS = { motion: "Motion", sound: "Sound", flash: "Flash", "time code": "Time code" };
 const COLUMNS = [
   ["Camera", "Cameras of the session"],
   ["frames", "Frame of the footage at the time of frame 0"],
@@ -25,7 +27,7 @@ const SIDE_PX = 252;
 
 /**
  * @param {import("../model/index.js").Context} context
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
+ * @returns {import("./inspector.js").Section}
  */
 export function clocksSection({ store, send, navigation }) {
   let [camera, other, isAsked] = [0, 1, false];
@@ -46,15 +48,14 @@ export function clocksSection({ store, send, navigation }) {
   ].map(({ text, label, by }) => ({ text, label, run: () => use("nudge", { camera, frames: by() }) }));
 
   const table = make("table", "number-table");
-  const none = /** @type {[string, string][]} */ ([]);
-  const choice = choiceRow({ label: "Camera", title: "Camera that is nudged", options: none, change: (value) => choose(Number(value), other) });
+  const choice = choiceRow("Camera", "Camera that is nudged", NO_OPTIONS, (value) => choose(Number(value), other));
   const buttons = nudges.map(({ text, label, run }) => textButton(text, `Show pictures taken ${label}; undo restores the clock`, run));
-  const beside = choiceRow({ label: "Beside", title: "Camera to compare with", options: none, change: (value) => choose(camera, Number(value)) });
+  const beside = choiceRow("Beside", "Camera to compare with", NO_OPTIONS, (value) => choose(camera, Number(value)));
   const find = textButton("Fast moment", "Go to a frame on which something moves fast in both views, and show them side by side", findMoment);
   const figures = [0, 1].map(() => ({ canvas: make("canvas", { width: SIDE_PX, height: SIDE_PX }), caption: make("figcaption") }));
   const pictures = make("div", "acquisition-pictures", ...figures.map(({ canvas, caption }) => make("figure", {}, canvas, caption)));
   const source = sectionNote();
-  const ways = choiceRow({ label: "Estimate by", title: "Data that the clocks are estimated by", options: WAYS, change: (value) => (way = value) });
+  const ways = choiceRow("Estimate by", "Data that the clocks are estimated by", WAYS, (value) => (way = value));
   const start = textButton("Estimate", "Estimate when each camera began; nothing changes until an estimate is taken", () => use("estimate", { way }));
   const work = workRow("Stop; nothing is changed", () => use("stop"));
   const estimates = make("ul", "find-notes");
@@ -93,7 +94,7 @@ export function clocksSection({ store, send, navigation }) {
     find.disabled = found.running || names().length < 2;
     work.show(found);
     estimates.replaceChildren(...found.cameras.flatMap(({ found: estimate }, i) => (estimate ? [entry(found.way, estimate, i)] : [])));
-    notes.textContent = found.notes.map((text) => `${text[0].toUpperCase()}${text.slice(1)}.`).join(" ");
+    notes.textContent = found.notes.map(sentence).join(" ");
     const hasArrived = isAsked && !found.running && found.moment && !found.failed;
     if (!found.running) isAsked = false;
     draw();
@@ -139,24 +140,20 @@ export function clocksSection({ store, send, navigation }) {
 
   store.on(["clocks", "session"], show);
   store.on(["shown"], draw);
-  return {
-    id: "clocks",
-    title: "Clocks",
-    hint: "When each camera took its pictures: nudge, estimate, compare",
-    body,
-    bindings(reveal) {
-      const busy = () => (store.facts.clocks?.running ? "Work on the clocks is under way." : names().length < 2 ? "There is one camera." : null);
-      const bound = (/** @type {string} */ label, /** @type {() => void} */ run, /** @type {() => string | null} */ why) =>
-        command(label, "clock time offset synchronize", () => (reveal(), run()), why);
-      return [
-        ...nudges.map(({ label, run }) => bound(`Nudge the clock: ${label}`, run, () => null)),
-        ...WAYS.map(([of, text]) => bound(`Estimate the clocks: ${text.toLowerCase()}`, () => use("estimate", { way: of }), busy)),
-        bound("Compare two views at a fast moment", findMoment, busy),
-        bound("Take the estimated clock of the camera", () => use("take", { camera }), () =>
-          canTake(camera) ? null : "No clear estimate differs from the clock of the chosen camera."),
-      ]; // prettier-ignore
-    },
+  const bindings = (/** @type {() => void} */ reveal) => {
+    const busy = () => (store.facts.clocks?.running ? "Work on the clocks is under way." : names().length < 2 ? "There is one camera." : null);
+    const bound = (/** @type {string} */ label, /** @type {() => void} */ run, /** @type {() => string | null} */ why) =>
+      command(label, "clock time offset synchronize", () => (reveal(), run()), why);
+    return [
+      ...nudges.map(({ label, run }) => bound(`Nudge the clock: ${label}`, run, () => null)),
+      .../** @type {Way[]} */ (Object.keys(WAYS)).map((of) =>
+        bound(`Estimate the clocks: ${WAYS[of].toLowerCase()}`, () => use("estimate", { way: of }), busy)),
+      bound("Compare two views at a fast moment", findMoment, busy),
+      bound("Take the estimated clock of the camera", () => use("take", { camera }), () =>
+        canTake(camera) ? null : "No clear estimate differs from the clock of the chosen camera."),
+    ]; // prettier-ignore
   };
+  return { id: "clocks", title: "Clocks", hint: "When each camera took its pictures: nudge, estimate, compare", body, bindings };
 }
 
 /**

@@ -4,7 +4,8 @@ import { make, onSubmit, textButton } from "../widgets/elements.js";
 import { postJson } from "../widgets/post_json.js";
 import { copyDifferences, differenceAt } from "../model/selectors.js";
 import { count, displayName } from "../widgets/text.js";
-import { command, frameRow, group, labelled, longList } from "./parts.js";
+import { group, jointRow, labelled, longList } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
 import { numberRow, sectionNote } from "./rows.js";
 
 /**
@@ -20,7 +21,7 @@ const NO_COPY = "No copy is compared. Open one first.";
  * @param {import("../model/index.js").Context} context
  * @param {import("../timeline/index.js").TimelineRoom} timeline
  * @param {import("./import_form.js").PathFields} paths
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
+ * @returns {import("./inspector.js").Section}
  */
 export function copySection({ store, send, say, navigation, actions }, { jumps }, paths) {
   const decide = (/** @type {Action} */ action) => {
@@ -38,9 +39,7 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
 
   const summary = sectionNote();
   const here = sectionNote();
-  const tolerance = numberRow({
-    label: "Tolerance",
-    title: "Distance of a joint up to which two poses count as one",
+  const tolerance = numberRow("Tolerance", "Distance of a joint up to which two poses count as one", {
     unit: "mm",
     low: 0,
     high: 10000,
@@ -57,12 +56,9 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
   const ways = group(previous, next, textButton("End", "End the comparison; nothing is changed", leaveCopy));
   const worst = make("ol", { className: "observed-worst", "aria-label": "Differences, largest first" });
   const differences = longList(worst, FEW_LISTED, "List smaller differences too", (/** @type {Difference} */ one) => {
-    const { frame, person, joint, distance_mm } = one;
-    const people = store.facts.session?.people ?? [];
-    const who = people.length > 1 ? `${people[person].name}, ` : "";
-    const title = `Go to frame ${frame} and select the ${displayName(joint)}`;
-    const apart = make("span", "quiet", `${Math.round(distance_mm)} mm`);
-    return frameRow(frame, frame === store.facts.state?.frame, title, () => visit(one), make("span", {}, who + displayName(joint)), apart);
+    const { session, state } = store.facts;
+    const cells = /** @type {[string, string]} */ ([displayName(one.joint), `${Math.round(one.distance_mm)} mm`]);
+    return jointRow(session?.people ?? [], one, one.frame === state?.frame, () => visit(one), cells);
   });
   const compared = make("div", "acquisition", summary, tolerance.element, ways, here, buttons, ...differences.elements);
   const body = make("div", "acquisition", form, answer, compared);
@@ -138,28 +134,24 @@ export function copySection({ store, send, say, navigation, actions }, { jumps }
   refuse("");
   show();
   store.on(["otherCopy", "state", "session", "connected"], show);
-  return {
-    id: "copy",
-    title: "Other copy",
-    hint: "Compare with another annotator's copy of this session, and decide where both differ",
-    body,
-    bindings(reveal) {
-      const noCopy = () => (store.facts.otherCopy ? null : NO_COPY);
-      const none = () => noCopy() ?? (copyDifferences(store.facts).length ? null : "The copies differ nowhere by more than the tolerance.");
-      const off = (/** @type {HTMLButtonElement} */ which) => () => noCopy() ?? (which.disabled ? here.textContent : null);
-      const words = "annotator agreement copy compare disagreement difference";
-      return [
-        command("Compare with another copy of the session…", words, () => (reveal(), input.focus())),
-        command("Other copy: keep my pose", words, () => decide("keep"), off(keep)),
-        command("Other copy: take their pose", words, () => decide("take"), off(take)),
-        command("Other copy: take the mean of both poses", words, () => decide("mean"), off(mean)),
-        command("Other copy: go to the largest difference", words, () => {
-          reveal();
-          const [largest] = copyDifferences(store.facts).sort((a, b) => b.distance_mm - a.distance_mm);
-          visit(largest);
-        }, none),
-        command("End the comparison with the other copy", words, leaveCopy, noCopy),
-      ];
-    },
+  const bindings = (/** @type {() => void} */ reveal) => {
+    const noCopy = () => (store.facts.otherCopy ? null : NO_COPY);
+    const none = () => noCopy() ?? (copyDifferences(store.facts).length ? null : "The copies differ nowhere by more than the tolerance.");
+    const off = (/** @type {HTMLButtonElement} */ which) => () => noCopy() ?? (which.disabled ? here.textContent : null);
+    const words = "annotator agreement copy compare disagreement difference";
+    return [
+      command("Compare with another copy of the session…", words, () => (reveal(), input.focus())),
+      command("Other copy: keep my pose", words, () => decide("keep"), off(keep)),
+      command("Other copy: take their pose", words, () => decide("take"), off(take)),
+      command("Other copy: take the mean of both poses", words, () => decide("mean"), off(mean)),
+      command("Other copy: go to the largest difference", words, () => {
+        reveal();
+        const [largest] = copyDifferences(store.facts).sort((a, b) => b.distance_mm - a.distance_mm);
+        visit(largest);
+      }, none),
+      command("End the comparison with the other copy", words, leaveCopy, noCopy),
+    ];
   };
+  const hint = "Compare with another annotator's copy of this session, and decide where both differ";
+  return { id: "copy", title: "Other copy", hint, body, bindings };
 }

@@ -1,8 +1,9 @@
 /** Picture of the cost over two degrees of freedom around the shown pose. A click or Enter takes the pose there. */
 
+import { fillRect, prepare } from "../widgets/canvas.js";
 import { make, textButton } from "../widgets/elements.js";
+import { ARROWS } from "../widgets/key_matching.js";
 import { nearest } from "../widgets/plot.js";
-import { prepare } from "../panes/drawing.js";
 import { displayName } from "../widgets/text.js";
 
 /**
@@ -14,7 +15,6 @@ const HEIGHT_PX = 190;
 /** Poses up to so many nats above the best have a line around them: they are about as good. */
 const NEAR_NATS = 6;
 const UNITS = { deg: "°", cm: " cm" };
-const STEPS = new Map([["ArrowLeft", [-1, 0]], ["ArrowRight", [1, 0]], ["ArrowUp", [0, 1]], ["ArrowDown", [0, -1]]]); // prettier-ignore
 
 /**
  * @param {import("../model/index.js").Context} context
@@ -68,7 +68,7 @@ export function costMap({ store, send }, posing) {
   };
   const draw = () => {
     const found = shown();
-    const { person } = posing;
+    const { person } = posing.joint();
     const width = canvas.parentElement?.clientWidth ?? 0;
     if (!isOpen || width === 0) return;
     canvas.style.height = `${HEIGHT_PX}px`;
@@ -89,7 +89,7 @@ export function costMap({ store, send }, posing) {
   });
   canvas.addEventListener("click", () => cursor && take(cursor));
   canvas.addEventListener("keydown", (event) => {
-    const [found, step] = [shown(), STEPS.get(event.key)];
+    const [found, step] = [shown(), ARROWS.get(event.key)];
     if (!found || event.altKey || event.ctrlKey || event.metaKey || !(step || event.key === "Enter")) return;
     event.preventDefault();
     event.stopPropagation(); // arrows move joints elsewhere
@@ -102,8 +102,7 @@ export function costMap({ store, send }, posing) {
 
   /** @param {boolean} [isChosen] whether the angles may have changed */
   const update = (isChosen = false) => {
-    const { person, limb } = posing;
-    const own = posing.dofs;
+    const { person, limb, dofs: own } = posing.joint();
     // A joint of one angle is shown with those of its limb.
     const offered = own.length > 1 ? own : [...new Set([...own, ...limb.dofs])];
     open.hidden = isOpen || own.length === 0 || offered.length < 2;
@@ -158,20 +157,17 @@ function drawMap(context, map, width, cursor, style) {
   const { across, up, nats } = map;
   const [w, h] = [width / across.length, HEIGHT_PX / up.length];
   const best = Math.min(...nats.flat());
-  context.fillStyle = style.getPropertyValue("--plot");
-  context.fillRect(0, 0, width, HEIGHT_PX);
-  context.fillStyle = style.getPropertyValue("--accent");
+  fillRect(context, style.getPropertyValue("--plot"), 0, 0, width, HEIGHT_PX);
+  const color = style.getPropertyValue("--accent");
   const range = Math.max(NEAR_NATS, Math.max(...nats.flat()) - best);
   nats.forEach((costs, row) =>
     costs.forEach((cost, column) => {
-      context.globalAlpha = 0.85 * (1 - Math.sqrt((cost - best) / range));
       // Whole pixels: seams would look like a grid.
       const [left, right] = [column * w, (column + 1) * w].map(Math.round);
       const [top, bottom] = [HEIGHT_PX - (row + 1) * h, HEIGHT_PX - row * h].map(Math.round);
-      context.fillRect(left, top, right - left, bottom - top);
+      fillRect(context, color, left, top, right - left, bottom - top, 0.85 * (1 - Math.sqrt((cost - best) / range)));
     }),
   );
-  context.globalAlpha = 1;
   context.strokeStyle = style.getPropertyValue("--text");
   context.lineWidth = 1.25;
   context.stroke(outline(nats, best + NEAR_NATS, w, h));

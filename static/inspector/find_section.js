@@ -59,12 +59,5 @@ export function findSection({ store, send, layers }) {
   };
   show();
   store.on(["finding", "observations", "session", "advice"], show);
-  return {
-    id: "find",
-    title: "Find people",
-    hint: "First poses, sizes and a track with nobody's help",
-    body,
-    find,
-    detect,
-  };
+  return { id: "find", title: "Find people", hint: "First poses, sizes and a track with nobody's help", body, find, detect };
 }

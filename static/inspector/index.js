@@ -5,7 +5,8 @@
  */
 
 import { button } from "../widgets/elements.js";
-import { inArea } from "../widgets/key_matching.js";
+import { command, inArea } from "../widgets/key_matching.js";
+import { capital } from "../widgets/text.js";
 import { calibrationSection } from "./calibration_section.js";
 import { clocksSection } from "./clocks_section.js";
 import { copySection } from "./copy_section.js";
@@ -13,7 +14,6 @@ import { findSection } from "./find_section.js";
 import { bodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
 import { jointSection } from "./joint_section.js";
-import { command } from "./parts.js";
 import { observationsSection } from "./observations_section.js";
 import { provenanceSection } from "./provenance_section.js";
 import { reasonSection } from "./reason_section.js";
@@ -21,12 +21,8 @@ import { searchSection } from "./search_section.js";
 import { trackSection } from "./track_section.js";
 import { viewSection } from "./view_section.js";
 
-/** @type {{choice: import("../model/theme.js").ThemeChoice, label: string}[]} */
-const THEMES = [
-  { choice: "dark", label: "Dark theme" },
-  { choice: "light", label: "Light theme" },
-  { choice: "system", label: "System theme" },
-];
+/** @type {import("../model/theme.js").ThemeChoice[]} */
+const THEMES = ["dark", "light", "system"];
 
 /** @typedef {ReturnType<typeof mount>} InspectorRoom */
 
@@ -39,12 +35,8 @@ const THEMES = [
  */
 export function mount(context, { panes, posing, timeline, scene, sessions }) {
   const joint = jointSection(context, posing);
-  const calibration = calibrationSection(context);
-  const clocks = clocksSection(context);
-  const observations = observationsSection(context, panes, sessions);
-  const provenance = provenanceSection(context, timeline);
   const finding = findSection(context);
-  const copy = copySection(context, timeline, sessions);
+  /** @type {import("./inspector.js").Section[]} */
   const sections = [
     joint,
     reasonSection(context, panes, posing),
@@ -52,11 +44,11 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
     bodySection(context),
     trackSection(context),
     searchSection(context),
-    calibration,
-    clocks,
-    observations,
-    provenance,
-    copy,
+    calibrationSection(context),
+    clocksSection(context),
+    observationsSection(context, panes, sessions),
+    provenanceSection(context, timeline),
+    copySection(context, timeline, sessions),
     viewSection(context, scene, panes),
   ];
   const inspector = new Inspector(context.store, sections);
@@ -71,22 +63,14 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
   button("show-reason", () => inspector.reveal("reason"));
   const bindings = inArea("Inspector", [
     { label: "Inspector: sizes, settings (toggle)", words: "body", run: () => inspector.toggle() },
-    {
-      label: "Why this pose is in doubt",
-      words: "reason explain evidence colours outside silhouette contour nats parts views",
-      run: () => inspector.reveal("reason"),
-    },
+    command("Why this pose is in doubt", "reason explain evidence colours outside silhouette contour nats parts views", () => inspector.reveal("reason")),
     command("Cost over two angles of the joint", "landscape map nats inspector", () => (inspector.reveal("joint"), joint.openMap())),
     command("Find people", "start automatically initialize bootstrap first pose acquire track nobody placed", findPeople),
-    ...calibration.bindings(() => inspector.reveal("calibration")),
-    ...clocks.bindings(() => inspector.reveal("clocks")),
-    ...observations.bindings(() => inspector.reveal("observations")),
-    ...provenance.bindings(() => inspector.reveal("provenance")),
-    ...copy.bindings(() => inspector.reveal("copy")),
+    ...sections.flatMap(({ id, bindings }) => bindings?.(() => inspector.reveal(id)) ?? []),
     ...sections.filter(({ id }) => !["find", "reason", "observations"].includes(id)).map(({ id, title, hint }) =>
       command(id === "view" ? "View settings: theme, 3-D view" : title, `${hint} inspector settings`, () => inspector.reveal(id)),
     ),
-    ...THEMES.map(({ choice, label }) => command(label, "colour scheme mode appearance", () => context.themes.choose(choice))),
+    ...THEMES.map((choice) => command(`${capital(choice)} theme`, "colour scheme mode appearance", () => context.themes.choose(choice))),
   ]);
   return { inspector, findPeople, detect, bindings };
 }

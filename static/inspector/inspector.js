@@ -11,6 +11,7 @@ const STORED = "quadrille.inspector";
  * @property {string} title
  * @property {string} hint what it is for
  * @property {HTMLElement} body
+ * @property {(reveal: () => void) => import("../widgets/key_matching.js").Command[]} [bindings] commands; `reveal` opens the section
  */
 
 export class Inspector {

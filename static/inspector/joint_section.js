@@ -60,7 +60,7 @@ export function jointSection(context, { posing }) {
   };
 
   const show = () => {
-    const { person, point, dofs } = posing;
+    const { person, point, dofs } = posing.joint();
     const { state } = store.facts;
     if (!person || !state || !point) return;
     const shape = JSON.stringify([state.person, point, dofs]);
@@ -89,11 +89,5 @@ export function jointSection(context, { posing }) {
   };
   store.on(["connected"], () => map.update(true));
   store.on(["state", "session", "observability", "layers", "costMap", "theme"], show);
-  return {
-    id: "joint",
-    title: "Joint",
-    hint: "Angles of the selected joint (J selects the next one)",
-    body,
-    openMap: map.open,
-  };
+  return { id: "joint", title: "Joint", hint: "Angles of the selected joint (J selects the next one)", body, openMap: map.open };
 }

@@ -2,10 +2,11 @@
 
 import { make, textButton } from "../widgets/elements.js";
 import { download } from "../widgets/downloads.js";
-import { capital, count, displayName, percent } from "../widgets/text.js";
+import { capital, count, percent } from "../widgets/text.js";
 import { importForm } from "./import_form.js";
 import { zoomOnArrival } from "../panes/arrival_zoom.js";
-import { command, frameRow, group, longList, workRow } from "./parts.js";
+import { group, jointRow, longList, workRow } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
 import { sectionNote } from "./rows.js";
 
 /**
@@ -22,7 +23,7 @@ const NO_SET = "No observations were imported. Import them first.";
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
  * @param {import("./import_form.js").PathFields} sessions
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
+ * @returns {import("./inspector.js").Section}
  */
 export function observationsSection({ store, send, say, navigation, actions, layers }, panes, sessions) {
   const act = (/** @type {Action} */ action, name = "") => send({ type: "observations", action, name });
@@ -51,12 +52,8 @@ export function observationsSection({ store, send, say, navigation, actions, lay
   const work = workRow("Stop this work", () => (found()?.running ? act("stop") : send({ type: "find_people", action: "stop" })));
   const verdict = make("div");
   const worst = make("ol", "observed-worst");
-  const entryRow = (/** @type {JudgedLimb} */ { frame, person, joint, reason, probability }, /** @type {number} */ rank) => {
-    const people = store.facts.session?.people ?? [];
-    const who = people.length > 1 ? `${people[person]?.name}, ` : "";
-    const title = `Go to frame ${frame} and select the ${displayName(joint)}`;
-    return frameRow(frame, rank === at, title, () => visit(rank), make("span", {}, who + reason), make("span", "quiet", percent(probability)));
-  };
+  const entryRow = (/** @type {JudgedLimb} */ entry, /** @type {number} */ rank) =>
+    jointRow(store.facts.session?.people ?? [], entry, rank === at, () => visit(rank), [entry.reason, percent(entry.probability)]);
   const entries = longList(worst, FEW_LISTED, "List less severe entries too", entryRow);
   const form = importForm(store, sessions, () => act("discard"));
   const body = make("div", "acquisition", none, list, detecting, buttons, tracking, work.element, work.status, verdict, ...entries.elements, form.element);
@@ -157,32 +154,28 @@ export function observationsSection({ store, send, say, navigation, actions, lay
 
   store.on(["observations", "session"], showAll);
   store.on(["finding"], () => found() && showWork(/** @type {Observations} */ (found())));
-  return {
-    id: "observations",
-    title: "Observations",
-    hint: "Key points, joints and masks of other programs: import, judge, mend",
-    body,
-    bindings(reveal) {
-      const noSet = () => (current() ? null : NO_SET);
-      const busy = () => (found()?.running ? "Work on observations is under way." : store.facts.finding?.running ? "A search for people is under way." : noSet());
-      const noEntry = () => (found()?.worst.length ? null : found()?.judged ? "No imported limb is off." : "Nothing was judged. Judge the observations first.");
-      const step = (/** @type {1 | -1} */ way) => visit(Math.max(0, Math.min((found()?.worst.length ?? 0) - 1, at + way)));
-      const own = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
-        command(label, `${words} observations imported detector`, () => (reveal(), run()), why);
-      return [
-        { label: "Observations of other programs", words: "imported key points joints openpose trc judge detector", run: reveal },
-        { label: "Next imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(1) },
-        { label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(-1) },
-        own("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
-        own("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
-        own("Take the observations as poses", "store mend correct", busy, () => act("take", current())),
-        own("Track with the observations", "contours evidence find people", busy, startTrack),
-        own("Send the observations back as they came", "export save file mended", noSet, () => void save(`export/like/${encodeURIComponent(current())}`, "The export")),
-        own("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
-        own("Import observations…", "key points joints masks files openpose trc", () => null, form.open),
-      ];
-    },
+  const bindings = (/** @type {() => void} */ reveal) => {
+    const noSet = () => (current() ? null : NO_SET);
+    const busy = () => (found()?.running ? "Work on observations is under way." : store.facts.finding?.running ? "A search for people is under way." : noSet());
+    const noEntry = () => (found()?.worst.length ? null : found()?.judged ? "No imported limb is off." : "Nothing was judged. Judge the observations first.");
+    const step = (/** @type {1 | -1} */ way) => visit(Math.max(0, Math.min((found()?.worst.length ?? 0) - 1, at + way)));
+    const own = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) =>
+      command(label, `${words} observations imported detector`, () => (reveal(), run()), why);
+    return [
+      { label: "Observations of other programs", words: "imported key points joints openpose trc judge detector", run: reveal },
+      { label: "Next imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(1) },
+      { label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", why: noEntry, run: () => step(-1) },
+      own("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
+      own("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
+      own("Take the observations as poses", "store mend correct", busy, () => act("take", current())),
+      own("Track with the observations", "contours evidence find people", busy, startTrack),
+      own("Send the observations back as they came", "export save file mended", noSet, () => void save(`export/like/${encodeURIComponent(current())}`, "The export")),
+      own("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
+      own("Import observations…", "key points joints masks files openpose trc", () => null, form.open),
+    ];
   };
+  const hint = "Key points, joints and masks of other programs: import, judge, mend";
+  return { id: "observations", title: "Observations", hint, body, bindings };
 }
 
 /**

@@ -1,7 +1,7 @@
 /** Pieces that sections share: work that goes on, long lists of frames, and commands of the palette. */
 
 import { make, textButton } from "../widgets/elements.js";
-import { count } from "../widgets/text.js";
+import { count, displayName } from "../widgets/text.js";
 
 /** @param {HTMLElement[]} children in one line */
 export function group(...children) {
@@ -53,6 +53,21 @@ export function frameRow(frame, isHere, title, visit, ...cells) {
 }
 
 /**
+ * Make a row of a joint of a person on a frame.
+ *
+ * @param {readonly {name: string}[]} people of the session, of whom the person is named if there are several
+ * @param {{frame: number, person: number, joint: string}} at
+ * @param {boolean} isHere
+ * @param {() => void} visit
+ * @param {[text: string, figure: string]} cells
+ */
+export function jointRow(people, { frame, person, joint }, isHere, visit, [text, figure]) {
+  const who = people.length > 1 ? `${people[person]?.name}, ` : "";
+  const title = `Go to frame ${frame} and select the ${displayName(joint)}`;
+  return frameRow(frame, isHere, title, visit, make("span", {}, who + text), make("span", "quiet", figure));
+}
+
+/**
  * Show the first entries of a list, and the others after a button.
  *
  * @template Entry
@@ -100,17 +115,4 @@ export function longList(list, few, title, row) {
  */
 export function labelled(kind, text, title, field) {
   return make("label", { className: kind, title }, make("span", {}, text), field);
-}
-
-/**
- * Make a command that only the palette has.
- *
- * @param {string} label
- * @param {string} words further words that it is found by
- * @param {() => void} run
- * @param {() => string | null} [why] why it is unavailable
- * @returns {import("../widgets/key_matching.js").Command}
- */
-export function command(label, words, run, why) {
-  return { label, words, run, why };
 }

@@ -4,8 +4,9 @@ import { make, textButton } from "../widgets/elements.js";
 import { KINDS, annotatorName, pointPhrases, poseLines } from "../model/provenance.js";
 import { tasksAt } from "../model/tasks.js";
 import { capital, count, displayName } from "../widgets/text.js";
-import { command, group } from "./parts.js";
-import { choiceRow, sectionNote } from "./rows.js";
+import { group } from "./parts.js";
+import { command } from "../widgets/key_matching.js";
+import { NO_OPTIONS, choiceRow, sectionNote } from "./rows.js";
 
 /** @typedef {import("../model/provenance.js").Filter} Filter */
 
@@ -14,15 +15,10 @@ const BY_NAME = "annotator:";
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("../timeline/index.js").TimelineRoom} timeline
- * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Command[]}}
+ * @returns {import("./inspector.js").Section}
  */
 export function provenanceSection({ store, send, actions }, { jumps }) {
-  const filter = choiceRow({
-    label: "Filter",
-    title: "Poses that the timeline shows as usual; it dims the others",
-    options: /** @type {[string, string][]} */ ([]),
-    change: (value) => choose(chosen(value)),
-  });
+  const filter = choiceRow("Filter", "Poses that the timeline shows as usual; it dims the others", NO_OPTIONS, (value) => choose(chosen(value)));
   const step = (/** @type {1 | -1} */ way) => jumps.go("chosen", way);
   const previous = textButton("Previous", "Go to the previous frame of this kind", () => step(-1));
   const next = textButton("Next", "Go to the next frame of this kind", () => step(1));
@@ -52,21 +48,15 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
   };
   new ResizeObserver(() => ask()).observe(body);
 
-  let offered = "";
   const showFilter = () => {
     const { annotators, provenanceFilter } = store.facts;
     const names = new Set((annotators?.people ?? []).flatMap((of) => Object.keys(of)));
     if (provenanceFilter?.kind === "annotator") names.add(provenanceFilter.name);
-    /** @type {[string, string][]} */
-    const choices = [
+    filter.fill([
       [ALL, "all poses"],
-      ...KINDS.map(({ kind, label }) => /** @type {[string, string]} */ ([kind, label])),
-      ...[...names].sort().map((name) => /** @type {[string, string]} */ ([BY_NAME + name, `keyframes of ${annotatorName(name)}`])),
-    ];
-    if (JSON.stringify(choices) !== offered) {
-      offered = JSON.stringify(choices);
-      filter.fill(choices);
-    }
+      ...KINDS.map(({ kind, label }) => [kind, label]),
+      ...[...names].sort().map((name) => [BY_NAME + name, `keyframes of ${annotatorName(name)}`]),
+    ]);
     filter.show(valueOf(provenanceFilter), provenanceFilter !== null);
     const found = provenanceFilter ? jumps.count("chosen") : 0;
     steps.hidden = provenanceFilter === null;
@@ -97,20 +87,16 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
     showFilter();
     showPose();
   });
-  return {
-    id: "provenance",
-    title: "Provenance",
-    hint: "Origin of this pose and of each joint; filter the timeline by it",
-    body,
-    bindings(reveal) {
-      const choice = (/** @type {string} */ label, /** @type {import("../model/provenance.js").Filter | null} */ wanted) =>
-        command(label, "provenance timeline dim source made", () => (reveal(), choose(wanted)));
-      return [
-        ...KINDS.map(({ kind, label }) => choice(`Filter the timeline: poses ${label}`, { kind })),
-        choice("Filter the timeline: all poses", null),
-      ];
-    },
+  const bindings = (/** @type {() => void} */ reveal) => {
+    const choice = (/** @type {string} */ label, /** @type {import("../model/provenance.js").Filter | null} */ wanted) =>
+      command(label, "provenance timeline dim source made", () => (reveal(), choose(wanted)));
+    return [
+      ...KINDS.map(({ kind, label }) => choice(`Filter the timeline: poses ${label}`, { kind })),
+      choice("Filter the timeline: all poses", null),
+    ];
   };
+  const hint = "Origin of this pose and of each joint; filter the timeline by it";
+  return { id: "provenance", title: "Provenance", hint, body, bindings };
 }
 
 /**

@@ -91,12 +91,7 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
     follow();
   });
   store.on(["reason", "session", "state", "connected"], show);
-  return {
-    id: "reason",
-    title: "Reason",
-    hint: "Why this pose is in doubt: what each view shows of each part",
-    body,
-  };
+  return { id: "reason", title: "Reason", hint: "Why this pose is in doubt: what each view shows of each part", body };
 }
 
 /**

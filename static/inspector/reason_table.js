@@ -1,6 +1,7 @@
 /** Table of parts by views. Arrow keys move among its cells, Enter or a click zooms the view to the part. */
 
 import { make, tableRow } from "../widgets/elements.js";
+import { ARROWS } from "../widgets/key_matching.js";
 import { displayName } from "../widgets/text.js";
 
 /**
@@ -94,12 +95,12 @@ export function reasonTable({ point, zoom }) {
   table.addEventListener("focusout", () => point(null));
   table.addEventListener("keydown", (event) => {
     const at = cellAt(event.target);
-    const step = STEPS.get(event.key);
+    const step = ARROWS.get(event.key);
     if (!at || event.altKey || event.ctrlKey || event.metaKey || !(step || event.key === "Enter" || event.key === " ")) return;
     event.preventDefault();
     event.stopPropagation(); // arrows move joints elsewhere
     if (!step) act(event.target);
-    else rows[at.row + step.row]?.[at.view + step.view]?.focus();
+    else rows[at.row - step[1]]?.[at.view + step[0]]?.focus();
   });
 
   return {
@@ -154,14 +155,6 @@ export function reasonTable({ point, zoom }) {
     return row;
   }
 }
-
-/** @type {Map<string, {row: number, view: number}>} */
-const STEPS = new Map([
-  ["ArrowUp", { row: -1, view: 0 }],
-  ["ArrowDown", { row: 1, view: 0 }],
-  ["ArrowLeft", { row: 0, view: -1 }],
-  ["ArrowRight", { row: 0, view: 1 }],
-]);
 
 /**
  * All three measures of a cell in words.

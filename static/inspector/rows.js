@@ -13,21 +13,22 @@ const SEND_MS = 80;
  */
 
 /**
- * @param {{label: string, title: string, unit?: string, low: number, high: number, step: number, auto?: string,
- *   change: (value: number | null) => void, refuse: Refuse}} options auto: shown for no value, which is allowed then
+ * @param {string} label
+ * @param {string} title
+ * @param {{unit?: string, low: number, high: number, step: number, auto?: string, change: (value: number | null) => void,
+ *   refuse: Refuse}} options auto: shown for no value, which is allowed then
  * @returns {NumberRow}
  */
-export function numberRow({ label, title, unit = "", low, high, step, auto, change, refuse }) {
-  const { element, head } = row("label", label, title);
-  const field = boundedField({ name: `${label}${unit && `, ${unit}`}`, low, high, step, allowsNone: auto !== undefined, change, refuse });
+export function numberRow(label, title, { unit = "", auto, ...options }) {
+  const field = boundedField({ name: `${label}${unit && `, ${unit}`}`, allowsNone: auto !== undefined, ...options });
   if (auto !== undefined) field.element.placeholder = auto;
-  element.append(field.element, make("span", "row-unit", unit));
+  const { element, mark } = row(label, title, field.element, make("span", "row-unit", unit));
   return {
     element,
     limits: field.limits,
-    show(value, isChanged = false) {
+    show(value, isChanged) {
       field.show(value);
-      head.classList.toggle("is-changed", isChanged);
+      mark(isChanged);
     },
   };
 }
@@ -79,14 +80,15 @@ export function boundedField({ name, low, high, step, digits, allowsNone = false
 }
 
 /**
- * @param {{label: string, title: string, take: (text: string) => string | null, refuse: Refuse}} options take: applies the
- *   text, or returns why it is invalid
+ * @param {string} label
+ * @param {string} title
+ * @param {(text: string) => string | null} take applies the text, or returns why it is invalid
+ * @param {Refuse} refuse
  */
-export function textRow({ label, title, take, refuse }) {
-  const { element, head } = row("label", label, title);
+export function textRow(label, title, take, refuse) {
   const field = numberField({ name: label, take, refuse, step: null });
   field.element.classList.add("is-wide");
-  element.append(field.element);
+  const { element, mark } = row(label, title, field.element);
   return {
     element,
     /**
@@ -95,41 +97,53 @@ export function textRow({ label, title, take, refuse }) {
      */
     show(text, isChanged) {
       field.show(text);
-      head.classList.toggle("is-changed", isChanged);
+      mark(isChanged);
     },
   };
 }
 
-/** @param {{label: string, title: string, change: (on: boolean) => void}} options */
-export function checkRow({ label, title, change }) {
-  const { element, head } = row("label", label, title);
-  const input = make("input", { type: "checkbox" });
-  input.addEventListener("change", () => change(input.checked));
-  element.append(input);
+/**
+ * @param {string} label
+ * @param {string} title
+ * @param {(on: boolean) => void} change
+ */
+export function checkRow(label, title, change) {
+  const input = make("input", { type: "checkbox", onchange: () => change(input.checked) });
+  const { element, mark } = row(label, title, input);
   return {
     element,
     /**
      * @param {boolean} on
      * @param {boolean} [isChanged]
      */
-    show(on, isChanged = false) {
+    show(on, isChanged) {
       input.checked = on;
-      head.classList.toggle("is-changed", isChanged);
+      mark(isChanged);
     },
   };
 }
 
+/** Options of a choice that is filled later. @type {Record<string, string>} */
+export const NO_OPTIONS = {};
+
 /**
  * @template {string} T
- * @param {{label: string, title: string, options: [T, string][], change: (value: T) => void}} options values with labels
+ * @param {string} label
+ * @param {string} title
+ * @param {Record<T, string>} options labels of the values
+ * @param {(value: T) => void} change
  */
-export function choiceRow({ label, title, options, change }) {
-  const { element, head } = row("label", label, title);
-  const select = make("select");
-  const fill = (/** @type {[string, string][]} */ choices) => select.replaceChildren(...choices.map(([value, text]) => new Option(text, value)));
-  fill(options);
-  select.addEventListener("change", () => change(/** @type {T} */ (select.value)));
-  element.append(select);
+export function choiceRow(label, title, options, change) {
+  const select = make("select", { onchange: () => change(/** @type {T} */ (select.value)) });
+  const { element, mark } = row(label, title, select);
+  let listed = "";
+  const fill = (/** @type {string[][]} */ choices) => {
+    const described = JSON.stringify(choices);
+    if (described === listed) return; // an open list of choices must not be replaced
+    listed = described;
+    select.replaceChildren(...choices.map(([value, text]) => new Option(text, value)));
+  };
+  fill(Object.entries(options));
   return {
     element,
     select,
@@ -138,22 +152,22 @@ export function choiceRow({ label, title, options, change }) {
      * @param {T} value
      * @param {boolean} [isChanged]
      */
-    show(value, isChanged = false) {
+    show(value, isChanged) {
       select.value = value;
-      head.classList.toggle("is-changed", isChanged);
+      mark(isChanged);
     },
   };
 }
 
 /**
- * @param {{label: string, title: string, min: number, max: number, step: number, format: (value: number) => string,
- *   change: (value: number) => void}} options
+ * @param {string} label
+ * @param {string} title
+ * @param {{min: number, max: number, step: number, format: (value: number) => string, change: (value: number) => void}} options
  */
-export function sliderRow({ label, title, min, max, step, format, change }) {
-  const { element } = row("label", label, title);
+export function sliderRow(label, title, { change, ...options }) {
   const send = throttled(change);
-  const made = slider({ label, title, min, max, step, format, onInput: send });
-  element.append(made.input, made.value);
+  const made = slider({ label, title, ...options, onInput: send });
+  const { element } = row(label, title, made.input, made.value);
   return {
     element,
     input: made.input,
@@ -174,13 +188,14 @@ export function tidy(value) {
 }
 
 /**
- * @param {"label" | "div"} kind
  * @param {string} label
  * @param {string} title
+ * @param {HTMLElement[]} controls
  */
-function row(kind, label, title) {
+function row(label, title, ...controls) {
   const head = make("span", "row-label is-clipped", label);
-  return { element: make(kind, { className: "row", title }, head), head };
+  const element = make("label", { className: "row", title }, head, ...controls);
+  return { element, mark: (isChanged = false) => void head.classList.toggle("is-changed", isChanged) };
 }
 
 /**

@@ -45,31 +45,22 @@ const NUMBERS = [
 export function searchSection({ store, send, say: refuse }) {
   const set = (/** @type {Partial<SearchValues>} */ changes) =>
     send({ type: "search_settings", changes: /** @type {import("../model/protocol.js").SearchChanges} */ (changes) });
-  const numbers = NUMBERS.map(({ name, factor, ...options }) => ({
-    name,
-    factor,
-    row: numberRow({
-      ...options,
-      change: (value) => value !== null && set({ [name]: factor === 1 ? Math.round(value) : value / factor }),
-      refuse,
-    }),
-  }));
-  const passes = textRow({
-    label: "Passes",
-    title: "Factors on the steps: all stages are searched once per factor, each time around the best pose so far. GD96 has one pass, 1",
-    take(text) {
-      const factors = text.split(/[\s,;]+/).filter(Boolean).map(Number);
-      if (!factors.length || !factors.every((factor) => factor > 0 && factor <= 1)) {
-        return `Passes: expected factors above 0 and up to 1, such as 1 0.5 0.25, found “${text}”.`;
-      }
-      set({ passes: factors });
-      return null;
-    },
-    refuse,
+  const numbers = NUMBERS.map(({ name, label, title, factor, ...options }) => {
+    const change = (/** @type {number | null} */ value) => value !== null && set({ [name]: factor === 1 ? Math.round(value) : value / factor });
+    return { name, factor, row: numberRow(label, title, { ...options, change, refuse }) };
   });
-  const theta = numberRow({
-    label: "Outlier distance θ",
-    title: "Edges farther than this from a contour add nothing more to the cost, pixels. Empty: 3% of the longer side of the image",
+  const takePasses = (/** @type {string} */ text) => {
+    const factors = text.split(/[\s,;]+/).filter(Boolean).map(Number);
+    if (!factors.length || !factors.every((factor) => factor > 0 && factor <= 1)) {
+      return `Passes: expected factors above 0 and up to 1, such as 1 0.5 0.25, found “${text}”.`;
+    }
+    set({ passes: factors });
+    return null;
+  };
+  const repeating = "Factors on the steps: all stages are searched once per factor, each time around the best pose so far. GD96 has one pass, 1";
+  const passes = textRow("Passes", repeating, takePasses, refuse);
+  const limiting = "Edges farther than this from a contour add nothing more to the cost, pixels. Empty: 3% of the longer side of the image";
+  const theta = numberRow("Outlier distance θ", limiting, {
     unit: "px",
     low: 1,
     high: 500,
@@ -78,20 +69,10 @@ export function searchSection({ store, send, say: refuse }) {
     change: (value) => set({ theta_px: value }),
     refuse,
   });
-  const outliers = choiceRow({
-    label: "Outliers",
-    title: "Contour points beyond θ count with θ (truncated), or are left out of the mean as in GD96 (paper)",
-    options: [
-      ["truncated", "Truncated"],
-      ["paper", "Left out (GD96)"],
-    ],
-    change: (value) => set({ outliers: value }),
-  });
-  const apart = checkRow({
-    label: "Separate limbs",
-    title: "Search the limbs of a group one after the other, not together as in GD96",
-    change: (on) => set({ limbs_apart: on }),
-  });
+  const counting = "Contour points beyond θ count with θ (truncated), or are left out of the mean as in GD96 (paper)";
+  const outliers = choiceRow("Outliers", counting, { truncated: "Truncated", paper: "Left out (GD96)" }, (value) => set({ outliers: value }));
+  const separating = "Search the limbs of a group one after the other, not together as in GD96";
+  const apart = checkRow("Separate limbs", separating, (on) => set({ limbs_apart: on }));
   const reset = textButton("Reset", "Restore the default search settings. Bounds and steps of single stages stay", () => {
     const { settings } = store.facts;
     if (settings) set(settings.search_default);
@@ -111,10 +92,5 @@ export function searchSection({ store, send, say: refuse }) {
     reset.disabled = JSON.stringify(search) === JSON.stringify(initial);
   };
   store.on(["settings"], show);
-  return {
-    id: "search",
-    title: "Search settings",
-    hint: "How the search of a frame chooses the poses that it tries",
-    body,
-  };
+  return { id: "search", title: "Search settings", hint: "How the search of a frame chooses the poses that it tries", body };
 }

@@ -22,9 +22,7 @@ export function trackSection({ store, send, say: refuse }) {
   let shown = "";
   /** @type {Map<string, OptionRow>} */
   const rows = new Map();
-  const stride = numberRow({
-    label: "Stride",
-    title: "Track every Nth frame alone. The frames between get no pose, and can be interpolated",
+  const stride = numberRow("Stride", "Track every Nth frame alone. The frames between get no pose, and can be interpolated", {
     low: 1,
     high: 100,
     step: 1,
@@ -42,12 +40,9 @@ export function trackSection({ store, send, say: refuse }) {
 
   /** @param {MethodInfo[]} methods */
   const build = (methods) => {
-    method = choiceRow({
-      label: "Method",
-      title: methods.map((each) => `${each.label}: ${each.help.charAt(0).toLowerCase()}${each.help.slice(1)}`).join(". "),
-      options: methods.map((each) => [each.name, each.label]),
-      change: (value) => set({ method: value }),
-    });
+    const title = methods.map((each) => `${each.label}: ${each.help.charAt(0).toLowerCase()}${each.help.slice(1)}`).join(". ");
+    const names = Object.fromEntries(methods.map((each) => [each.name, each.label]));
+    method = choiceRow("Method", title, names, (value) => set({ method: value }));
     choices.replaceChildren(method.element);
     for (const option of methods.flatMap((each) => each.options)) {
       if (!rows.has(option.name)) rows.set(option.name, optionRow(option, (value) => set({ options: { [option.name]: value } }), refuse));
@@ -73,12 +68,7 @@ export function trackSection({ store, send, say: refuse }) {
     reset.disabled = JSON.stringify(track) === JSON.stringify(initial);
   };
   store.on(["settings", "session"], show);
-  return {
-    id: "track",
-    title: "Track settings",
-    hint: "How the tracker finds the pose of each frame",
-    body,
-  };
+  return { id: "track", title: "Track settings", hint: "How the tracker finds the pose of each frame", body };
 }
 
 /**
@@ -91,16 +81,16 @@ export function trackSection({ store, send, say: refuse }) {
  */
 function optionRow({ label, help, kind, choices, limits, step }, change, refuse) {
   if (kind === "switch") {
-    const row = checkRow({ label, title: help, change });
+    const row = checkRow(label, help, change);
     return { element: row.element, show: (value, isChanged) => row.show(value === true, isChanged) };
   }
   if (kind === "choice") {
-    const row = choiceRow({ label, title: help, options: Object.entries(choices), change });
+    const row = choiceRow(label, help, choices, change);
     return { element: row.element, show: (value, isChanged) => row.show(String(value), isChanged) };
   }
   const [low, high] = limits ?? [0, Infinity];
   const whole = (/** @type {number | null} */ value) => (kind === "whole" && value !== null ? Math.round(value) : value);
-  const row = numberRow({ label, title: `${help}, ${low} to ${high}`, low, high, step, change: (value) => change(whole(value)), refuse });
+  const row = numberRow(label, `${help}, ${low} to ${high}`, { low, high, step, change: (value) => change(whole(value)), refuse });
   return { element: row.element, show: (value, isChanged) => row.show(typeof value === "number" ? value : null, isChanged) };
 }
 

@@ -2,18 +2,13 @@
 
 import { checkbox, make, textButton } from "../widgets/elements.js";
 import { displayName } from "../widgets/text.js";
-import { checkRow, choiceRow, sectionNote, sliderRow } from "./rows.js";
+import { NO_OPTIONS, checkRow, choiceRow, sectionNote, sliderRow } from "./rows.js";
 
 const FREE = "free";
 const MAX_TRAIL_FRAMES = 250;
-const NO_CHARACTER = /** @type {string} */ ("");
 
-/** @type {[import("../model/theme.js").ThemeChoice, string][]} */
-const THEMES = [
-  ["system", "As the system"],
-  ["dark", "Dark"],
-  ["light", "Light"],
-];
+/** @type {Record<import("../model/theme.js").ThemeChoice, string>} */
+const THEMES = { system: "As the system", dark: "Dark", light: "Light" };
 
 /** @typedef {"bodies" | "cameras" | "images" | "floor" | "gizmos" | "ghost" | "voxels"} Layer */
 
@@ -36,66 +31,34 @@ const LAYERS = [
  */
 export function viewSection({ store, send, themes, layers: paneLayers }, { floor }, panes) {
   const set = (/** @type {import("../model/protocol.js").View3dChanges} */ changes) => send({ type: "view_3d", changes });
-  const theme = choiceRow({
-    label: "Theme",
-    title: "Colour scheme of the page and the 3-D view; kept in this browser",
-    options: THEMES,
-    change: (value) => themes.choose(value),
-  });
-  const link = checkRow({
-    label: "Link zoom",
-    title: "All camera views show the place that one is zoomed to, at the same size of the people",
-    change: () => panes.grid.toggleLink(),
-  });
-  const ellipses = checkRow({
-    label: "Error ellipses",
-    title:
-      "Draw around each joint of the selected person the ellipse that holds 90% of its error in the camera view. Errors come from tracking; a pose changed by hand has none",
-    change: (on) => paneLayers.toggle(["errors"], on),
-  });
+  const theme = choiceRow("Theme", "Colour scheme of the page and the 3-D view; kept in this browser", THEMES, (value) => themes.choose(value));
+  const linking = "All camera views show the place that one is zoomed to, at the same size of the people";
+  const link = checkRow("Link zoom", linking, () => panes.grid.toggleLink());
+  const errors =
+    "Draw around each joint of the selected person the ellipse that holds 90% of its error in the camera view. " +
+    "Errors come from tracking; a pose changed by hand has none";
+  const ellipses = checkRow("Error ellipses", errors, (on) => paneLayers.toggle(["errors"], on));
   const noErrors = sectionNote("The errors of this pose are not known: they come from tracking over the whole run.");
-  const camera = choiceRow({
-    label: "Look through",
-    title: "Look through a camera, its image behind the bodies (Y: the camera under the pointer). Turning the view leaves the camera",
-    options: /** @type {[string, string][]} */ ([[FREE, "Free view"]]),
-    change: (value) => send({ type: "snap", camera: value === FREE ? null : Number(value) }),
-  });
-  const layers = LAYERS.map(({ name, label, title }) => ({
-    name,
-    row: checkRow({ label, title, change: (on) => set({ [name]: on }) }),
-  }));
-  const colors = choiceRow({
-    label: "Colours",
-    title: "Each part of a body, or each person, in a colour of its own",
-    options: [
-      ["parts", "By part"],
-      ["people", "By person"],
-    ],
-    change: (value) => set({ colors: value }),
-  });
-  const opacity = sliderRow({
-    label: "Opacity",
-    title: "Opacity of the bodies. Lower it to see what they hide",
+  const looking = "Look through a camera, its image behind the bodies (Y: the camera under the pointer). Turning the view leaves the camera";
+  const camera = choiceRow("Look through", looking, NO_OPTIONS, (value) => send({ type: "snap", camera: value === FREE ? null : Number(value) }));
+  const layers = LAYERS.map(({ name, label, title }) => ({ name, row: checkRow(label, title, (on) => set({ [name]: on })) }));
+  const coloring = "Each part of a body, or each person, in a colour of its own";
+  const colors = choiceRow("Colours", coloring, { parts: "By part", people: "By person" }, (value) => set({ colors: value }));
+  const opacity = sliderRow("Opacity", "Opacity of the bodies. Lower it to see what they hide", {
     min: 0.1,
     max: 1,
     step: 0.05,
     format: (value) => `${Math.round(100 * value)}%`,
     change: (value) => set({ opacity: value }),
   });
-  const character = choiceRow({
-    label: "Character",
-    title: "Show another body that moves as each person does, beside them in the 3-D view",
-    options: [[NO_CHARACTER, "None"]],
-    change: (value) => set({ character: value }),
-  });
+  const beside = "Show another body that moves as each person does, beside them in the 3-D view";
+  const character = choiceRow("Character", beside, NO_OPTIONS, (value) => set({ character: value }));
   const prediction = sectionNote();
   const floorText = sectionNote();
   const setFloor = textButton("Set floor…", "Click three points of the floor in the views", () => floor.toggle());
   const fromFeet = textButton("From feet", "Set the floor to the plane under the feet in all poses", () => floor.setFromFeet());
   const formerFloor = textButton("Previous floor", "Restore the floor before the last change", () => floor.revert());
-  const trails = sliderRow({
-    label: "Trail length",
-    title: "Length of a trail to either side of the shown frame, frames: blue before it, orange after it",
+  const trails = sliderRow("Trail length", "Length of a trail to either side of the shown frame, frames: blue before it, orange after it", {
     min: 1,
     max: MAX_TRAIL_FRAMES,
     step: 1,
@@ -111,8 +74,6 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
     make("h4", {}, "Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
   let built = "";
-  let listed = "";
-  let offered = "";
 
   const show = () => {
     const { view3d, state, session, linkedViews, theme: chosen, layers: { shown } } = store.facts;
@@ -121,20 +82,14 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
     ellipses.show(shown.errors);
     noErrors.hidden = !shown.errors || state?.expected_errors_m.length !== 0;
     const cameras = session?.cameras.map(({ name }) => name) ?? [];
-    if (cameras.join("\n") !== listed) {
-      listed = cameras.join("\n"); // an open list of choices must not be replaced
-      camera.fill([[FREE, "Free view"], ...cameras.map((name, i) => /** @type {[string, string]} */ ([String(i), name]))]);
-    }
+    camera.fill([[FREE, "Free view"], ...cameras.map((name, i) => [String(i), name])]);
     camera.show(state?.snapped == null ? FREE : String(state.snapped));
+    character.fill([["", "None"], ...(view3d?.characters ?? []).map((name) => [name, name])]);
     if (!view3d) return;
     const { view } = view3d;
     for (const { name, row } of layers) row.show(view[name]);
     colors.show(view.colors);
     opacity.show(view.opacity);
-    if (offered !== view3d.characters.join()) {
-      offered = view3d.characters.join(); // an open list of choices must not be replaced
-      character.fill([[NO_CHARACTER, "None"], ...view3d.characters.map((name) => /** @type {[string, string]} */ ([name, name]))]);
-    }
     character.show(view.character);
     prediction.textContent = view3d.prediction && `Prediction ${view3d.prediction}`;
     prediction.hidden = !view3d.prediction;
@@ -153,12 +108,7 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
     set({ trail_points: on ? [...chosen, name] : chosen.filter((other) => other !== name) });
   };
   store.on(["view3d", "state", "session", "theme", "linkedViews", "layers"], show);
-  return {
-    id: "view",
-    title: "View",
-    hint: "Theme of the page, error ellipses, and what the 3-D view shows",
-    body,
-  };
+  return { id: "view", title: "View", hint: "Theme of the page, error ellipses, and what the 3-D view shows", body };
 }
 
 /**

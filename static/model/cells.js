@@ -5,17 +5,19 @@
  * @typedef {import("./protocol.js").Status} Status
  */
 
-/** Sources of a pose in the order of the legend. timeline/cell_marks.js has their marks. */
-export const SOURCES = [
-  "manual",
-  "pinned",
-  "searched",
-  "fitted",
-  "tracked",
-  "interpolated",
-  "smoothed",
-  "imported",
-];
+/** How a pose was made, by its source. @type {Record<string, string>} */
+export const SOURCE_WORDS = {
+  manual: "by hand",
+  pinned: "fitted to pins",
+  searched: "searched on its frame",
+  fitted: "fitted on its frame",
+  tracked: "tracked",
+  interpolated: "interpolated",
+  smoothed: "smoothed",
+  imported: "imported",
+};
+/** Sources in the order of the legend. timeline/cell_marks.js has their marks. */
+export const SOURCES = Object.keys(SOURCE_WORDS);
 /** Statuses of a pose, the worst last. */
 export const STATUSES = /** @type {const} */ (["", "good", "doubtful", "lost"]);
 const GOOD = STATUSES.indexOf("good");

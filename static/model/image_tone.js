@@ -31,46 +31,39 @@ export function toneCurve({ brightness, contrast, gamma }) {
   });
 }
 
-export class ImageTones {
-  #store;
-  #session = "";
+/** @typedef {ReturnType<typeof makeImageTones>} ImageTones */
 
-  /** @param {import("./store.js").Store} store */
-  constructor(store) {
-    this.#store = store;
-    store.on(["session"], () => this.#restore());
-  }
+/** @param {import("./store.js").Store} store */
+export function makeImageTones(store) {
+  let name = "";
+  store.on(["session"], restore);
 
   /**
    * @param {number} camera
    * @param {ImageTone} tone
    */
-  set(camera, tone) {
-    const imageTones = [...this.#store.facts.imageTones];
-    imageTones[camera] = tone;
-    this.#save(imageTones);
-  }
+  const set = (camera, tone) => save(Object.assign([...store.facts.imageTones], { [camera]: tone }));
 
   /** @param {ImageTone} tone for all cameras */
-  setAll(tone) {
-    this.#save((this.#store.facts.session?.cameras ?? []).map(() => tone));
-  }
+  const setAll = (tone) => save((store.facts.session?.cameras ?? []).map(() => tone));
 
   /** @param {(ImageTone | undefined)[]} imageTones by camera */
-  #save(imageTones) {
-    this.#store.set({ imageTones });
-    const names = (this.#store.facts.session?.cameras ?? []).map(({ name }) => name);
+  function save(imageTones) {
+    store.set({ imageTones });
+    const names = (store.facts.session?.cameras ?? []).map(({ name }) => name);
     const changed = names.map((name, camera) => [name, imageTones[camera]]).filter(([, tone]) => tone && tone !== PLAIN);
-    localStorage.setItem(STORED + this.#session, JSON.stringify(Object.fromEntries(changed)));
+    localStorage.setItem(STORED + name, JSON.stringify(Object.fromEntries(changed)));
   }
 
-  #restore() {
-    const { session } = this.#store.facts;
+  function restore() {
+    const { session } = store.facts;
     if (!session) return;
-    this.#session = session.name;
-    const found = stored(STORED + session.name);
-    this.#store.set({ imageTones: session.cameras.map(({ name }) => restored(found?.[name])) });
+    name = session.name;
+    const found = stored(STORED + name);
+    store.set({ imageTones: session.cameras.map((camera) => restored(found?.[camera.name])) });
   }
+
+  return { set, setAll };
 }
 
 /** @param {Partial<ImageTone> | undefined} found */

@@ -4,12 +4,12 @@
  * The room holds the store, the connection with its messages, and the actions of a user. It imports only types of `widgets`.
  */
 
-import { Actions } from "./actions.js";
+import { makeActions } from "./actions.js";
 import { makeConnection } from "./connection.js";
-import { ImageTones } from "./image_tone.js";
+import { makeImageTones } from "./image_tone.js";
 import { Latency } from "../widgets/latency.js";
 import { makeLayers } from "./layers.js";
-import { Navigation } from "./navigation.js";
+import { makeNavigation } from "./navigation.js";
 import { makeReceiver } from "./receiver.js";
 import { RecentImages } from "./recent_images.js";
 import { Store } from "./store.js";
@@ -45,19 +45,18 @@ export function mount() {
     if (MOVING.includes(message.type)) navigation.expectMove();
     connection?.send(message);
   };
-  const navigation = new Navigation(store, send);
+  const navigation = makeNavigation(store, send);
   const receiver = makeReceiver(store, notify, send, recentImages);
   return {
     store,
     send,
-    notify,
     say,
     latency,
     recentImages,
-    actions: new Actions(store, send),
+    actions: makeActions(store, send),
     navigation,
     layers: makeLayers(store),
-    imageTones: new ImageTones(store),
+    imageTones: makeImageTones(store),
     themes: makeThemes(store),
     reasons: unavailableReasons(store),
 

@@ -5,69 +5,45 @@
 
 const TIMEOUT_MS = 2000;
 
-export class Navigation {
-  #store;
-  #send;
+/** @typedef {ReturnType<typeof makeNavigation>} Navigation */
+
+/**
+ * @param {import("./store.js").Store} store
+ * @param {(message: import("./protocol.js").ClientMessage) => void} send
+ */
+export function makeNavigation(store, send) {
   /** @type {{frame: number} | null} */
-  #pending = null;
+  let pending = null;
   /** @type {number | null} */
-  #next = null;
+  let next = null;
   /** Whether the program may show another frame before it obeys the next request. */
-  #isMoving = false;
+  let isMoving = false;
 
-  /**
-   * @param {import("./store.js").Store} store
-   * @param {(message: import("./protocol.js").ClientMessage) => void} send
-   */
-  constructor(store, send) {
-    this.#store = store;
-    this.#send = send;
-    store.on(["connected"], () => this.#reset());
-    store.on(["shown", "state"], () => this.#arrived());
-    store.on(["state"], () => (this.#isMoving &&= this.#pending !== null));
-  }
+  store.on(["connected"], reset);
+  store.on(["shown", "state"], arrived);
+  store.on(["state"], () => (isMoving &&= pending !== null));
 
-  get #last() {
-    return (this.#store.facts.session?.n_frames ?? 1) - 1;
-  }
-
-  /** Expect that the program goes to another frame by itself: an undo goes to the frame of its edit. */
-  expectMove() {
-    this.#isMoving = true;
-  }
+  const lastFrame = () => (store.facts.session?.n_frames ?? 1) - 1;
 
   /**
    * Go to a frame, clamped to the recording.
    *
    * @param {number} frame
    */
-  goTo(frame) {
-    const { session, connected } = this.#store.facts;
+  function goTo(frame) {
+    const { session, connected } = store.facts;
     if (!session || !connected || !session.has_place) return;
-    this.request(Math.max(0, Math.min(this.#last, Math.round(frame))));
+    request(Math.max(0, Math.min(lastFrame(), Math.round(frame))));
   }
 
   /** @param {number} count negative to go back */
-  step(count) {
-    this.pause();
-    this.goTo(this.#store.facts.target + count);
+  function step(count) {
+    pause();
+    goTo(store.facts.target + count);
   }
 
-  first() {
-    this.goTo(0);
-  }
-
-  last() {
-    this.goTo(this.#last);
-  }
-
-  pause() {
-    if (this.#store.facts.playing) this.#store.set({ playing: false });
-  }
-
-  /** Whether a request is pending. */
-  get isWaiting() {
-    return this.#pending !== null;
+  function pause() {
+    if (store.facts.playing) store.set({ playing: false });
   }
 
   /**
@@ -75,49 +51,61 @@ export class Navigation {
    *
    * @param {number} frame
    */
-  request(frame) {
-    this.#store.set({ target: frame });
-    this.#next = frame === this.#pending?.frame ? null : frame;
-    if (!this.#pending) this.#sendNext();
+  function request(frame) {
+    store.set({ target: frame });
+    next = frame === pending?.frame ? null : frame;
+    if (!pending) sendNext();
   }
 
-  #sendNext() {
-    this.#pending = null;
-    if (this.#next === null) return;
-    const frame = this.#next;
-    this.#next = null;
-    if (!this.#isMoving && this.#isAt(frame)) return;
+  function sendNext() {
+    pending = null;
+    if (next === null) return;
+    const frame = next;
+    next = null;
+    if (!isMoving && isAt(frame)) return;
     const request = { frame };
-    this.#pending = request;
-    this.#send({ type: "seek", frame });
+    pending = request;
+    send({ type: "seek", frame });
     // Another tab may have requested a different frame. Then these images never arrive.
     setTimeout(() => {
-      if (this.#pending !== request) return;
-      this.#sendNext();
-      this.#arrived();
+      if (pending !== request) return;
+      sendNext();
+      arrived();
     }, TIMEOUT_MS);
   }
 
-  #arrived() {
-    const { shown, state, target } = this.#store.facts;
-    const { frame } = this.#pending ?? {};
-    if (this.#pending && shown?.frame === frame && (!this.#isMoving || state?.frame === frame)) this.#sendNext();
+  function arrived() {
+    const { shown, state, target } = store.facts;
+    const { frame } = pending ?? {};
+    if (pending && shown?.frame === frame && (!isMoving || state?.frame === frame)) sendNext();
     // Another tab, an undo or a tracker may have changed the frame.
-    if (!this.#pending && this.#next === null && state && state.frame !== target) {
-      this.#store.set({ target: state.frame });
+    if (!pending && next === null && state && state.frame !== target) {
+      store.set({ target: state.frame });
     }
   }
 
   /** @param {number} frame */
-  #isAt(frame) {
-    const { shown, state } = this.#store.facts;
+  function isAt(frame) {
+    const { shown, state } = store.facts;
     return shown?.frame === frame && state?.frame === frame;
   }
 
-  #reset() {
-    this.#pending = null;
-    this.#next = null;
-    this.#isMoving = false;
-    this.pause();
+  function reset() {
+    pending = next = null;
+    isMoving = false;
+    pause();
   }
+
+  return {
+    goTo,
+    step,
+    pause,
+    request,
+    first: () => goTo(0),
+    last: () => goTo(lastFrame()),
+    /** Whether a request is pending. */
+    isWaiting: () => pending !== null,
+    /** Expect that the program goes to another frame by itself: an undo goes to the frame of its edit. */
+    expectMove: () => (isMoving = true),
+  };
 }

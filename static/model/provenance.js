@@ -1,6 +1,6 @@
 /** Where poses come from: words for it, and the filter of the timeline by it. */
 
-import { KEYFRAME, NO_POSE, SOURCES } from "./cells.js";
+import { KEYFRAME, NO_POSE, SOURCES, SOURCE_WORDS } from "./cells.js";
 import { capital, displayName, percent } from "../widgets/text.js";
 
 /**
@@ -18,16 +18,6 @@ export const KINDS = [
   { kind: "imported", label: "imported", sources: ["imported"] },
 ];
 const NOBODY = "nobody named";
-const WORDS = /** @type {Record<string, string>} */ ({
-  manual: "by hand",
-  pinned: "fitted to pins",
-  searched: "searched on its frame",
-  fitted: "fitted on its frame",
-  tracked: "tracked",
-  interpolated: "interpolated",
-  smoothed: "smoothed",
-  imported: "imported",
-});
 /** Smallest probability that a limb is lost that is named: below, it is displayed as nothing. */
 const LEAST_LOST = 0.01;
 /** Sources that are somebody's own work, whose author and views are named. */
@@ -74,7 +64,7 @@ export function pointPhrases({ source, author, time, views, lost }, pose) {
   const isOwn = BY_HAND.includes(source);
   const isTaken = pose.taken_from !== "" && time === pose.time;
   const where = views.length ? `in ${listed(views)}` : "";
-  const parts = isOwn ? [`${isTaken ? `taken from ${pose.taken_from}` : WORDS[source]} by ${annotatorName(author)}`, when(time), where] : [`${WORDS[source]}${how(source, pose)}`, where && `put by hand ${where}`];
+  const parts = isOwn ? [`${isTaken ? `taken from ${pose.taken_from}` : SOURCE_WORDS[source]} by ${annotatorName(author)}`, when(time), where] : [`${SOURCE_WORDS[source]}${how(source, pose)}`, where && `put by hand ${where}`];
   return [...parts, lost !== null && lost >= LEAST_LOST ? `${percent(lost)} chance that the limb is lost` : ""].filter(Boolean);
 }
 
@@ -103,7 +93,7 @@ export function poseLines(pose, tasks) {
     `${mark} by ${annotatorName(pose.author)}, ${when(pose.time)}`,
     verdict && `${capital(verdict.state)} by ${annotatorName(verdict.by)}`,
     pose.taken_from && `Taken from ${pose.taken_from}`,
-    capital(`${WORDS[pose.source ?? ""] ?? pose.source}${how(pose.source ?? "", pose)}`),
+    capital(`${SOURCE_WORDS[pose.source ?? ""] ?? pose.source}${how(pose.source ?? "", pose)}`),
     pose.seam_mm === null ? "" : `Both passes lie up to ${Math.round(pose.seam_mm)} mm apart`,
     `Body ${pose.body}, revision ${pose.body_revision}${pose.is_earlier_body ? ": earlier than the present one" : ""}`,
     `Calibration revision ${pose.calibration_revision}${pose.is_earlier_calibration ? ": earlier than the present one" : ""}`,

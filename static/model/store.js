@@ -204,6 +204,15 @@ export class Store {
     this.subscribe((changed) => facts.some((fact) => changed.has(fact)) && act());
   }
 
+  /**
+   * @param {import("./series.js").Tab} tab
+   * @param {(keyof Facts)[]} facts
+   * @param {() => void} act called when the tab of the drawer opens, and whenever one of the facts has changed while it is open
+   */
+  onTab(tab, facts, act) {
+    this.on(["drawer", ...facts], () => this.facts.drawer === tab && act());
+  }
+
   #flush() {
     // Changes made by views are shown in the same animation frame.
     for (let round = 0; round < MAX_ROUNDS && this.#changed.size > 0; round += 1) {

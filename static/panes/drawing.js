@@ -1,6 +1,6 @@
 /** Draw a pane: pictures, and vectors over them. All sizes on the screen are CSS pixels. */
 
-import { addLine, diamondPath, setText } from "../widgets/canvas.js";
+import { addLine, circlePath, diamondPath, fillRect, setText } from "../widgets/canvas.js";
 import { OFF_DASH, imageColor } from "../widgets/image_colors.js";
 
 /**
@@ -67,28 +67,6 @@ export const LINE_STYLES = {
 };
 
 /**
- * Resize a canvas to its pane in device pixels. Return its cleared context, scaled to CSS pixels.
- *
- * @param {HTMLCanvasElement} canvas
- * @param {number} width
- * @param {number} height
- * @param {boolean} onProcessor whether to draw on the processor, which is faster for many short lines that change each
- *   time, especially without a graphics card
- */
-export function prepare(canvas, width, height, onProcessor) {
-  const ratio = devicePixelRatio;
-  const [deviceWidth, deviceHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
-  if (canvas.width !== deviceWidth || canvas.height !== deviceHeight) {
-    canvas.width = deviceWidth;
-    canvas.height = deviceHeight;
-  }
-  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: onProcessor }));
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  context.clearRect(0, 0, width, height);
-  return context;
-}
-
-/**
  * Draw a dark background, so that translucent layers look the same in both colour schemes.
  *
  * @param {CanvasRenderingContext2D} context
@@ -96,8 +74,7 @@ export function prepare(canvas, width, height, onProcessor) {
  */
 export function drawBackground(context, view) {
   const { x, y, width, height } = view.place;
-  context.fillStyle = BEHIND_IMAGES;
-  context.fillRect(x, y, width, height);
+  fillRect(context, BEHIND_IMAGES, x, y, width, height);
 }
 
 /**
@@ -135,9 +112,7 @@ export function drawGrains(context, picture, circles) {
     const [left, top, side] = [x - radius, y - radius, 2 * radius];
     coarse.drawImage(picture, left * ratio, top * ratio, side * ratio, side * ratio, 0, 0, GRAINS, GRAINS);
     context.save();
-    context.beginPath();
-    context.arc(x, y, radius, 0, 2 * Math.PI);
-    context.clip();
+    context.clip(circlePath(x, y, radius));
     context.drawImage(grains, left, top, side, side);
     context.restore();
   }
@@ -290,11 +265,7 @@ export function drawSkeleton(context, placed, people, opacity) {
  */
 export function drawHandle(context, { handle, x, y }, color, emphasis, isSeen = handle.visible) {
   const outline = handleOutline(handle, x, y, emphasis === "hovered" ? 1.5 : 0);
-  if (handle.held) {
-    const ring = new Path2D();
-    ring.arc(x, y, HELD_RADIUS, 0, 2 * Math.PI);
-    stroke(context, ring, color, 2);
-  }
+  if (handle.held) stroke(context, circlePath(x, y, HELD_RADIUS), color, 2);
   // Hidden joints are rings in the person's colour, visible joints discs with a white ring.
   context.strokeStyle = imageColor("outline");
   context.lineWidth = 3.5;
@@ -317,16 +288,11 @@ export function drawHandle(context, { handle, x, y }, color, emphasis, isSeen = 
  * @param {number} grown by how much it is larger than usual
  */
 function handleOutline({ point, side }, x, y, grown) {
-  const outline = new Path2D();
-  if (point === TORSO) {
-    const half = TORSO_HALF_SIDE + grown;
-    outline.roundRect(x - half, y - half, 2 * half, 2 * half, 2);
-  } else if (side === "right") {
-    outline.addPath(diamondPath(x, y, DIAMOND_RADIUS + grown));
-  } else {
-    outline.arc(x, y, JOINT_RADIUS + grown, 0, 2 * Math.PI);
-  }
-  return outline;
+  if (point !== TORSO) return side === "right" ? diamondPath(x, y, DIAMOND_RADIUS + grown) : circlePath(x, y, JOINT_RADIUS + grown);
+  const half = TORSO_HALF_SIDE + grown;
+  const square = new Path2D();
+  square.roundRect(x - half, y - half, 2 * half, 2 * half, 2);
+  return square;
 }
 
 /**

@@ -13,6 +13,7 @@ import { isDimmed } from "../model/selectors.js";
 import { DragHint, modeOf } from "./drag_hint.js";
 import { JointPicking } from "./joint_picking.js";
 import { partAt } from "./part_hit.js";
+import { isSame } from "./pin_drawing.js";
 
 /**
  * @typedef {import("./drawing.js").PlacedHandle} PlacedHandle
@@ -273,9 +274,7 @@ export function makeGestures(store, send, latency) {
 
   /** @param {Drag} drag */
   function toggleHold({ frame, camera, person, point }) {
-    const handle = store.facts.overlay?.handles.find(
-      (one) => one.camera === camera && one.person === person && one.point === point,
-    );
+    const handle = store.facts.overlay?.handles.find((one) => isSame(one, { camera, person, point }));
     send({ type: "pose", action: "hold", frame, person, point, held: !handle?.held });
   }
 

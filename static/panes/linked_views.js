@@ -133,7 +133,7 @@ export class PeopleFollower {
     if (view.isFramed) {
       const people = state?.solo ? [state.person] : [...joints.keys()];
       const box = boxOf(people.flatMap((person) => seen(joints.get(person) ?? [], camera, info)));
-      if (box) pane.refit(box);
+      if (box) view.refit(box);
       return;
     }
     const before = [...this.#joints.values()].flat().filter((joint) => joint.camera === camera);
@@ -144,7 +144,7 @@ export class PeopleFollower {
     const both = before.filter((joint) => joint.person === person && now.has(joint.point));
     if (both.length === 0) return;
     const there = both.map(({ point }) => /** @type {Joint} */ (now.get(point)));
-    pane.follow({ du: mean(there, "u") - mean(both, "u"), dv: mean(there, "v") - mean(both, "v") });
+    view.follow(mean(there, "u") - mean(both, "u"), mean(there, "v") - mean(both, "v"));
   }
 }
 

@@ -3,10 +3,10 @@
 import { arrange, fit, layOut, movedShares } from "../layout/grid_layout.js";
 import { keep, kept, keptByName } from "../layout/kept_views.js";
 import { PeopleFollower, boxOf, followView, keepLink, keptLink, seen } from "./linked_views.js";
-import { Pane } from "./pane.js";
+import { makePane } from "./pane.js";
 import { makePaneBorders } from "../layout/pane_borders.js";
 import { isInSight } from "../model/selectors.js";
-import { cornersOf } from "./part_hit.js";
+import { cornersOf, outlineOf } from "./part_hit.js";
 import { PaneShares } from "../layout/pane_shares.js";
 
 /** Smallest size of what is framed, in that of the body: a limb is judged by what it hangs on. */
@@ -20,7 +20,10 @@ const FOLLOWED = ["overlay", "state", "dragging"];
 /** Facts that change the pictures. @type {(keyof import("../model/store.js").Facts)[]} */
 const PICTURED = ["shown", "placeholder", "layers", "imageTones", "bare"];
 
-/** @typedef {{watch: (pane: Pane, camera: number) => void}} PointerTarget handles the pointer in a pane */
+/**
+ * @typedef {import("./pane.js").Pane} Pane
+ * @typedef {{watch: (pane: Pane, camera: number) => void}} PointerTarget handles the pointer in a pane
+ */
 
 export class PaneGrid {
   /** @type {Pane[]} */
@@ -191,13 +194,10 @@ export class PaneGrid {
   frameJoints(person, points) {
     const { overlay, session, state } = this.#store.facts;
     const handles = (overlay?.handles ?? []).filter((one) => one.person === person);
-    const inside = handles.filter(({ camera, u, v }) => {
-      const { width, height } = session?.cameras[camera] ?? { width: 0, height: 0 };
-      return u >= 0 && v >= 0 && u < width && v < height;
-    });
+    const inside = session?.cameras.flatMap((info, camera) => seen(handles, camera, info)) ?? [];
     const meant = inside.filter(({ point }) => points.includes(point));
-    const seen = meant.filter((one) => isInSight(state, one));
-    const cameras = new Set((seen.length ? seen : meant).map(({ camera }) => camera));
+    const inSight = meant.filter((one) => isInSight(state, one));
+    const cameras = new Set((inSight.length ? inSight : meant).map(({ camera }) => camera));
     const moved = [...new Set([...cameras, ...this.#zoomedToJoints])];
     this.#following = new Set(moved);
     for (const camera of moved) {
@@ -214,7 +214,7 @@ export class PaneGrid {
    */
   framePart({ camera, person, part }) {
     const { overlay, filled } = this.#store.facts;
-    const outline = overlay?.outlines.find((one) => one.camera === camera && one.person === person && one.part === part);
+    const outline = overlay && outlineOf(overlay, { camera, person, part });
     if (!overlay || !outline) return;
     if (filled !== null && filled !== camera) this.#store.set({ filled: camera });
     const body = overlay.handles.filter((one) => one.camera === camera && one.person === person);
@@ -259,7 +259,7 @@ export class PaneGrid {
     const isFollowed = FOLLOWED.some((fact) => changed.has(fact)) && !this.#store.facts.dragging;
     const isMoved = isFollowed && this.#follower.take(this.panes, this.#store.facts);
     if (changed.has("overlay")) this.#frameAtOpening();
-    if (changed.has("target")) this.#ask(this.panes.map((pane) => pane.reduction));
+    if (changed.has("target")) this.#ask(this.panes.map((pane) => pane.reduction()));
     if (changed.has("active") || changed.has("session")) this.#markActive();
     const withPictures = isMoved || PICTURED.some((fact) => changed.has(fact));
     // Each move of a drag changes the state, but only these fields of it change the vectors.
@@ -295,10 +295,7 @@ export class PaneGrid {
     this.#isFirst = views === null;
     this.#follower.forget();
     this.panes = cameras.map((info, camera) => {
-      const pane = new Pane(this.#store, camera, info, {
-        viewChanged: () => this.#viewChanged(camera),
-        openToneMenu: this.#openToneMenu,
-      });
+      const pane = makePane(this.#store, camera, info, { viewChanged: () => this.#viewChanged(camera), openToneMenu: this.#openToneMenu });
       pane.view.restore(views?.[info.name]);
       for (const target of this.#pointerTargets) target.watch(pane, camera);
       pane.element.addEventListener("dblclick", (event) => {
@@ -382,13 +379,13 @@ export class PaneGrid {
     let first = 0;
     const names = arrangement.counts.map((count) => shown.slice(first, (first += count)).map(({ name }) => name));
     this.#borders.show(borders, arrangement.isColumns, names);
-    this.#ask(this.panes.map((pane) => pane.reduction));
+    this.#ask(this.panes.map((pane) => pane.reduction()));
   }
 
   /** Request finer pictures after zooming in. Coarser pictures can wait for the next frame. */
   #refine() {
     const { reductions } = this.#store.facts;
-    this.#ask(this.panes.map((pane, camera) => Math.min(pane.reduction, reductions[camera] ?? pane.reduction)));
+    this.#ask(this.panes.map((pane, camera) => Math.min(pane.reduction(), reductions[camera] ?? pane.reduction())));
   }
 
   /** @param {number[]} reductions */

@@ -1,6 +1,6 @@
 /** Keys of the camera panes and their layers. */
 
-import { inArea } from "../widgets/key_matching.js";
+import { command, inArea } from "../widgets/key_matching.js";
 
 /**
  * @param {{store: import("../model/store.js").Store, grid: import("./pane_grid.js").PaneGrid, gestures: import("./gestures.js").Gestures,
@@ -29,17 +29,12 @@ export function paneBindings({ store, grid, gestures, layersMenu, say }) {
       run: ({ code }) => store.set({ bare: code !== "" || !store.facts.bare }),
       release: () => store.set({ bare: false }),
     },
-    {
-      label: "Zoomed views follow the people from frame to frame (toggle)",
-      words: "pan track playback steady still",
-      run: () => say(`Zoomed views ${grid.togglePeopleFollowed() ? "follow the people." : "stay where they are."}`),
-    },
-    {
-      label: "Reset the sizes of all panes",
-      words: "resize border split automatic",
-      why: () => (grid.isResized ? null : "No pane was resized. Drag a border between two panes to do so."),
-      run: () => grid.resetSizes(),
-    },
+    command("Zoomed views follow the people from frame to frame (toggle)", "pan track playback steady still", () =>
+      say(`Zoomed views ${grid.togglePeopleFollowed() ? "follow the people." : "stay where they are."}`),
+    ),
+    command("Reset the sizes of all panes", "resize border split automatic", () => grid.resetSizes(), () =>
+      grid.isResized ? null : "No pane was resized. Drag a border between two panes to do so.",
+    ),
     { label: "Take the next of the joints that overlap under the pointer", run: () => gestures.offerNext() },
   ]);
 }

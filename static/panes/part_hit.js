@@ -38,6 +38,16 @@ function holds(segments, { first, count }, u, v) {
 }
 
 /**
+ * The outline of a part of a person in a view.
+ *
+ * @param {{outlines: import("../model/protocol.js").Outline[]}} overlay
+ * @param {{camera: number, person: number, part: number}} meant
+ */
+export function outlineOf({ outlines }, { camera, person, part }) {
+  return outlines.find((one) => one.camera === camera && one.person === person && one.part === part);
+}
+
+/**
  * Corners of an outline.
  *
  * @param {Float32Array} segments of the overlay

@@ -1,6 +1,6 @@
 /** Draw the pins of a view, their distance to the model, and their triangulated point. All sizes are CSS pixels. */
 
-import { addLine, diamondPath } from "../widgets/canvas.js";
+import { addLine, circlePath, diamondPath } from "../widgets/canvas.js";
 import { drawLabel, stroke } from "./drawing.js";
 import { displayName } from "../widgets/text.js";
 import { OFF_DASH, imageColor } from "../widgets/image_colors.js";
@@ -41,7 +41,7 @@ export function placedPins({ overlay, heldPin }, view, camera) {
 
 /**
  * @param {{camera: number, person: number, point: string}} a
- * @param {{camera: number, person: number, point: string} | null} b
+ * @param {{camera: number, person: number, point: string | null} | null} b
  */
 export function isSame(a, b) {
   return a.camera === b?.camera && a.person === b.person && a.point === b.point;
@@ -110,8 +110,7 @@ function drawError(context, view, { pin, x, y }) {
 function drawPin(context, { x, y, headX, headY }, color, isGrown) {
   const radius = HEAD_RADIUS + (isGrown ? 1.5 : 0);
   stroke(context, addLine(new Path2D(), { x, y }, { x: headX, y: headY }), "#fff", 1.5);
-  const head = new Path2D();
-  head.arc(headX, headY, radius, 0, 2 * Math.PI);
+  const head = circlePath(headX, headY, radius);
   context.strokeStyle = imageColor("outline");
   context.lineWidth = 3.5;
   context.stroke(head);

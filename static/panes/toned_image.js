@@ -2,33 +2,24 @@
 
 import { isPlain, toneCurve } from "../model/image_tone.js";
 
-export class TonedImage {
-  /** @type {ImageBitmap | OffscreenCanvas | null} */
-  #source = null;
-  /** @type {import("../model/image_tone.js").ImageTone | null} */
-  #tone = null;
-  /** @type {OffscreenCanvas | null} */
-  #canvas = null;
+/**
+ * @typedef {ImageBitmap | OffscreenCanvas} Bitmap
+ * @typedef {import("../model/image_tone.js").ImageTone} ImageTone
+ */
 
-  /**
-   * @param {ImageBitmap | OffscreenCanvas} bitmap
-   * @param {import("../model/image_tone.js").ImageTone | undefined} tone
-   * @returns {CanvasImageSource & {width: number, height: number}} the bitmap itself if the tone is plain
-   */
-  of(bitmap, tone) {
-    if (!tone || isPlain(tone)) {
-      this.#source = this.#tone = this.#canvas = null;
-      return bitmap;
-    }
-    if (bitmap === this.#source && tone === this.#tone && this.#canvas) return this.#canvas;
-    [this.#source, this.#tone] = [bitmap, tone];
-    this.#canvas = tonedImage(bitmap, toneCurve(tone));
-    return this.#canvas;
-  }
+/** Returns a function that applies a tone to a bitmap, and returns the bitmap itself if the tone is plain. */
+export function makeTonedImage() {
+  /** @type {{bitmap: Bitmap, tone: ImageTone, image: OffscreenCanvas} | null} */
+  let last = null;
+  return (/** @type {Bitmap} */ bitmap, /** @type {ImageTone | undefined} */ tone) => {
+    if (!tone || isPlain(tone)) last = null;
+    else if (bitmap !== last?.bitmap || tone !== last.tone) last = { bitmap, tone, image: tonedImage(bitmap, toneCurve(tone)) };
+    return last?.image ?? bitmap;
+  };
 }
 
 /**
- * @param {ImageBitmap | OffscreenCanvas} bitmap
+ * @param {Bitmap} bitmap
  * @param {Uint8ClampedArray} curve
  */
 function tonedImage(bitmap, curve) {

@@ -32,7 +32,7 @@ export function mountJointBar(element, store, posing, say) {
   let builtFor = "";
   button("previous-joint", () => posing.toJoint(-1));
   button("next-joint", () => posing.toJoint(1));
-  button("lock-joint", () => posing.toggleLock(posing.dofs));
+  button("lock-joint", () => posing.toggleLock(posing.joint().dofs));
   button("mirror-pose", () => posing.mirror());
   button("reset-limb", () => posing.resetLimb());
   onChange(joint, () => posing.selectPoint(joint.value));
@@ -84,7 +84,7 @@ export function mountJointBar(element, store, posing, say) {
   }
 
   function show() {
-    const { person, point, dofs, limb } = posing;
+    const { person, point, dofs, limb } = posing.joint();
     const { state, dof: selected } = store.facts;
     if (!person || !state || !point) return;
     const built = JSON.stringify([state.person, person.points, dofs]);

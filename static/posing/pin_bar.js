@@ -47,7 +47,7 @@ export function mountPinBar(store, pinning) {
   function fits() {
     const { state, session } = store.facts;
     if (!state || !session) return [];
-    const { limb } = pinning;
+    const limb = pinning.limb();
     const name = session.people[state.person].name;
     const everybody = { text: "All placed people", note: "", title: "Fit everybody who is placed on this frame", run: () => pinning.fit(null) };
     return [

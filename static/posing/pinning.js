@@ -17,66 +17,58 @@ const RESPONSE_MS = 600;
  *   pin: import("../model/protocol.js").PinMark, begun: boolean}} Held
  */
 
-export class Pinning {
-  #store;
-  #send;
-  #say;
-  /** @type {Held | null} */
-  #held = null;
-  #moveScheduled = false;
+/** @typedef {ReturnType<typeof makePinning>} Pinning */
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   * @param {(text: string) => void} say
-   */
-  constructor(store, send, say) {
-    this.#store = store;
-    this.#send = send;
-    this.#say = say;
-    store.on(["connected"], () => this.#release(false));
-    store.on(["overlay"], () => !this.#held && store.facts.heldPin && store.set({ heldPin: null }));
-    store.on(["state"], () => store.facts.pinning && !store.facts.state?.point && store.set({ pinning: false }));
-  }
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ * @param {(text: string) => void} say
+ */
+export function makePinning(store, send, say) {
+  /** @type {Held | null} */
+  let held = null;
+  let moveScheduled = false;
+
+  store.on(["connected"], () => release(false));
+  store.on(["overlay"], () => !held && store.facts.heldPin && store.set({ heldPin: null }));
+  store.on(["state"], () => store.facts.pinning && !store.facts.state?.point && store.set({ pinning: false }));
 
   /** Toggle the mode in which each click pins the selected joint. */
-  toggle() {
-    const { pinning, state } = this.#store.facts;
-    if (!pinning && !state?.point) this.#say("Select a joint first: click it in a view.");
-    else this.#store.set({ pinning: !pinning, pinHover: null, hover: null, hoverPart: null });
+  function toggle() {
+    const { pinning, state } = store.facts;
+    if (!pinning && !state?.point) say("Select a joint first: click it in a view.");
+    else store.set({ pinning: !pinning, pinHover: null, hover: null, hoverPart: null });
   }
 
-  toggleLive() {
-    this.#store.set({ livePins: !this.#store.facts.livePins });
-  }
+  const toggleLive = () => store.set({ livePins: !store.facts.livePins });
 
   /** Revert the drag of a pin, or else end pin mode. Returns whether there was anything to cancel. */
-  cancel() {
-    if (this.#held) {
-      if (this.#held.begun) this.#message("cancel", this.#held.pin);
-      this.#release(false);
+  function cancel() {
+    if (held) {
+      if (held.begun) message("cancel", held.pin);
+      release(false);
       return true;
     }
-    const wasOn = this.#store.facts.pinning;
-    if (wasOn) this.#store.set({ pinning: false });
+    const wasOn = store.facts.pinning;
+    if (wasOn) store.set({ pinning: false });
     return wasOn;
   }
 
   /** Remove the pin under the pointer, or else the pins of the selected joint. */
-  remove() {
-    const { pinHover, state, overlay } = this.#store.facts;
-    if (pinHover) this.#unpin(pinHover.person, pinHover.point, pinHover.camera);
+  function remove() {
+    const { pinHover, state, overlay } = store.facts;
+    if (pinHover) unpin(pinHover.person, pinHover.point, pinHover.camera);
     else if (state?.point && overlay?.pins.some((p) => p.person === state.person && p.point === state.point)) {
-      this.#unpin(state.person, state.point, null);
-    } else this.#say("No pin to remove. Point at a pin, or select a joint that has pins.");
+      unpin(state.person, state.point, null);
+    } else say("No pin to remove. Point at a pin, or select a joint that has pins.");
   }
 
   /** Remove all pins of the active person on this frame. */
-  clear() {
-    const { state, overlay } = this.#store.facts;
+  function clear() {
+    const { state, overlay } = store.facts;
     if (!state) return;
-    if (overlay?.pins.some((p) => p.person === state.person)) this.#unpin(state.person, null, null);
-    else this.#say("This person has no pins on this frame.");
+    if (overlay?.pins.some((p) => p.person === state.person)) unpin(state.person, null, null);
+    else say("This person has no pins on this frame.");
   }
 
   /**
@@ -84,30 +76,30 @@ export class Pinning {
    *
    * @param {number | null} person null for all placed people
    */
-  fit(person = scopePerson(this.#store.facts)) {
-    const { state } = this.#store.facts;
-    if (state) this.#send({ type: "fit", frame: state.frame, person });
+  function fit(person = scopePerson(store.facts)) {
+    const { state } = store.facts;
+    if (state) send({ type: "fit", frame: state.frame, person });
   }
 
   /** Display name of the limb of the selected joint; null where no joint of a limb is selected. */
-  get limb() {
-    const { state, session } = this.#store.facts;
+  function limb() {
+    const { state, session } = store.facts;
     const person = state && session?.people[state.person];
     const limb = state?.point ? person?.point_limbs[state.point] : undefined;
     return limb && limb.dofs.length > 0 && state?.point !== person?.points[0] ? limb.name : null;
   }
 
   /** Fit only the limb of the selected joint to pins and edges. */
-  fitLimb() {
-    const { state } = this.#store.facts;
-    if (state && this.limb !== null) this.#send({ type: "fit", frame: state.frame, person: state.person, point: state.point });
-    else this.#say("Select a joint of the limb first: click it in a view.");
+  function fitLimb() {
+    const { state } = store.facts;
+    if (state && limb() !== null) send({ type: "fit", frame: state.frame, person: state.person, point: state.point });
+    else say("Select a joint of the limb first: click it in a view.");
   }
 
   /** Put the limb back that the last fit moved farthest although nobody had touched it. */
-  takeLimbBack() {
-    const { state } = this.#store.facts;
-    if (state) this.#send({ type: "limb_back", frame: state.frame });
+  function takeLimbBack() {
+    const { state } = store.facts;
+    if (state) send({ type: "limb_back", frame: state.frame });
   }
 
   /**
@@ -116,17 +108,17 @@ export class Pinning {
    * @param {Pane} pane
    * @param {number} camera
    */
-  watch(pane, camera) {
+  function watch(pane, camera) {
     const { surface } = pane;
-    surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
-    surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
-    surface.addEventListener("pointerup", (event) => this.#up(event));
-    surface.addEventListener("pointercancel", () => this.#held && this.cancel());
-    surface.addEventListener("pointerleave", () => this.#store.facts.pinHover && this.#store.set({ pinHover: null }));
+    surface.addEventListener("pointerdown", (event) => down(event, pane, camera));
+    surface.addEventListener("pointermove", (event) => move(event, pane, camera));
+    surface.addEventListener("pointerup", (event) => up(event));
+    surface.addEventListener("pointercancel", () => held && cancel());
+    surface.addEventListener("pointerleave", () => store.facts.pinHover && store.set({ pinHover: null }));
     surface.addEventListener("contextmenu", (event) => event.preventDefault());
     surface.addEventListener("dblclick", (event) => {
       // A double-click that sets two pins must not fill the grid.
-      if (this.#store.facts.pinning || this.#store.facts.pinHover || event.ctrlKey) event.stopImmediatePropagation();
+      if (store.facts.pinning || store.facts.pinHover || event.ctrlKey) event.stopImmediatePropagation();
     });
   }
 
@@ -137,16 +129,12 @@ export class Pinning {
    * @param {number} camera
    * @param {{x: number, y: number}} at
    */
-  #hit(pane, camera, at) {
-    const { facts } = this.#store;
-    let nearest = null;
-    let reach = HEAD_REACH;
-    for (const one of placedPins(facts, pane.view, camera)) {
-      const distance = Math.hypot(one.headX - at.x, one.headY - at.y);
-      if (distance < reach) [nearest, reach] = [one, distance];
-    }
-    if (nearest || this.#joint(pane, at)) return nearest?.pin ?? null;
-    return placedPins(facts, pane.view, camera).find(({ x, y }) => Math.hypot(x - at.x, y - at.y) < POINT_REACH)?.pin ?? null;
+  function pinAt(pane, camera, at) {
+    const pins = placedPins(store.facts, pane.view, camera);
+    const from = (/** @type {typeof pins[number]} */ { headX, headY }) => Math.hypot(headX - at.x, headY - at.y);
+    const [nearest] = pins.filter((one) => from(one) < HEAD_REACH).sort((a, b) => from(a) - from(b));
+    if (nearest || jointAt(pane, at)) return nearest?.pin ?? null;
+    return pins.find(({ x, y }) => Math.hypot(x - at.x, y - at.y) < POINT_REACH)?.pin ?? null;
   }
 
   /**
@@ -155,8 +143,8 @@ export class Pinning {
    * @param {Pane} pane
    * @param {{x: number, y: number}} at
    */
-  #joint(pane, at) {
-    if (!this.#store.facts.layers.shown.joints) return null;
+  function jointAt(pane, at) {
+    if (!store.facts.layers.shown.joints) return null;
     const from = (/** @type {{x: number, y: number}} */ { x, y }) => Math.hypot(x - at.x, y - at.y);
     const [nearest] = pane.graspableHandles().sort((a, b) => from(a) - from(b));
     return nearest && from(nearest) <= GRAB_RADIUS ? nearest.handle : null;
@@ -167,27 +155,24 @@ export class Pinning {
    * @param {Pane} pane
    * @param {number} camera
    */
-  #down(event, pane, camera) {
-    const { pinning, pressed, state, shown } = this.#store.facts;
-    if (this.#held || event.button === 1 || !state || !shown) return;
+  function down(event, pane, camera) {
+    const { pinning, pressed, state, shown } = store.facts;
+    if (held || event.button === 1 || !state || !shown) return;
     const at = pane.locate(event);
-    const hit = this.#hit(pane, camera, at);
+    const hit = pinAt(pane, camera, at);
     const isSetting = event.button === 0 && (pinning || event.ctrlKey || event.metaKey);
     if (!hit && !isSetting) return;
     event.stopImmediatePropagation();
-    if (!this.#store.isSettled) return;
+    if (!store.isSettled) return;
     if (event.button === 2 && hit) {
-      this.#unpin(hit.person, hit.point, camera);
-      this.#store.set({ pinHover: null });
+      unpin(hit.person, hit.point, camera);
+      store.set({ pinHover: null });
       return;
     }
     if (event.button !== 0) return;
     const { person, point } = pressed?.state === state ? pressed : state;
-    const joint = point === null ? this.#joint(pane, at) : { person, point };
-    if (!hit && !joint) {
-      this.#say("Select a joint first: click it in a view, then Ctrl+click to pin it.");
-      return;
-    }
+    const joint = point === null ? jointAt(pane, at) : { person, point };
+    if (!hit && !joint) return say("Select a joint first: click it in a view, then Ctrl+click to pin it.");
     // Among crowded joints, a click refers to the selected joint, even if another joint's pin is nearer.
     const isOwn = hit && (!isSetting || (hit.person === joint?.person && hit.point === joint.point));
     const pointer = pane.view.toImage(at.x, at.y);
@@ -196,16 +181,16 @@ export class Pinning {
     const offset = { u: pin.u - pointer.u, v: pin.v - pointer.v };
     pane.surface.setPointerCapture(event.pointerId);
     pane.surface.classList.add("is-dragging");
-    this.#held = { pane, frame: shown.frame, pointer: event.pointerId, start: at, offset, pin, begun: false };
-    this.#store.set({ dragging: true, hover: null, hoverPart: null, heldPin: pin });
-    if (isOwn) this.#send({ type: "select", person: pin.person, point: pin.point });
-    else this.#begin(this.#held);
+    held = { pane, frame: shown.frame, pointer: event.pointerId, start: at, offset, pin, begun: false };
+    store.set({ dragging: true, hover: null, hoverPart: null, heldPin: pin });
+    if (isOwn) send({ type: "select", person: pin.person, point: pin.point });
+    else begin(held);
   }
 
   /** @param {Held} held */
-  #begin(held) {
+  function begin(held) {
     held.begun = true;
-    this.#message("start", held.pin);
+    message("start", held.pin);
   }
 
   /**
@@ -213,38 +198,35 @@ export class Pinning {
    * @param {Pane} pane
    * @param {number} camera
    */
-  #move(event, pane, camera) {
-    const held = this.#held;
-    if (!held) {
-      if (event.buttons === 0) this.#hover(event, pane, camera);
-      return;
-    }
+  function move(event, pane, camera) {
+    const moved = held;
+    if (!moved) return event.buttons === 0 && hover(event, pane, camera);
     event.stopImmediatePropagation();
-    if (event.pointerId !== held.pointer) return;
-    const at = held.pane.locate(event);
-    const isFar = Math.hypot(at.x - held.start.x, at.y - held.start.y) >= DRAG_THRESHOLD;
+    if (event.pointerId !== moved.pointer) return;
+    const at = moved.pane.locate(event);
+    const isFar = Math.hypot(at.x - moved.start.x, at.y - moved.start.y) >= DRAG_THRESHOLD;
     // Small movements during a click do not move the pin.
-    if (!isFar && held.start.x !== Infinity) return;
-    held.start = { x: Infinity, y: Infinity };
-    if (!held.begun) this.#begin(held);
-    const { u, v } = held.pane.view.toImage(at.x, at.y);
-    held.pin = { ...held.pin, ...this.#within(held.pin.camera, u + held.offset.u, v + held.offset.v) };
-    this.#store.set({ heldPin: { ...held.pin, model_u: null, model_v: null } });
-    if (this.#moveScheduled) return;
-    this.#moveScheduled = true;
+    if (!isFar && moved.start.x !== Infinity) return;
+    moved.start = { x: Infinity, y: Infinity };
+    if (!moved.begun) begin(moved);
+    const { u, v } = moved.pane.view.toImage(at.x, at.y);
+    moved.pin = { ...moved.pin, ...within(moved.pin.camera, u + moved.offset.u, v + moved.offset.v) };
+    store.set({ heldPin: { ...moved.pin, model_u: null, model_v: null } });
+    if (moveScheduled) return;
+    moveScheduled = true;
     requestAnimationFrame(() => {
-      this.#moveScheduled = false;
-      if (this.#held === held) this.#message("move", held.pin);
+      moveScheduled = false;
+      if (held === moved) message("move", moved.pin);
     });
   }
 
   /** @param {PointerEvent} event */
-  #up(event) {
-    if (!this.#held) return;
+  function up(event) {
+    if (!held) return;
     event.stopImmediatePropagation();
-    if (event.pointerId !== this.#held.pointer) return;
-    if (this.#held.begun) this.#message("end", this.#held.pin);
-    this.#release(this.#held.begun);
+    if (event.pointerId !== held.pointer) return;
+    if (held.begun) message("end", held.pin);
+    release(held.begun);
   }
 
   /**
@@ -252,18 +234,18 @@ export class Pinning {
    * @param {Pane} pane
    * @param {number} camera
    */
-  #hover(event, pane, camera) {
-    const { facts } = this.#store;
-    const hit = this.#hit(pane, camera, pane.locate(event));
+  function hover(event, pane, camera) {
+    const { facts } = store;
+    const hit = pinAt(pane, camera, pane.locate(event));
     const previous = facts.pinHover;
     if (hit ? !isSame(hit, previous) : previous) {
-      this.#store.set({ pinHover: hit && { camera, person: hit.person, point: hit.point } });
+      store.set({ pinHover: hit && { camera, person: hit.person, point: hit.point } });
     }
     pane.surface.classList.toggle("is-over-pin", hit !== null);
     if (!hit && !facts.pinning) return;
     event.stopImmediatePropagation();
     pane.surface.classList.remove("is-over-joint", "is-over-part");
-    if (facts.hover || facts.hoverPart) this.#store.set({ hover: null, hoverPart: null });
+    if (facts.hover || facts.hoverPart) store.set({ hover: null, hoverPart: null });
   }
 
   /**
@@ -273,8 +255,8 @@ export class Pinning {
    * @param {number} u
    * @param {number} v
    */
-  #within(camera, u, v) {
-    const { width, height } = this.#store.facts.session?.cameras[camera] ?? { width: 0, height: 0 };
+  function within(camera, u, v) {
+    const { width, height } = store.facts.session?.cameras[camera] ?? { width: 0, height: 0 };
     return { u: Math.max(-0.5, Math.min(width - 0.5, u)), v: Math.max(-0.5, Math.min(height - 0.5, v)) };
   }
 
@@ -282,9 +264,9 @@ export class Pinning {
    * @param {"start" | "move" | "end" | "cancel"} phase
    * @param {import("../model/protocol.js").PinMark} pin
    */
-  #message(phase, { camera, person, point, u, v }) {
-    const { frame } = /** @type {Held} */ (this.#held);
-    this.#send({ type: "pin", phase, frame, camera, person, point, u, v, live: this.#store.facts.livePins });
+  function message(phase, { camera, person, point, u, v }) {
+    const { frame } = /** @type {Held} */ (held);
+    send({ type: "pin", phase, frame, camera, person, point, u, v, live: store.facts.livePins });
   }
 
   /**
@@ -292,18 +274,20 @@ export class Pinning {
    * @param {string | null} point
    * @param {number | null} camera
    */
-  #unpin(person, point, camera) {
-    const { state } = this.#store.facts;
-    if (state) this.#send({ type: "unpin", frame: state.frame, person, point, camera });
+  function unpin(person, point, camera) {
+    const { state } = store.facts;
+    if (state) send({ type: "unpin", frame: state.frame, person, point, camera });
   }
 
   /** @param {boolean} isKept whether to show the pin at its last position until the program's overlay arrives */
-  #release(isKept) {
-    const held = this.#held;
+  function release(isKept) {
     if (!held) return;
-    this.#held = null;
-    held.pane.surface.classList.remove("is-dragging");
-    this.#store.set({ dragging: false, ...(isKept ? {} : { heldPin: null }) });
-    setTimeout(() => !this.#held && this.#store.facts.heldPin && this.#store.set({ heldPin: null }), RESPONSE_MS);
+    const { surface } = held.pane;
+    held = null;
+    surface.classList.remove("is-dragging");
+    store.set({ dragging: false, ...(isKept ? {} : { heldPin: null }) });
+    setTimeout(() => !held && store.facts.heldPin && store.set({ heldPin: null }), RESPONSE_MS);
   }
+
+  return { toggle, toggleLive, cancel, remove, clear, fit, limb, fitLimb, takeLimbBack, watch };
 }

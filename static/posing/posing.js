@@ -11,70 +11,56 @@ const DEFAULT_STEPS = { cm: 1, deg: 5 };
 /**
  * @typedef {{cm: number, deg: number}} Steps
  * @typedef {{right: number, up: number}} Way
+ * @typedef {import("../model/protocol.js").PoseEdit} PoseEdit
  */
 
-export class Posing {
-  #store;
-  #send;
-  #steps = restoredSteps();
-  /** @type {Map<string, import("../model/protocol.js").PoseEdit>} steps that wait to be sent, by target */
-  #waiting = new Map();
-  #sentAt = -Infinity;
+/**
+ * An edit without the fields that all have.
+ *
+ * @template T
+ * @typedef {T extends PoseEdit ? Omit<T, "type" | "frame" | "person"> & {frame?: number} : never} Change
+ */
+
+/** @typedef {ReturnType<typeof makePosing>} Posing */
+
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ */
+export function makePosing(store, send) {
+  /** Step sizes of the keys. */
+  const steps = restoredSteps();
+  /** @type {Map<string, PoseEdit>} steps that wait to be sent, by target */
+  const waiting = new Map();
+  let sentAt = -Infinity;
   /** @type {{point: string, at: number} | null} the joint requested last, until the program has confirmed it */
-  #requested = null;
+  let requested = null;
+
+  store.subscribe((changed) => {
+    if (requested?.point === store.facts.state?.point) requested = null;
+    if (changed.has("state") || changed.has("session")) keepDof();
+  });
+
+  /** @param {Partial<Steps>} changes */
+  function setSteps(changes) {
+    Object.assign(steps, changes);
+    localStorage.setItem(STEPS_KEY, JSON.stringify(steps));
+  }
 
   /**
-   * @param {import("../model/store.js").Store} store
-   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   * The active person, null before the session is known; the selected joint, if any; the joint to edit, which else is the
+   * root, with the indices of its degrees of freedom; and its limb.
    */
-  constructor(store, send) {
-    this.#store = store;
-    this.#send = send;
-    store.subscribe((changed) => {
-      if (this.#requested?.point === store.facts.state?.point) this.#requested = null;
-      if (changed.has("state") || changed.has("session")) this.#keepDof();
-    });
-  }
-
-  /** Step sizes of the keys. */
-  get steps() {
-    return this.#steps;
-  }
-
-  /** @param {Partial<Steps>} steps */
-  setSteps(steps) {
-    this.#steps = { ...this.#steps, ...steps };
-    localStorage.setItem(STEPS_KEY, JSON.stringify(this.#steps));
-  }
-
-  /** The active person; null before the session is known. */
-  get person() {
-    const { session, state } = this.#store.facts;
-    return (state && session?.people[state.person]) ?? null;
-  }
-
-  /** The selected joint; null if there is none. */
-  get selected() {
+  function joint() {
+    const { session, state } = store.facts;
+    const person = (state && session?.people[state.person]) ?? null;
     // Keys are faster than the program's answers. A request without an answer expires.
-    const requested = this.#requested && performance.now() < this.#requested.at + REQUEST_MS ? this.#requested.point : null;
-    return requested ?? this.#store.facts.state?.point ?? null;
-  }
-
-  /** The joint to edit: the selected joint, or else the root. */
-  get point() {
-    return this.selected ?? this.person?.points[0] ?? null;
-  }
-
-  /** Indices of the joint's degrees of freedom. */
-  get dofs() {
-    const { person, point } = this;
-    return (person && point && person.point_dofs[point]) || [];
-  }
-
-  /** Name and degrees of freedom of the joint's limb. */
-  get limb() {
-    const { person, point } = this;
-    return (person && point && person.point_limbs[point]) || { name: "", dofs: [] };
+    const awaited = requested && performance.now() < requested.at + REQUEST_MS ? requested.point : null;
+    const selected = awaited ?? state?.point ?? null;
+    const point = selected ?? person?.points[0] ?? null;
+    const dofs = (person && point && person.point_dofs[point]) || [];
+    const limb = (person && point && person.point_limbs[point]) || { name: "", dofs: [] };
+    return { person, selected, point, dofs, limb };
   }
 
   /**
@@ -82,32 +68,30 @@ export class Posing {
    *
    * @param {1 | -1} way
    */
-  toJoint(way) {
-    const { person, selected } = this;
+  function toJoint(way) {
+    const { person, selected } = joint();
     if (!person) return;
     const points = person.points;
     const at = selected === null ? (way > 0 ? -1 : 0) : points.indexOf(selected);
-    this.selectPoint(points[(at + way + points.length) % points.length]);
+    selectPoint(points[(at + way + points.length) % points.length]);
   }
 
   /** @param {string} point */
-  selectPoint(point) {
-    const { state } = this.#store.facts;
+  function selectPoint(point) {
+    const { state } = store.facts;
     if (!state) return;
-    this.#requested = { point, at: performance.now() };
-    this.#store.set({ state });
-    this.#send({ type: "select", person: state.person, point });
+    requested = { point, at: performance.now() };
+    store.set({ state });
+    send({ type: "select", person: state.person, point });
   }
 
   /** @param {number} dof */
-  selectDof(dof) {
-    if (dof !== this.#store.facts.dof) this.#store.set({ dof });
-  }
+  const selectDof = (dof) => dof !== store.facts.dof && store.set({ dof });
 
   /** Select the next degree of freedom of the joint. */
-  nextDof() {
-    const { dofs } = this;
-    if (dofs.length) this.selectDof(dofs[(dofs.indexOf(this.#store.facts.dof ?? -1) + 1) % dofs.length]);
+  function nextDof() {
+    const { dofs } = joint();
+    if (dofs.length) selectDof(dofs[(dofs.indexOf(store.facts.dof ?? -1) + 1) % dofs.length]);
   }
 
   /**
@@ -116,13 +100,13 @@ export class Posing {
    * @param {Way} way
    * @param {number} factor
    */
-  nudge(way, factor) {
-    const { state, active, filled } = this.#store.facts;
+  function nudge(way, factor) {
+    const { state, active, filled } = store.facts;
     if (!state) return;
     const camera = filled ?? active ?? 0;
-    const [right, up] = [way.right * factor * this.#steps.cm, way.up * factor * this.#steps.cm];
-    const point = this.selected;
-    this.#gather(`nudge ${camera} ${point}`, { ...this.#head(), action: "nudge", point, camera, right, up });
+    const [right, up] = [way.right * factor * steps.cm, way.up * factor * steps.cm];
+    const point = joint().selected;
+    gather(`nudge ${camera} ${point}`, { ...head(), action: "nudge", point, camera, right, up });
   }
 
   /**
@@ -130,11 +114,10 @@ export class Posing {
    *
    * @param {number} factor
    */
-  turn(factor) {
-    const { dof } = this.#store.facts;
-    const info = dof === null ? undefined : this.person?.dofs[dof];
-    if (dof === null || !info) return;
-    this.turnDofs([dof], factor * this.#steps[info.unit]);
+  function turn(factor) {
+    const { dof } = store.facts;
+    const info = dof === null ? undefined : joint().person?.dofs[dof];
+    if (dof !== null && info) turnDofs([dof], factor * steps[info.unit]);
   }
 
   /**
@@ -144,19 +127,18 @@ export class Posing {
    * @param {number | null} by null takes the drag back
    * @param {{drag: number, frame: number} | null} drag its number and frame, from whose start the step counts
    */
-  turnDofs(dofs, by, drag = null) {
-    const step = { ...this.#head(), ...drag, action: /** @type {const} */ ("turn"), dofs, by };
-    if (by === null) this.#edit(step);
-    else this.#gather(`turn ${dofs} ${drag?.drag}`, step);
+  function turnDofs(dofs, by, drag = null) {
+    const start = drag && { drag: drag.drag, frame: drag.frame };
+    const step = { ...head(), ...start, action: /** @type {const} */ ("turn"), dofs, by };
+    if (by === null) edit(step);
+    else gather(`turn ${dofs} ${drag?.drag}`, step);
   }
 
   /**
    * @param {number} dof
    * @param {number} value in degrees or centimetres
    */
-  set(dof, value) {
-    this.#edit({ ...this.#head(), action: "set", dof, value });
-  }
+  const set = (dof, value) => edit({ action: "set", dof, value });
 
   /**
    * Set a value repeatedly, as a slider does. Only the newest waiting value is sent.
@@ -164,52 +146,38 @@ export class Posing {
    * @param {number} dof
    * @param {number} value in degrees or centimetres
    */
-  slide(dof, value) {
-    this.#gather(`set ${dof}`, { ...this.#head(), action: "set", dof, value });
-  }
+  const slide = (dof, value) => gather(`set ${dof}`, { ...head(), action: "set", dof, value });
 
-  mirror() {
-    this.#edit({ ...this.#head(), action: "mirror" });
-  }
+  const mirror = () => edit({ action: "mirror" });
 
   /**
    * Switch to the best alternative pose, or back.
    *
    * @param {number} [rank] of another one among those of the reason
    */
-  takeAlternative(rank) {
-    this.#edit({ ...this.#head(), action: "alternative", rank: rank ?? null });
-  }
+  const takeAlternative = (rank) => edit({ action: "alternative", rank: rank ?? null });
 
-  resetLimb() {
-    this.#edit({ ...this.#head(), action: "reset", point: this.selected });
-  }
+  const resetLimb = () => edit({ action: "reset", point: joint().selected });
 
   /** @param {number} from */
-  copyFrom(from) {
-    this.#edit({ ...this.#head(), action: "copy", from });
-  }
+  const copyFrom = (from) => edit({ action: "copy", from });
 
   /**
    * Copy the joint angles of another person on this frame; position and orientation stay.
    *
    * @param {number} from
    */
-  copyPerson(from) {
-    if (from !== this.#head().person) this.#edit({ ...this.#head(), action: "copy_person", from });
+  function copyPerson(from) {
+    if (from !== head().person) edit({ action: "copy_person", from });
   }
 
   /** Copy the joint angles of the next person in the list. */
-  copyNextPerson() {
-    const count = this.#store.facts.session?.people.length ?? 1;
-    this.copyPerson((this.#head().person + 1) % count);
-  }
+  const copyNextPerson = () => copyPerson((head().person + 1) % (store.facts.session?.people.length ?? 1));
 
   /** @param {1 | -1} way */
-  copyNeighbour(way) {
-    const { frame } = this.#head();
-    const from = frame + way;
-    if (from >= 0 && from < (this.#store.facts.session?.n_frames ?? 0)) this.copyFrom(from);
+  function copyNeighbour(way) {
+    const from = head().frame + way;
+    if (from >= 0 && from < (store.facts.session?.n_frames ?? 0)) copyFrom(from);
   }
 
   /**
@@ -217,8 +185,8 @@ export class Posing {
    *
    * @param {number[]} dofs
    */
-  toggleLock(dofs) {
-    if (dofs.length) this.#edit({ ...this.#head(), action: "lock", dofs, locked: !this.isLocked(dofs) });
+  function toggleLock(dofs) {
+    if (dofs.length) edit({ action: "lock", dofs, locked: !isLocked(dofs) });
   }
 
   /**
@@ -226,51 +194,45 @@ export class Posing {
    *
    * @param {number[]} dofs
    */
-  isLocked(dofs) {
-    const locked = this.#store.facts.state?.locked ?? [];
+  function isLocked(dofs) {
+    const locked = store.facts.state?.locked ?? [];
     return dofs.length > 0 && dofs.every((dof) => locked.includes(dof));
   }
 
   /** Hold the joint in place while others are dragged, or release it. */
-  toggleHold() {
-    const { point } = this;
-    if (point) this.#edit({ ...this.#head(), action: "hold", point, held: !this.#isHeld(point) });
+  function toggleHold() {
+    const { overlay, state } = store.facts;
+    const { point } = joint();
+    const isHeld = overlay?.handles.some((one) => one.person === state?.person && one.point === point && one.held) ?? false;
+    if (point) edit({ action: "hold", point, held: !isHeld });
   }
 
   /** Release all held joints of the active person on the frame. */
-  releaseAll() {
-    this.#edit({ ...this.#head(), action: "hold", point: null, held: false });
-  }
-
-  /** @param {string} point */
-  #isHeld(point) {
-    const { overlay, state } = this.#store.facts;
-    return overlay?.handles.some((one) => one.person === state?.person && one.point === point && one.held) ?? false;
-  }
+  const releaseAll = () => edit({ action: "hold", point: null, held: false });
 
   /** Fields of every edit: the active person and the frame that is shown. */
-  #head() {
-    const { shown, state } = this.#store.facts;
+  function head() {
+    const { shown, state } = store.facts;
     return { type: /** @type {const} */ ("pose"), frame: shown?.frame ?? state?.frame ?? 0, person: state?.person ?? 0 };
   }
 
-  /** @param {import("../model/protocol.js").PoseEdit} edit */
-  #edit(edit) {
-    if (!this.#store.facts.connected) return;
-    this.#flush();
-    this.#send(edit);
+  /** @param {Change<PoseEdit>} change */
+  function edit(change) {
+    if (!store.facts.connected) return;
+    flush();
+    send(/** @type {PoseEdit} */ ({ ...head(), ...change }));
   }
 
   /**
    * Merge a step with waiting steps of the same target, since a held key repeats faster than poses can be drawn.
    *
    * @param {string} what
-   * @param {import("../model/protocol.js").PoseEdit & {action: "nudge" | "turn" | "set"}} step
+   * @param {PoseEdit & {action: "nudge" | "turn" | "set"}} step
    */
-  #gather(what, step) {
-    if (!this.#store.facts.connected) return;
+  function gather(what, step) {
+    if (!store.facts.connected) return;
     const key = `${step.frame} ${step.person} ${what}`;
-    const waits = this.#waiting.get(key);
+    const waits = waiting.get(key);
     if (waits?.action === "nudge" && step.action === "nudge") {
       waits.right += step.right;
       waits.up += step.up;
@@ -279,27 +241,32 @@ export class Posing {
     } else if (waits?.action === "set" && step.action === "set") {
       waits.value = step.value;
     } else {
-      if (this.#waiting.size === 0) setTimeout(() => this.#flush(), this.#sentAt + SEND_MS - performance.now());
-      this.#waiting.set(key, step);
+      if (waiting.size === 0) setTimeout(flush, sentAt + SEND_MS - performance.now());
+      waiting.set(key, step);
     }
   }
 
-  #flush() {
-    if (this.#waiting.size === 0) return;
-    this.#sentAt = performance.now();
-    for (const step of this.#waiting.values()) this.#send(step);
-    this.#waiting.clear();
+  function flush() {
+    if (waiting.size === 0) return;
+    sentAt = performance.now();
+    for (const step of waiting.values()) send(step);
+    waiting.clear();
   }
 
   /** Keep the selected degree of freedom among those of the joint. */
-  #keepDof() {
-    const { dofs } = this;
-    const { dof } = this.#store.facts;
+  function keepDof() {
+    const { dofs } = joint();
+    const { dof } = store.facts;
     if (dof === null || !dofs.includes(dof)) {
       const first = dofs[0] ?? null;
-      if (first !== dof) this.#store.set({ dof: first });
+      if (first !== dof) store.set({ dof: first });
     }
   }
+
+  return {
+    steps, setSteps, joint, toJoint, selectPoint, selectDof, nextDof, nudge, turn, turnDofs, set, slide, mirror, takeAlternative,
+    resetLimb, copyFrom, copyPerson, copyNextPerson, copyNeighbour, toggleLock, isLocked, toggleHold, releaseAll,
+  }; // prettier-ignore
 }
 
 /** @returns {Steps} */

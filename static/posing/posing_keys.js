@@ -1,6 +1,6 @@
 /** Keys that edit poses and pins. */
 
-import { inArea } from "../widgets/key_matching.js";
+import { command, inArea } from "../widgets/key_matching.js";
 import { factorOf } from "../widgets/number_field.js";
 
 /** @type {[string, string, import("./posing.js").Way][]} */
@@ -33,8 +33,8 @@ export function posingBindings(posing, jointBar, why) {
     { keys: ["+"], label: "Increase the selected degree of freedom by one step", matches: sign(["+", "="]), run: () => posing.turn(1) },
     { keys: ["-"], label: "Decrease the selected degree of freedom by one step", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
     { label: "Type a value for the selected degree of freedom", run: () => jointBar.type() },
-    { keys: ["O"], label: "Lock or unlock the joint", run: () => posing.toggleLock(posing.dofs) },
-    { label: "Lock or unlock the joint's limb", run: () => posing.toggleLock(posing.limb.dofs) },
+    { keys: ["O"], label: "Lock or unlock the joint", run: () => posing.toggleLock(posing.joint().dofs) },
+    { label: "Lock or unlock the joint's limb", run: () => posing.toggleLock(posing.joint().limb.dofs) },
     { label: "Hold the joint in place while others are dragged, or release it", run: () => posing.toggleHold() },
     { label: "Release all held joints of the person on this frame", run: () => posing.releaseAll() },
     { label: "Mirror the pose left to right", run: () => posing.mirror() },
@@ -69,17 +69,14 @@ export function pinBindings(pinning, why) {
  * @param {() => string | null} away
  */
 export function depthBindings({ facts }, grid, away) {
-  return inArea("Posing", [
-    {
-      label: "Fill the grid with the view that looks across the last placed joint",
-      words: "depth opposite side",
-      why: () => away() ?? (facts.state?.view_across == null ? "The views have shown the depth of the last placed joint." : null),
-      run: () => {
-        const camera = facts.state?.view_across ?? null;
-        if (camera !== null && camera !== facts.filled) grid.toggleFill(camera);
-      },
-    },
-  ]);
+  const across = () => facts.state?.view_across ?? null;
+  const why = () => away() ?? (across() === null ? "The views have shown the depth of the last placed joint." : null);
+  const run = () => {
+    const camera = across();
+    if (camera !== null && camera !== facts.filled) grid.toggleFill(camera);
+  };
+  const label = "Fill the grid with the view that looks across the last placed joint";
+  return inArea("Posing", [command(label, "depth opposite side", run, why)]);
 }
 
 /**
@@ -88,5 +85,5 @@ export function depthBindings({ facts }, grid, away) {
  */
 export function epipolarBindings(check, why) {
   const words = "calibration check cameras line of sight distance pointer";
-  return inArea("Views", [{ label: "Epipolar lines (toggle)", words, run: () => check.toggle() }], why);
+  return inArea("Views", [command("Epipolar lines (toggle)", words, check.toggle, why)]);
 }

@@ -8,7 +8,7 @@ import { byId } from "../widgets/elements.js";
 import { drawsInSoftware } from "../widgets/webgl.js";
 import { loadScene } from "./appearance.js";
 import { mountCameraView } from "./camera_view.js";
-import { Floor } from "./floor.js";
+import { makeFloor } from "./floor.js";
 import { pauseScene } from "./pause.js";
 import { sceneBindings } from "./scene_keys.js";
 
@@ -25,7 +25,7 @@ const BEFORE_COST = new Set(["posing", "contours", "evidence", "cost"]);
  */
 export function mount({ store, send, reasons }, { grid }) {
   const frame = byId("scene", HTMLIFrameElement);
-  const floor = new Floor(byId("panes", HTMLElement), store, grid, send);
+  const floor = makeFloor(byId("panes", HTMLElement), store, grid, send);
   const cameraView = mountCameraView(store, grid, send);
   const isSoftware = drawsInSoftware();
   if (isSoftware) pauseScene(frame, store);

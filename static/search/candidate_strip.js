@@ -1,6 +1,7 @@
 /** Best candidates of a search as stick figures, in the view where they differ most. */
 
-import { prepare, stroke } from "../panes/drawing.js";
+import { stroke } from "../panes/drawing.js";
+import { prepare } from "../widgets/canvas.js";
 import { byId, make } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
 import { selectedRun } from "../model/search_runs.js";
@@ -21,12 +22,7 @@ export function mountCandidateStrip(store, send) {
   /** @type {unknown[]} the arguments of the last drawing; candidates change less often than steps */
   let drawnFrom = [];
   element.append(label, list);
-
-  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  function update(changed) {
-    const facts = ["drawer", "searchCandidates", "searchRun", "filled", "shown"];
-    if (facts.some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) show();
-  }
+  store.onTab("search", ["searchCandidates", "searchRun", "filled", "shown"], show);
 
   function show() {
     const { searchCandidates, session, filled, shown } = store.facts;
@@ -116,8 +112,6 @@ export function mountCandidateStrip(store, send) {
       first += 2 * found.people[p];
     });
   }
-
-  return { update };
 }
 
 /**

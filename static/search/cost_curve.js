@@ -2,11 +2,10 @@
  * Plot of best and tested costs by number of poses evaluated, with stages and other runs. A click replays that step.
  */
 
-import { fillRect, setText } from "../widgets/canvas.js";
+import { fillRect, prepare, setText } from "../widgets/canvas.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
-import { prepare } from "../panes/drawing.js";
 import { byId, make } from "../widgets/elements.js";
-import { Plot } from "../widgets/plot.js";
+import { Plot, nearest } from "../widgets/plot.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count } from "../widgets/text.js";
 
@@ -29,13 +28,9 @@ export function mountCostCurve(store, send) {
   let curvePlot = /** @type {Plot | null} */ (null);
   box.append(lines, read);
   new ResizeObserver(() => draw()).observe(box);
+  store.onTab("search", ["searchSteps", "searchRuns", "searchRun"], draw);
   store.on(["theme"], () => draw());
   listen();
-
-  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  function update(changed) {
-    if (["drawer", "searchSteps", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"drawer"} */ (f)))) draw();
-  }
 
   function getRun() {
     return selectedRun(store.facts);
@@ -76,15 +71,7 @@ export function mountCostCurve(store, send) {
   function stepUnder(event) {
     const steps = getSteps();
     if (!curvePlot || !steps || steps.count === 0) return null;
-    const value = curvePlot.valueAt(event.clientX - box.getBoundingClientRect().left);
-    let [low, high] = [0, steps.count - 1];
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (steps.evaluations[middle] < value) low = middle + 1;
-      else high = middle;
-    }
-    const isFormerNearer = low > 0 && value - steps.evaluations[low - 1] < steps.evaluations[low] - value;
-    return isFormerNearer ? low - 1 : low;
+    return nearest(steps.evaluations, curvePlot.valueAt(event.clientX - box.getBoundingClientRect().left));
   }
 
   function draw() {
@@ -98,8 +85,7 @@ export function mountCostCurve(store, send) {
     if (runs.length === 0) {
       curvePlot = null;
       read.textContent = "";
-      context.font = "12px system-ui, sans-serif";
-      context.textAlign = "center";
+      setText(context, "center", "alphabetic", "12px");
       context.fillStyle = style.getPropertyValue("--muted");
       context.fillText("Start a search: Step, Stage or Frame", clientWidth / 2, clientHeight / 2);
       return;
@@ -153,8 +139,6 @@ export function mountCostCurve(store, send) {
     const costs = `tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
     read.textContent = `${where}${count(steps.evaluations[at])} poses · ${costs}`;
   }
-
-  return { update };
 }
 
 /**

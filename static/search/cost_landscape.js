@@ -1,8 +1,7 @@
 /** Plot of the cost over the range of one degree of freedom. Hovering reads values, a click sets the value. */
 
-import { fillRect } from "../widgets/canvas.js";
+import { circlePath, fillRect, prepare, setText } from "../widgets/canvas.js";
 import { colorName, dashOf, lineSwatch } from "../widgets/series_lines.js";
-import { prepare } from "../panes/drawing.js";
 import { byId, make, onChange, textButton } from "../widgets/elements.js";
 import { Plot, nearest } from "../widgets/plot.js";
 import { displayName } from "../widgets/text.js";
@@ -25,7 +24,6 @@ export function mountCostLandscape(store, send) {
   const waiting = make("p", "landscape-waiting");
   let hovered = /** @type {number | null} */ (null);
   let lastPlot = /** @type {Plot | null} */ (null);
-  let isShown = false;
   /** The names that the list of degrees of freedom was built for. */
   let listed = "";
   onChange(choice, () => send({ type: "landscape", dof: choice.value }));
@@ -35,27 +33,11 @@ export function mountCostLandscape(store, send) {
   });
   controls.append(choice, toMinimum, legend);
   element.append(canvas, waiting);
-  store.subscribe((changed) => {
-    if (changed.has("drawer")) open();
-    if (!isShown) return;
-    if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "landscape" });
-    if (changed.has("drawer") || changed.has("dof") || changed.has("connected")) followSelection();
-    if (changed.has("landscape") || changed.has("session")) show();
-  });
+  store.onTab("landscape", ["dof", "connected"], followSelection);
+  store.onTab("landscape", ["landscape", "session"], show);
   new ResizeObserver(() => draw()).observe(element);
   store.on(["theme"], show);
   listen();
-  open();
-
-  function open() {
-    const { drawer, connected } = store.facts;
-    const isOpen = drawer === "landscape";
-    element.hidden = controls.hidden = !isOpen;
-    if (isOpen === isShown) return;
-    isShown = isOpen;
-    if (connected && (isOpen || drawer !== "search")) send({ type: "watch", tab: isOpen ? "landscape" : null });
-    if (isOpen) show();
-  }
 
   /** Show the degree of freedom that the keys change, if a joint is selected. */
   function followSelection() {
@@ -112,7 +94,7 @@ export function mountCostLandscape(store, send) {
 
   function draw() {
     const { clientWidth, clientHeight } = element;
-    if (clientWidth === 0 || !isShown) return;
+    if (clientWidth === 0 || store.facts.drawer !== "landscape") return;
     const context = prepare(canvas, clientWidth, clientHeight, true);
     const found = store.facts.landscape;
     if (!found) return;
@@ -157,17 +139,13 @@ export function mountCostLandscape(store, send) {
     const now = plot.x(found.current * factor);
     context.fillStyle = context.strokeStyle = style.getPropertyValue("--text");
     context.fillRect(now - 0.5, plot.top, 1, height);
-    context.font = "600 10.5px system-ui, sans-serif";
-    context.textBaseline = "top";
     const isRight = now > (plot.left + plot.right) / 2;
-    context.textAlign = isRight ? "right" : "left";
+    setText(context, isRight ? "right" : "left", "top", "600 10.5px");
     context.fillText("now", now + (isRight ? -4 : 4), plot.top + 2);
     const min = indexOfMin(found.total);
     const [x, y] = [plot.x(found.values[min] * factor), plot.y(found.total[min])];
-    context.beginPath();
-    context.arc(x, y, 4.5, 0, 2 * Math.PI);
     context.lineWidth = 2;
-    context.stroke();
+    context.stroke(circlePath(x, y, 4.5));
     if (hovered !== null) {
       fillRect(context, style.getPropertyValue("--text"), plot.x(found.values[hovered] * factor) - 0.5, plot.top, 1, height, 0.5);
     }

@@ -19,7 +19,25 @@ import { mountSearchPanel } from "./search_panel.js";
  */
 export function mount({ store, send, actions, navigation, reasons }, { drawer }) {
   mountSearchPanel(store, actions, send);
+  watchTab(store, send);
   mountCostLandscape(store, send);
   mountRunComparison(store, navigation, actions, () => drawer.open("runs"));
   return { bindings: searchBindings(store, actions, reasons) };
+}
+
+/**
+ * Tell the program which of the tabs that it computes for is open.
+ *
+ * @param {import("../model/store.js").Store} store
+ * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+ */
+function watchTab(store, send) {
+  /** @type {"search" | "landscape" | null} */
+  let watched = null;
+  store.on(["drawer", "connected"], () => {
+    const { drawer, connected } = store.facts;
+    const tab = connected && (drawer === "search" || drawer === "landscape") ? drawer : null;
+    if (connected && tab !== watched) send({ type: "watch", tab });
+    watched = tab;
+  });
 }

@@ -33,9 +33,9 @@ export function mountReplayBar(store, send) {
   });
   byId("replay-bar", HTMLElement).append(make("div", "group", ...buttons), slider, text, leave);
 
-  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  function update(changed) {
-    if (!["drawer", "searchRuns", "searchRun", "searchSteps"].some((f) => changed.has(/** @type {"drawer"} */ (f)))) return;
+  store.onTab("search", ["searchRuns", "searchRun", "searchSteps"], show);
+
+  function show() {
     const { searchRuns } = store.facts;
     const run = selectedRun(store.facts);
     const replay = searchRuns?.replay ?? null;
@@ -99,6 +99,4 @@ export function mountReplayBar(store, send) {
     timer = null;
     play.setAttribute("aria-pressed", "false");
   }
-
-  return { update };
 }

@@ -18,8 +18,6 @@ const LEAST_PX = 0.005;
  * @param {() => void} open opens the tab
  */
 export function mountRunComparison(store, navigation, actions, open) {
-  const panel = byId("run-comparison", HTMLElement);
-  const controls = byId("run-comparison-controls", HTMLElement);
   const text = byId("run-comparison-text", HTMLElement);
   const empty = byId("run-comparison-empty", HTMLElement);
   const table = byId("run-comparison-table", HTMLTableElement);
@@ -39,12 +37,9 @@ export function mountRunComparison(store, navigation, actions, open) {
     if (changed.has("state")) followWork();
     if (changed.has("rangeComparison")) followRun();
     else if (changed.has("drawer") && store.facts.drawer === null && lastRun) actions.compareRange(false);
-    const isOpen = store.facts.drawer === "runs";
-    panel.hidden = controls.hidden = !isOpen;
-    if (!isOpen) return;
-    if (["drawer", "rangeComparison", "state", "connected"].some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) show();
-    if (changed.has("drawer") || changed.has("rangeComparison") || changed.has("target")) mark();
   });
+  store.onTab("runs", ["rangeComparison", "state", "connected"], show);
+  store.onTab("runs", ["target"], mark);
 
   /** Note the open tab when a run ends: its comparison follows, but a tab that is opened meanwhile stays. */
   function followWork() {

@@ -17,9 +17,7 @@ export function mountRunList(store, send) {
   const head = make("h3", { title: "Searches of this frame. Earlier runs are kept for comparison" }, "Runs");
   byId("search-runs", HTMLElement).append(head, list);
 
-  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  function update(changed) {
-    if (!["drawer", "searchRuns", "searchRun"].some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) return;
+  store.onTab("search", ["searchRuns", "searchRun"], () => {
     const { searchRuns } = store.facts;
     const runs = [...(searchRuns?.runs ?? [])].reverse();
     const numbers = runs.map(({ number }) => number);
@@ -30,7 +28,7 @@ export function mountRunList(store, send) {
       if (numbers.length === 0) list.textContent = "No runs";
     }
     for (const run of runs) show(run);
-  }
+  });
 
   /**
    * @param {number} number
@@ -69,8 +67,6 @@ export function mountRunList(store, send) {
     row.compare.setAttribute("aria-pressed", String(searchRuns?.compared === run.number));
     row.compare.disabled = row.take.disabled = run.steps === 0 || run.state === "running";
   }
-
-  return { update };
 }
 
 /**

@@ -36,14 +36,11 @@ export function mountSearchTree(store, change) {
   /** @type {{field: ReturnType<typeof makeNumber>, read: (setup: Setup) => number | null}[]} */
   let rowFields = [];
 
-  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
-  function update(changed) {
+  store.onTab("search", ["searchSetup", "settings", "session"], () => {
     const { searchSetup, settings, session } = store.facts;
-    if (!searchSetup || !settings || !session) return;
-    const isOther = ["searchSetup", "settings", "session", "drawer"].some((fact) => changed.has(/** @type {"session"} */ (fact)));
-    if (isOther) build({ ...settings.search, ...searchSetup }, session);
-    showRun();
-  }
+    if (searchSetup && settings && session) build({ ...settings.search, ...searchSetup }, session);
+  });
+  store.onTab("search", ["searchSetup", "settings", "session", "searchRuns", "searchRun"], showRun);
 
   /**
    * @param {Setup} setup
@@ -96,11 +93,7 @@ export function mountSearchTree(store, change) {
   function root(setup, name, dofs, person) {
     const fields = FIELDS.map(({ key, unit, title }) => {
       if (person > 0) return cell("", "", "");
-      const field = makeNumber({
-        label: "",
-        title: `${title}. Default for all stages`,
-        change: (value) => value !== null && change({ [key]: value / unit }),
-      });
+      const field = makeNumber("", `${title}. Default for all stages`, (value) => value !== null && change({ [key]: value / unit }));
       rowFields.push({ field, read: (now) => now[key] * unit });
       return field.element;
     });
@@ -124,12 +117,8 @@ export function mountSearchTree(store, change) {
     label.dataset.leaf = `${person} ${name}`;
     const fields = FIELDS.map(({ key, has, unit, title }) => {
       if (leaf[has] === 0) return cell("", "", "");
-      const field = makeNumber({
-        label: "",
-        title: `${title}, for ${name}. Empty: default`,
-        placeholder: "mixed",
-        change: (value) => change({ leaf: { person, name, [key]: value === null ? null : value / unit } }),
-      });
+      const set = (/** @type {number | null} */ value) => change({ leaf: { person, name, [key]: value === null ? null : value / unit } });
+      const field = makeNumber("", `${title}, for ${name}. Empty: default`, set, "mixed");
       rowFields.push({ field, read: (now) => valueOf(now, person, name, key, unit) });
       return field.element;
     });
@@ -148,17 +137,13 @@ export function mountSearchTree(store, change) {
    */
   function rest(setup) {
     const line = make("div", "tree-rest");
-    const patience = makeNumber({
-      label: "Patience",
-      title: "A stage ends after this many expansions without improvement",
-      change: (value) => value !== null && change({ patience: Math.round(value) }),
-    });
-    const max = makeNumber({
-      label: "Max.",
-      title: "Maximum number of expansions per stage",
-      change: (value) => value !== null && change({ max_expansions: Math.round(value) }),
-    });
-    rowFields.push({ field: patience, read: (now) => now.patience }, { field: max, read: (now) => now.max_expansions });
+    const whole = (/** @type {"patience" | "max_expansions"} */ key, /** @type {string} */ label, /** @type {string} */ title) => {
+      const field = makeNumber(label, title, (value) => value !== null && change({ [key]: Math.round(value) }));
+      rowFields.push({ field, read: (now) => now[key] });
+      return field.element;
+    };
+    const patience = whole("patience", "Patience", "A stage ends after this many expansions without improvement");
+    const max = whole("max_expansions", "Max.", "Maximum number of expansions per stage");
     const passes = make("label", { className: "search-field", title: "Step factors: all stages are searched once per factor. The paper uses 1" });
     const text = make("input", { type: "text", value: setup.passes.join(" "), "aria-label": passes.title });
     text.addEventListener("change", () => {
@@ -172,7 +157,7 @@ export function mountSearchTree(store, change) {
     const box = make("input", { type: "checkbox", checked: setup.limbs_apart });
     onChange(box, () => change({ limbs_apart: box.checked }));
     apart.append(box, "separate limbs");
-    line.append(passes, patience.element, max.element, apart);
+    line.append(passes, patience, max, apart);
     return line;
   }
 
@@ -189,8 +174,6 @@ export function mountSearchTree(store, change) {
       element.title = stage && text ? describe(stage) : "Not searched";
     }
   }
-
-  return { update };
 }
 
 /** @param {import("../model/protocol.js").SearchStage} stage */

@@ -6,9 +6,12 @@ import { make } from "../widgets/elements.js";
  * Make a field for an optional number. Input is sent when it is entered; values of the program are shown unless the user
  * is typing.
  *
- * @param {{label: string, title: string, placeholder?: string, change: (value: number | null) => void}} options
+ * @param {string} label
+ * @param {string} title
+ * @param {(value: number | null) => void} change
+ * @param {string} [placeholder]
  */
-export function makeNumber({ label, title, placeholder = "", change }) {
+export function makeNumber(label, title, change, placeholder = "") {
   const element = make("label", { className: "search-field", title });
   const input = make("input", { type: "number", step: "any", placeholder, "aria-label": title });
   let shown = "";

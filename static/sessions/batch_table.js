@@ -1,6 +1,6 @@
 /** The table of a batch: a row for each recording, the one that needs a person most first. */
 
-import { make } from "../widgets/elements.js";
+import { make, makeTable } from "../widgets/elements.js";
 
 /**
  * @typedef {{name: string, session: string, state: string, expected_error_mm: number | null, share_doubted: number,
@@ -10,7 +10,7 @@ import { make } from "../widgets/elements.js";
  * @typedef {{name: string, totals: Totals, recordings: BatchRow[]}} Batch
  */
 
-const HEADS = ["Recording", "Error, mm", "Doubted", "Verified", "Seconds"];
+const HEADS = [["Recording"], ["Error, mm"], ["Doubted"], ["Verified"], ["Seconds"]];
 const STATES = /** @type {const} */ (["done", "failed", "running", "waiting"]);
 
 /**
@@ -23,21 +23,16 @@ export function batchTable({ name, totals, recordings }, open) {
   const counts = STATES.filter((state) => totals[state]).map((state) => `${totals[state]} ${state}`);
   const verified = `${Math.round(100 * totals.share_verified)}% verified, ${totals.hours.toFixed(1)} hours of workers`;
   const summary = make("summary", {}, make("b", {}, name), ` ${counts.join(", ")}; ${verified}`);
-  const table = make("table");
-  const head = table.createTHead().insertRow();
-  for (const text of HEADS) head.append(make("th", { scope: "col" }, text));
-  const body = table.createTBody();
-  for (const row of recordings) addRow(body.insertRow(), row, open);
-  return make("details", "batch", summary, table);
+  const rows = recordings.map((row) => rowOf(row, open));
+  return make("details", "batch", summary, makeTable("", HEADS, rows));
 }
 
 /**
- * @param {HTMLTableRowElement} line
  * @param {BatchRow} row
  * @param {(folder: string, at: {frame: number, person: string}) => void} open
  */
-function addRow(line, row, open) {
-  const first = line.insertCell();
+function rowOf(row, open) {
+  const first = make("td");
   if (row.state === "done") {
     const at = { frame: row.worst_frame ?? 0, person: row.worst_person };
     const title = `Close this session and open ${row.name} at frame ${at.frame}, where it is worst`;
@@ -54,5 +49,5 @@ function addRow(line, row, open) {
     isTracked ? `${row.verified}/${row.poses}` : "",
     row.seconds ? row.seconds.toFixed(0) : "",
   ];
-  for (const text of cells) line.insertCell().textContent = text;
+  return make("tr", {}, first, ...cells.map((text) => make("td", {}, text)));
 }

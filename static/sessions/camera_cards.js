@@ -13,47 +13,41 @@ import { previewOf } from "./path_picker.js";
 const ELSEWHERE = "\0";
 const DRAGGED = "application/x-quadrille-camera";
 
-export class CameraCards {
-  #list = byId("new-cameras", HTMLElement);
-  #note = byId("new-cameras-note", HTMLElement);
-  #changed;
-  #pick;
-  /** @type {Footage[]} */
-  #files = [];
-  /** @type {Map<string, Choice>} */
-  #choices = new Map();
+/** @typedef {ReturnType<typeof makeCameraCards>} CameraCards */
 
-  /**
-   * @param {() => void} changed called after a change by the user
-   * @param {(from: string, take: (path: string) => void) => void} pick lets the user choose other footage
-   */
-  constructor(changed, pick) {
-    this.#changed = changed;
-    this.#pick = pick;
-  }
+/**
+ * @param {() => void} changed called after a change by the user
+ * @param {(from: string, take: (path: string) => void) => void} pick lets the user choose other footage
+ */
+export function makeCameraCards(changed, pick) {
+  const list = byId("new-cameras", HTMLElement);
+  const note = byId("new-cameras-note", HTMLElement);
+  /** @type {Footage[]} */
+  let files = [];
+  /** @type {Map<string, Choice>} */
+  let choices = new Map();
 
   /**
    * Show the cameras.
    *
    * @param {string[]} names
-   * @param {Footage[]} files
+   * @param {Footage[]} all
    * @param {Record<string, string>} assigned footage by camera
    * @param {boolean} isKept whether choices of the user stay
    */
-  show(names, files, assigned, isKept) {
-    const before = isKept ? this.#choices : new Map();
-    this.#files = files;
-    this.#choices = new Map(
+  function show(names, all, assigned, isKept) {
+    const before = isKept ? choices : new Map();
+    files = all;
+    choices = new Map(
       names.map((name) => [name, before.get(name) ?? { footage: assigned[name] ?? "", side: name, offset: null }]),
     );
-    this.#draw();
+    draw();
   }
 
   /** The cameras that are used. @returns {CameraChoice[]} */
-  get chosen() {
-    return [...this.#choices]
-      .filter(([, { footage }]) => footage)
-      .map(([name, { footage, side, offset }]) => ({ name, footage, side_name: side, offset }));
+  function chosen() {
+    const used = [...choices].filter(([, { footage }]) => footage);
+    return used.map(([name, { footage, side, offset }]) => ({ name, footage, side_name: side, offset }));
   }
 
   /**
@@ -63,28 +57,28 @@ export class CameraCards {
    * @param {string} second
    * @param {boolean} withSide whether backgrounds and masks go with the footage
    */
-  exchange(first, second, withSide) {
-    const [a, b] = [this.#choices.get(first), this.#choices.get(second)];
+  function exchange(first, second, withSide) {
+    const [a, b] = [choices.get(first), choices.get(second)];
     if (!a || !b || first === second) return;
     [a.footage, b.footage] = [b.footage, a.footage];
     [a.offset, b.offset] = [b.offset, a.offset];
     if (withSide) [a.side, b.side] = [b.side, a.side];
-    this.#draw();
-    this.#changed();
+    draw();
+    changed();
   }
 
-  #draw() {
+  function draw() {
     const focused = document.activeElement instanceof HTMLElement ? document.activeElement.id : "";
-    this.#list.replaceChildren(...[...this.#choices].map(([name, choice], index) => this.#card(name, choice, index)));
+    list.replaceChildren(...[...choices].map(([name, choice], index) => makeCard(name, choice, index)));
     if (focused) document.getElementById(focused)?.focus();
-    const used = new Set([...this.#choices.values()].map(({ footage }) => footage));
-    const unused = this.#files.filter(({ path }) => !used.has(path)).map(({ name }) => name);
-    const out = [...this.#choices].filter(([, { footage }]) => !footage).map(([name]) => name);
+    const used = new Set([...choices.values()].map(({ footage }) => footage));
+    const unused = files.filter(({ path }) => !used.has(path)).map(({ name }) => name);
+    const out = [...choices].filter(([, { footage }]) => !footage).map(([name]) => name);
     const notes = [];
     if (out.length) notes.push(`Left out: ${listed(out)}.`);
-    if (this.#choices.size && unused.length) notes.push(`Not used: ${listed(unused)}.`);
-    if (this.#choices.size > 1) notes.push("Drag a picture onto another to exchange them.");
-    this.#note.textContent = notes.join(" ") || "Choose footage and calibration: the cameras appear here.";
+    if (choices.size && unused.length) notes.push(`Not used: ${listed(unused)}.`);
+    if (choices.size > 1) notes.push("Drag a picture onto another to exchange them.");
+    note.textContent = notes.join(" ") || "Choose footage and calibration: the cameras appear here.";
   }
 
   /**
@@ -92,7 +86,7 @@ export class CameraCards {
    * @param {Choice} choice
    * @param {number} index
    */
-  #card(name, choice, index) {
+  function makeCard(name, choice, index) {
     const card = make("li", { draggable: true });
     card.classList.toggle("is-left-out", !choice.footage);
     const picture = choice.footage ? firstFrame(name, choice.footage) : make("div", "no-picture", "No footage");
@@ -102,10 +96,10 @@ export class CameraCards {
     const offset = make("input", { ...kind, value, title, "aria-label": `Offset of ${name} in frames` });
     offset.addEventListener("change", () => {
       choice.offset = offset.value === "" ? null : Number(offset.value);
-      this.#changed();
+      changed();
     });
-    card.append(picture, make("b", "is-clipped", name), this.#menu(name, choice, index), make("span", "with-unit", "Offset", offset, "frames"));
-    this.#listenToDrags(card, name);
+    card.append(picture, make("b", "is-clipped", name), footageMenu(name, choice, index), make("span", "with-unit", "Offset", offset, "frames"));
+    listenToDrags(card, name);
     return card;
   }
 
@@ -114,21 +108,17 @@ export class CameraCards {
    * @param {Choice} choice
    * @param {number} index
    */
-  #menu(name, choice, index) {
+  function footageMenu(name, choice, index) {
     const menu = make("select", { id: `new-footage-${index}`, title: `Footage of ${name}. That of another camera is exchanged`, "aria-label": `Footage of ${name}` }, new Option("Leave out", ""));
-    const isListed = this.#files.some(({ path }) => path === choice.footage);
+    const isListed = files.some(({ path }) => path === choice.footage);
     if (choice.footage && !isListed) menu.append(new Option(choice.footage.split("/").pop(), choice.footage));
-    for (const { path, name: file } of this.#files) menu.append(new Option(file, path));
+    for (const { path, name: file } of files) menu.append(new Option(file, path));
     menu.append(new Option("Other footage…", ELSEWHERE));
     menu.value = choice.footage;
     menu.addEventListener("change", () => {
-      const path = menu.value;
-      if (path === ELSEWHERE) {
-        menu.value = choice.footage;
-        this.#pick(choice.footage, (chosen) => this.#assign(name, chosen));
-      } else {
-        this.#assign(name, path);
-      }
+      if (menu.value !== ELSEWHERE) return assign(name, menu.value);
+      menu.value = choice.footage;
+      pick(choice.footage, (path) => assign(name, path));
     });
     return menu;
   }
@@ -137,21 +127,21 @@ export class CameraCards {
    * @param {string} name
    * @param {string} path
    */
-  #assign(name, path) {
-    const choice = this.#choices.get(name);
+  function assign(name, path) {
+    const choice = choices.get(name);
     if (!choice) return;
-    const other = path && [...this.#choices.values()].find(({ footage }) => footage === path);
+    const other = path && [...choices.values()].find(({ footage }) => footage === path);
     if (other) other.footage = choice.footage;
     choice.footage = path;
-    this.#draw();
-    this.#changed();
+    draw();
+    changed();
   }
 
   /**
    * @param {HTMLElement} card
    * @param {string} name
    */
-  #listenToDrags(card, name) {
+  function listenToDrags(card, name) {
     const isCamera = (/** @type {DragEvent} */ event) => event.dataTransfer?.types.includes(DRAGGED);
     card.addEventListener("dragstart", (event) => event.dataTransfer?.setData(DRAGGED, name));
     card.addEventListener("dragover", (event) => {
@@ -165,9 +155,11 @@ export class CameraCards {
       const other = event.dataTransfer?.getData(DRAGGED);
       if (!other) return;
       event.preventDefault();
-      this.exchange(other, name, false);
+      exchange(other, name, false);
     });
   }
+
+  return { show, exchange, chosen };
 }
 
 /** @param {string[]} names */

@@ -14,8 +14,8 @@ import { mountSessions } from "./sessions.js";
  *
  * @param {import("../model/index.js").Context} context
  */
-export function mount({ store, notify }) {
-  const sessions = mountSessions(store, notify);
+export function mount({ store, say }) {
+  const sessions = mountSessions(store, (text) => say(text, "error"));
   const showNew = () => void sessions.showNew();
   const bindings = inArea("History and help", [
     { label: "Open another session", words: "recent sessions folder recording file load switch", anywhere: true, run: () => sessions.toggle() },

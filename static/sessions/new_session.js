@@ -4,10 +4,11 @@
  */
 
 import { button, byId, make, onSubmit } from "../widgets/elements.js";
-import { CameraCards } from "./camera_cards.js";
+import { makeCameraCards } from "./camera_cards.js";
 import { DialogForm } from "./dialog_form.js";
 import { drawRig } from "./rig_drawing.js";
 import { postJson } from "../widgets/post_json.js";
+import { sentence } from "../widgets/text.js";
 
 /**
  * @typedef {{cameras: [string, string], with_backgrounds: boolean, text: string}} Exchanged
@@ -40,7 +41,7 @@ export class NewSession extends DialogForm {
    */
   constructor(picker, open) {
     super("new-session", picker);
-    this.#cards = new CameraCards(
+    this.#cards = makeCameraCards(
       () => this.#begin(),
       (from, take) => picker.show("footage", from || this.value("footage"), take),
     );
@@ -163,7 +164,7 @@ export class NewSession extends DialogForm {
       folder: this.value("folder"),
       calibration: this.value("calibration"),
       footage: this.value("footage"),
-      cameras: this.#cards.chosen,
+      cameras: this.#cards.chosen(),
       people: this.list("people"),
       heights: this.list("heights").map(Number),
       models: this.list("models"),
@@ -192,7 +193,7 @@ export class NewSession extends DialogForm {
 
   /** @param {Exchanged} exchanged */
   #offerExchange({ cameras: [first, second], with_backgrounds: withSide, text }) {
-    const item = this.add("is-warning", `${text[0].toUpperCase()}${text.slice(1)}. Nothing has been made yet.`);
+    const item = this.add("is-warning", `${sentence(text)} Nothing has been made yet.`);
     const offer = (/** @type {string} */ label, /** @type {string} */ title, /** @type {() => void} */ run) => {
       const choice = make("button", { type: "button", title, onclick: run }, label);
       item.append(choice);

@@ -12,50 +12,50 @@ import { button, byId, make, onSubmit } from "../widgets/elements.js";
 const TITLES = { folder: "Choose a folder", files: "Choose a file, several files or a folder", footage: "Choose a video or a folder of images" };
 const MARKS = { folder: "▸", session: "▸", video: "", file: "" };
 
-export class PathPicker {
-  #dialog = byId("path-picker", HTMLDialogElement);
-  #title = byId("path-picker-title", HTMLElement);
-  #path = byId("path-picker-path", HTMLInputElement);
-  #list = byId("path-picker-entries", HTMLElement);
-  #note = byId("path-picker-note", HTMLOutputElement);
-  #up = byId("path-picker-up", HTMLButtonElement);
-  #choose = byId("path-picker-choose", HTMLButtonElement);
-  /** @type {Wanted} */
-  #wanted = "folder";
-  /** @type {FolderContents | null} */
-  #contents = null;
-  /** Files of the folder that are marked, by name. @type {Set<string>} */
-  #marked = new Set();
-  #take = (/** @type {string} */ _path) => {};
+/** @typedef {ReturnType<typeof makePathPicker>} PathPicker */
 
-  constructor() {
-    onSubmit(byId("path-picker-form", HTMLFormElement), () => void this.#go(this.#path.value));
-    this.#up.addEventListener("click", () => this.#contents?.parent && void this.#go(this.#contents.parent));
-    this.#list.addEventListener("keydown", (event) => {
-      if (event.key === "Backspace") this.#up.click();
-      else if (event.key === "ArrowDown" || event.key === "ArrowUp") moveFocus(this.#list, event.key === "ArrowDown" ? 1 : -1);
-      else if (event.key !== " " || !this.#mark(document.activeElement)) return;
-      event.preventDefault();
-    });
-    button("path-picker-cancel", () => this.#dialog.close());
-    this.#choose.addEventListener("click", () => this.#contents && this.#finish(this.#chosen(this.#contents.folder)));
-  }
+export function makePathPicker() {
+  const dialog = byId("path-picker", HTMLDialogElement);
+  const heading = byId("path-picker-title", HTMLElement);
+  const field = byId("path-picker-path", HTMLInputElement);
+  const entries = byId("path-picker-entries", HTMLElement);
+  const note = byId("path-picker-note", HTMLOutputElement);
+  const up = byId("path-picker-up", HTMLButtonElement);
+  const chooser = byId("path-picker-choose", HTMLButtonElement);
+  /** @type {Wanted} */
+  let wanted = "folder";
+  /** @type {FolderContents | null} */
+  let contents = null;
+  /** Files of the folder that are marked, by name. @type {Set<string>} */
+  const marked = new Set();
+  let take = (/** @type {string} */ _path) => {};
+
+  onSubmit(byId("path-picker-form", HTMLFormElement), () => void go(field.value));
+  up.addEventListener("click", () => contents?.parent && void go(contents.parent));
+  entries.addEventListener("keydown", (event) => {
+    if (event.key === "Backspace") up.click();
+    else if (event.key === "ArrowDown" || event.key === "ArrowUp") moveFocus(entries, event.key === "ArrowDown" ? 1 : -1);
+    else if (event.key !== " " || !toggleMark(document.activeElement)) return;
+    event.preventDefault();
+  });
+  button("path-picker-cancel", () => dialog.close());
+  chooser.addEventListener("click", () => contents && finish(chosen(contents.folder)));
 
   /**
    * Let the user choose.
    *
-   * @param {Wanted} wanted
+   * @param {Wanted} kind
    * @param {string} from a path to begin at; empty for the user's home
-   * @param {(path: string) => void} take called with the choice
+   * @param {(path: string) => void} taken called with the choice
    */
-  show(wanted, from, take) {
-    this.#wanted = wanted;
-    this.#take = take;
-    this.#title.textContent = TITLES[wanted];
-    this.#contents = null;
-    this.#list.replaceChildren();
-    this.#dialog.showModal();
-    void this.#go(from).then((isThere) => !isThere && from && void this.#go(""));
+  function show(kind, from, taken) {
+    wanted = kind;
+    take = taken;
+    heading.textContent = TITLES[kind];
+    contents = null;
+    entries.replaceChildren();
+    dialog.showModal();
+    void go(from).then((isThere) => !isThere && from && void go(""));
   }
 
   /**
@@ -63,35 +63,33 @@ export class PathPicker {
    *
    * @param {string} path
    */
-  async #go(path) {
+  async function go(path) {
     const answer = await fetch(`sessions/folder?path=${encodeURIComponent(path)}`).catch(() => null);
     if (!answer?.ok) {
-      this.#note.textContent = (await answer?.text()) ?? "The program does not answer.";
+      note.textContent = (await answer?.text()) ?? "The program does not answer.";
       return false;
     }
-    /** @type {FolderContents} */
-    const contents = await answer.json();
-    this.#contents = contents;
-    this.#path.value = contents.folder;
-    this.#up.disabled = contents.parent === null;
-    const isMarkable = this.#wanted === "files" && contents.entries.some(({ kind }) => kind === "file");
+    const found = (contents = /** @type {FolderContents} */ (await answer.json()));
+    field.value = found.folder;
+    up.disabled = found.parent === null;
+    const isMarkable = wanted === "files" && found.entries.some(({ kind }) => kind === "file");
     const hint = isMarkable ? "Ctrl+click or Space marks several files." : "";
-    this.#note.textContent = contents.is_cut_off ? "Not all entries are shown." : contents.entries.length ? hint : "This folder is empty.";
-    this.#marked.clear();
-    this.#showMarked();
-    this.#list.replaceChildren(...contents.entries.map((entry) => this.#row(entry)));
-    this.#list.scrollTop = 0;
-    /** @type {HTMLElement} */ (this.#list.querySelector("button:not(:disabled)") ?? this.#list).focus();
+    note.textContent = found.is_cut_off ? "Not all entries are shown." : found.entries.length ? hint : "This folder is empty.";
+    marked.clear();
+    showMarked();
+    entries.replaceChildren(...found.entries.map(row));
+    entries.scrollTop = 0;
+    /** @type {HTMLElement} */ (entries.querySelector("button:not(:disabled)") ?? entries).focus();
     return true;
   }
 
   /** @param {Entry} entry */
-  #row(entry) {
+  function row(entry) {
     const { name, path, kind } = entry;
     const isFolder = kind === "folder" || kind === "session";
     const open = make("button", { type: "button", className: `is-${kind}`, title: isFolder ? `Open the folder ${name}` : `Choose ${name}` });
     // Files are listed where a folder is wanted, so that it can be recognized.
-    open.disabled = !isFolder && (this.#wanted === "folder" || (this.#wanted === "footage" && kind !== "video"));
+    open.disabled = !isFolder && (wanted === "folder" || (wanted === "footage" && kind !== "video"));
     if (kind === "video") {
       const picture = make("img", { alt: "", loading: "lazy", src: previewOf(path) });
       picture.addEventListener("error", () => picture.removeAttribute("src"));
@@ -103,8 +101,8 @@ export class PathPicker {
     if (kind === "session") open.append(make("small", {}, "session"));
     open.dataset.name = isFolder ? "" : name;
     open.addEventListener("click", (event) => {
-      if (isFolder) void this.#go(path);
-      else if (!(event.ctrlKey || event.metaKey) || !this.#mark(open)) this.#finish(path);
+      if (isFolder) void go(path);
+      else if (!(event.ctrlKey || event.metaKey) || !toggleMark(open)) finish(path);
     });
     return make("li", {}, open);
   }
@@ -114,19 +112,19 @@ export class PathPicker {
    *
    * @param {Element | null} entry
    */
-  #mark(entry) {
-    const name = entry instanceof HTMLElement && this.#wanted === "files" ? entry.dataset.name : "";
+  function toggleMark(entry) {
+    const name = entry instanceof HTMLElement && wanted === "files" ? entry.dataset.name : "";
     if (!entry || !name) return false;
-    if (!this.#marked.delete(name)) this.#marked.add(name);
-    entry.setAttribute("aria-pressed", String(this.#marked.has(name)));
-    this.#showMarked();
+    if (!marked.delete(name)) marked.add(name);
+    entry.setAttribute("aria-pressed", String(marked.has(name)));
+    showMarked();
     return true;
   }
 
-  #showMarked() {
-    const count = this.#marked.size;
-    this.#choose.textContent = count ? `Choose ${count} ${count === 1 ? "file" : "files"}` : "Choose this folder";
-    this.#choose.title = count ? "Choose the marked files" : "Choose the folder that is shown";
+  function showMarked() {
+    const count = marked.size;
+    chooser.textContent = count ? `Choose ${count} ${count === 1 ? "file" : "files"}` : "Choose this folder";
+    chooser.title = count ? "Choose the marked files" : "Choose the folder that is shown";
   }
 
   /**
@@ -134,15 +132,17 @@ export class PathPicker {
    *
    * @param {string} folder
    */
-  #chosen(folder) {
-    return this.#marked.size ? `${folder.replace(/\/$/, "")}/${[...this.#marked].join("; ")}` : folder;
+  function chosen(folder) {
+    return marked.size ? `${folder.replace(/\/$/, "")}/${[...marked].join("; ")}` : folder;
   }
 
   /** @param {string} path */
-  #finish(path) {
-    this.#dialog.close();
-    this.#take(path);
+  function finish(path) {
+    dialog.close();
+    take(path);
   }
+
+  return { show };
 }
 
 /**

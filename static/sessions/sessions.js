@@ -7,7 +7,7 @@ import { batchTable } from "./batch_table.js";
 import { BoardCalibration } from "./board_calibration.js";
 import { NewSession } from "./new_session.js";
 import { makePathField } from "./path_field.js";
-import { PathPicker } from "./path_picker.js";
+import { makePathPicker } from "./path_picker.js";
 import { completePaths } from "./session_requests.js";
 
 const POLL_MS = 300;
@@ -21,16 +21,16 @@ const PATIENCE_MS = 60_000;
  * @typedef {import("./batch_table.js").Batch} Batch
  * @typedef {{refusal: string | null, folder: string, recent: Recent[], batches: Batch[]}} Listed
  * @param {import("../model/store.js").Store} store
- * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+ * @param {(text: string) => void} refuse says why something cannot be done
  */
-export function mountSessions(store, notify) {
+export function mountSessions(store, refuse) {
   const panel = byId("sessions-panel", HTMLElement);
   const open = byId("session-name", HTMLButtonElement);
   const folder = byId("session-folder", HTMLInputElement);
   const list = byId("recent-sessions", HTMLElement);
   const note = byId("sessions-note", HTMLOutputElement);
   const form = byId("open-session", HTMLFormElement);
-  const picker = new PathPicker();
+  const picker = makePathPicker();
   /** Folder of the open session. */
   let present = "";
   /**
@@ -84,10 +84,7 @@ export function mountSessions(store, notify) {
    */
   async function showForm(form, result) {
     const { refusal, folder } = await listed();
-    if (refusal) {
-      notify({ type: "notice", level: "error", text: `No ${result} can be made here: ${refusal}` });
-      return;
-    }
+    if (refusal) return refuse(`No ${result} can be made here: ${refusal}`);
     present = folder;
     if (panel.matches(":popover-open")) panel.hidePopover();
     form.show();
@@ -143,9 +140,8 @@ export function mountSessions(store, notify) {
       location.reload();
       return;
     }
-    const text = `Expected ${store.facts.opening} to be open by now. The terminal of the program says what is wrong.`;
+    refuse(`Expected ${store.facts.opening} to be open by now. The terminal of the program says what is wrong.`);
     store.set({ opening: null, openingStep: "" });
-    notify({ type: "notice", level: "error", text });
   }
 
   /**

@@ -1,7 +1,9 @@
 /** Curves of the angles over the frames, one group at a time. */
 
 import { data } from "./data.js";
-import { begin, byId, element, token } from "./dom.js";
+import { fillRect, setText } from "../widgets/canvas.js";
+import { make } from "../widgets/elements.js";
+import { begin, byId, token } from "./dom.js";
 import { follow, redraw, seek, shown } from "./player.js";
 
 const LEFT = 38;
@@ -32,11 +34,9 @@ const draw = () => {
   const span = Math.max(high - low, 1);
   const x = (/** @type {number} */ i) => LEFT + ((width - LEFT - RIGHT) * i) / Math.max(1, data.frames.length - 1);
   const y = (/** @type {number} */ value) => height - MARGIN - ((height - 2 * MARGIN) * (value - low)) / span;
-  context.fillStyle = token("--plot");
-  context.fillRect(LEFT, 0, width - LEFT - RIGHT, height);
+  fillRect(context, token("--plot"), LEFT, 0, width - LEFT - RIGHT, height);
   context.fillStyle = token("--muted");
-  context.font = "11px system-ui, sans-serif";
-  context.textAlign = "right";
+  setText(context, "right", "alphabetic", "11px");
   for (const value of [low, high]) {
     context.fillText(`${value.toFixed(0)}${plot.unit === "deg" ? "°" : ` ${plot.unit}`}`, LEFT - 4, y(value) + 4);
   }
@@ -54,15 +54,12 @@ const draw = () => {
     context.stroke();
   });
   context.setLineDash([]);
-  context.fillStyle = token("--accent");
-  context.fillRect(x(shown().at) - 0.5, 0, 1.5, height);
+  fillRect(context, token("--accent"), x(shown().at) - 0.5, 0, 1.5, height);
   byId("legend").replaceChildren(
     ...plot.labels.map((label, i) => {
       const value = plot.values[i][shown().at];
-      const item = element("li", value === null ? label : `${label} ${value.toFixed(0)}`);
-      item.style.setProperty("--curve", color(i));
-      item.style.setProperty("--dash", i < 4 ? "solid" : "dashed");
-      return item;
+      const line = { "--curve": color(i), "--dash": i < 4 ? "solid" : "dashed" };
+      return make("li", line, value === null ? label : `${label} ${value.toFixed(0)}`);
     }),
   );
 };
@@ -70,11 +67,7 @@ const draw = () => {
 /** Make the curves and the choice of a group. */
 export const mountCurves = () => {
   const select = byId("plot");
-  plots.forEach((plot, i) => {
-    const option = /** @type {HTMLOptionElement} */ (element("option", plot.name));
-    option.value = String(i);
-    select.append(option);
-  });
+  select.append(...plots.map(({ name }, i) => new Option(name, String(i))));
   select.onchange = () => {
     select.blur(); // the keys play and step again
     redraw();

@@ -1,7 +1,8 @@
 /** Status and provenance of the poses of the shown frame, and the remarks and comments of all frames. */
 
 import { data, poseOf } from "./data.js";
-import { byId, element } from "./dom.js";
+import { make } from "../widgets/elements.js";
+import { byId } from "./dom.js";
 import { follow, seek, shown } from "./player.js";
 
 const SOURCES = { manual: "set by hand", pinned: "fitted to pins", fitted: "fitted", searched: "found by a search" };
@@ -21,13 +22,12 @@ const words = (pose) => {
 const drawDetails = () => {
   const parts = data.people.flatMap((person) => {
     const pose = poseOf(person, shown().at);
-    const title = element("h2", person.name);
-    title.style.setProperty("--person", person.color);
-    if (!pose) return [title, element("p", "no pose", "muted")];
+    const title = make("h2", { "--person": person.color }, person.name);
+    if (!pose) return [title, make("p", "muted", "no pose")];
     const day = pose.time.slice(0, 10);
     const made = `${pose.body}; calibration ${pose.calibration}; ${day}, Quadrille ${pose.program}`;
-    const remark = pose.remark ? [element("p", pose.remark)] : [];
-    return [title, element("p", words(pose)), ...remark, element("p", made, "muted")];
+    const remark = pose.remark ? [make("p", {}, pose.remark)] : [];
+    return [title, make("p", {}, words(pose)), ...remark, make("p", "muted", made)];
   });
   byId("details").replaceChildren(...parts);
 };
@@ -58,16 +58,11 @@ const comments = () =>
 /** Make the list of remarks and comments, and the details that follow the frame. */
 export const mountDetails = () => {
   const found = [...comments(), ...remarks()].sort((a, b) => a.first - b.first);
-  const list = element("ul");
-  for (const { person, first, last, text } of found) {
+  const rows = found.map(({ person, first, last, text }) => {
     const [from, to] = [data.frames[first], data.frames[last]];
     const who = data.people.length > 1 ? `${person}, ` : "";
-    const button = element("button", `${from}${to > from ? `–${to}` : ""}: ${who}${text}`);
-    button.onclick = () => seek(first);
-    const item = element("li");
-    item.append(button);
-    list.append(item);
-  }
-  byId("remarks").replaceChildren(element("h2", found.length ? "Remarks and comments" : "No remarks"), list);
+    return make("li", {}, make("button", { onclick: () => seek(first) }, `${from}${to > from ? `–${to}` : ""}: ${who}${text}`));
+  });
+  byId("remarks").replaceChildren(make("h2", {}, found.length ? "Remarks and comments" : "No remarks"), make("ul", {}, ...rows));
   follow(drawDetails);
 };

@@ -1,5 +1,7 @@
 /** Elements of the page, and canvases at the resolution of the screen. */
 
+import { prepare } from "../widgets/canvas.js";
+
 /**
  * Return the element of an id.
  *
@@ -10,21 +12,6 @@
 export const byId = (id) => /** @type {T} */ (document.getElementById(id));
 
 /**
- * Make an element with a text, which is never read as markup.
- *
- * @param {string} tag
- * @param {string} [text]
- * @param {string} [className]
- * @returns {HTMLElement}
- */
-export const element = (tag, text = "", className = "") => {
-  const made = document.createElement(tag);
-  made.textContent = text;
-  made.className = className;
-  return made;
-};
-
-/**
  * Clear a canvas and return its context, in CSS pixels, with its size; null while it is not shown.
  *
  * @param {HTMLCanvasElement} canvas
@@ -32,13 +19,7 @@ export const element = (tag, text = "", className = "") => {
  */
 export const begin = (canvas) => {
   const { clientWidth: width, clientHeight: height } = canvas;
-  const context = canvas.getContext("2d");
-  if (!context || !width || !height) return null;
-  const [columns, rows] = [Math.round(width * devicePixelRatio), Math.round(height * devicePixelRatio)];
-  if (canvas.width !== columns || canvas.height !== rows) [canvas.width, canvas.height] = [columns, rows];
-  context.setTransform(columns / width, 0, 0, rows / height, 0, 0);
-  context.clearRect(0, 0, width, height);
-  return { context, width, height };
+  return width && height ? { context: prepare(canvas, width, height, false), width, height } : null;
 };
 
 /**

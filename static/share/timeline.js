@@ -1,6 +1,8 @@
 /** One cell for each frame and person, coloured by status; a press or a drag goes there. */
 
 import { data, poseOf } from "./data.js";
+import { fillRect } from "../widgets/canvas.js";
+import { showPosition } from "../widgets/separator.js";
 import { begin, byId, token } from "./dom.js";
 import { follow, seek, shown } from "./player.js";
 
@@ -16,21 +18,16 @@ const draw = () => {
   const { at } = shown();
   data.people.forEach((person, i) => {
     const top = 4 + i * lane;
-    context.fillStyle = token("--track");
-    context.fillRect(0, top, width, lane - 1);
+    fillRect(context, token("--track"), 0, top, width, lane - 1);
     for (let k = 0; k < n; k += 1) {
       const pose = poseOf(person, k);
       if (!pose) continue;
       const [left, cell] = [(width * k) / n, Math.max(1, width / n - (width > 3 * n ? 1 : 0))];
-      context.fillStyle = token(pose.keyframe ? "--source-hand" : COLORS[pose.status]);
-      context.fillRect(left, top, cell, lane - 1);
+      fillRect(context, token(pose.keyframe ? "--source-hand" : COLORS[pose.status]), left, top, cell, lane - 1);
     }
   });
-  context.fillStyle = token("--accent");
-  context.fillRect((width * (at + 0.5)) / n - 1, 0, 2, height);
-  canvas.setAttribute("aria-valuemin", String(data.frames[0]));
-  canvas.setAttribute("aria-valuemax", String(data.frames[n - 1]));
-  canvas.setAttribute("aria-valuenow", String(data.frames[at]));
+  fillRect(context, token("--accent"), (width * (at + 0.5)) / n - 1, 0, 2, height);
+  showPosition(canvas, { now: data.frames[at], min: data.frames[0], max: data.frames[n - 1] });
 };
 
 /** Make the timeline. */

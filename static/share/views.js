@@ -1,7 +1,8 @@
 /** The camera views: a picture of the footage, and the bodies as lines over it. */
 
 import { data, poseOf } from "./data.js";
-import { begin, byId, element, token } from "./dom.js";
+import { make } from "../widgets/elements.js";
+import { begin, byId, token } from "./dom.js";
 import { change, follow, redraw, shown } from "./player.js";
 
 const AHEAD = 8;
@@ -151,13 +152,9 @@ export const toggleOnly = (view) => {
 /** Make the views. */
 export const mountViews = () => {
   const panes = data.cameras.map((camera, view) => {
-    const pane = element("div", "", "view");
-    const canvas = document.createElement("canvas");
-    canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", camera.name);
-    canvas.title = `Show ${camera.name} alone, or all (${view + 1})`;
-    canvas.onclick = () => toggleOnly(view);
-    pane.append(canvas, element("span", camera.name));
+    const title = `Show ${camera.name} alone, or all (${view + 1})`;
+    const canvas = make("canvas", { role: "img", "aria-label": camera.name, title, onclick: () => toggleOnly(view) });
+    const pane = make("div", "view", canvas, make("span", {}, camera.name));
     byId("views").append(pane);
     return { pane, canvas };
   });

@@ -35,7 +35,7 @@ export function deeds({ store, send, say, actions, navigation, layers }, rooms, 
 
   /** @type {Record<Action["deed"], (action: Action) => void>} */
   const table = {
-    accept: () => rooms.timeline.queue.accept(rooms.timeline.queue.current),
+    accept: () => rooms.timeline.queue.accept(rooms.timeline.queue.current()),
     acquire: (action) => inSection("body", { type: "acquire", action: "start", person: person(action) }),
     apply_correction: () => send({ type: "calibration_check", action: "apply" }),
     apply_sizes: (action) => send({ type: "body_sizes", action: "apply", person: person(action), refit: true }),

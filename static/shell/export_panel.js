@@ -15,9 +15,9 @@ const PROGRESS_MS = 400;
 
 /**
  * @param {import("../model/store.js").Store} store
- * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+ * @param {import("../model/index.js").Context["say"]} say
  */
-export function mountExportPanel(store, notify) {
+export function mountExportPanel(store, say) {
   const panel = byId("export-panel", HTMLElement);
   const open = byId("show-export", HTMLButtonElement);
   const format = byId("export-format", HTMLSelectElement);
@@ -49,8 +49,7 @@ export function mountExportPanel(store, notify) {
       try {
         await fill();
       } catch {
-        say("error", "The list of formats could not be loaded. Try again when the page is connected.");
-        return;
+        return say("The list of formats could not be loaded. Try again when the page is connected.", "error");
       }
     }
     togglePopover(panel, open);
@@ -136,13 +135,13 @@ export function mountExportPanel(store, notify) {
     try {
       const name = await download(address, running.signal);
       showMessage(`Saved ${name}`);
-      say("info", `Exported ${name}.`);
+      say(`Exported ${name}.`);
     } catch (error) {
       if (running.signal.aborted) showMessage("Canceled");
       else {
         const reason = error instanceof TypeError ? "the program cannot be reached" : String(/** @type {Error} */ (error).message);
         showMessage(`Failed: ${reason}`, true);
-        say("error", `Export failed: ${reason}`);
+        say(`Export failed: ${reason}`, "error");
       }
     } finally {
       clearInterval(timer);
@@ -175,13 +174,6 @@ export function mountExportPanel(store, notify) {
     progress.classList.toggle("is-failed", isFailure);
   }
 
-  /**
-   * @param {"error" | "info"} level
-   * @param {string} text
-   */
-  function say(level, text) {
-    notify({ type: "notice", level, text });
-  }
 
   return { cancel, toggle };
 }

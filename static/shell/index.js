@@ -12,7 +12,7 @@ import { mountComparison } from "./comparison.js";
 import { deeds } from "./deeds.js";
 import { mountExportPanel } from "./export_panel.js";
 import { mountHistoryList } from "./history_list.js";
-import { KeyChoices, followChoices } from "./key_choices.js";
+import { makeKeyChoices, followChoices } from "./key_choices.js";
 import { mountKeyList } from "./key_list.js";
 import { listen, orderedByArea } from "./keys.js";
 import { mountPalette } from "./palette.js";
@@ -20,7 +20,7 @@ import { mountPeople } from "./people.js";
 import { mountSavedMark } from "./saved_mark.js";
 import { escapeBindings, helpBindings, peopleBindings } from "./shell_keys.js";
 import { mountTopBar } from "./top_bar.js";
-import { Workspace } from "./workspace.js";
+import { mountWorkspace } from "./workspace.js";
 
 /**
  * @typedef {object} Rooms
@@ -49,9 +49,9 @@ export function mount(context, rooms) {
   mountTopBar(store, actions);
   mountComparison(store, actions);
   const people = mountPeople(store, actions, posing);
-  const workspace = new Workspace(store);
+  const workspace = mountWorkspace(store);
   const history = mountHistoryList(store, send);
-  const advice = mountAdvice(store, deeds(context, rooms, mountExportPanel(store, context.notify)));
+  const advice = mountAdvice(store, deeds(context, rooms, mountExportPanel(store, context.say)));
   context.onNotice((notice) => advice.answer(notice));
   mountSavedMark(store, send);
   mountAnnouncer(byId("announcer", HTMLElement), store);
@@ -70,7 +70,7 @@ export function mount(context, rooms) {
     ...[scene, search, timeline, rooms.posing, panes, inspector, annotation, participants].map(({ bindings }) => bindings),
   ]);
   const palette = mountPalette({ store, navigation, grid, posing, layers, actions, inspector: inspector.inspector, away: reasons.away }, table);
-  const choices = new KeyChoices(table, (text) => context.say(text, "error"));
+  const choices = makeKeyChoices(table, (text) => context.say(text, "error"));
   const keyList = mountKeyList(table, choices);
   followChoices(choices);
   store.on(["session"], () => store.facts.session?.role === "host" && void choices.load());

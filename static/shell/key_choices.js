@@ -8,52 +8,36 @@ import { postJson } from "../widgets/post_json.js";
  * @typedef {Record<string, string[]>} Keys by the label of a command
  */
 
-export class KeyChoices {
+/** @typedef {ReturnType<typeof makeKeyChoices>} KeyChoices */
+
+/**
+ * @param {Binding[]} table whose keys are replaced
+ * @param {(text: string) => void} tell shows what is wrong with the file
+ */
+export function makeKeyChoices(table, tell) {
   /** @type {Keys} */
-  #chosen = {};
-  #table;
-  /** @type {Map<Binding, string[]>} */
-  #defaults;
-  #tell;
+  let given = {};
+  const defaults = new Map(table.map((binding) => [binding, binding.keys]));
   /** @type {Promise<void> | null} */
-  #loading = null;
+  let loading = null;
   /** Called when keys have changed. @type {() => unknown} */
-  onChange = () => null;
+  let listener = () => null;
 
-  /**
-   * @param {Binding[]} table whose keys are replaced
-   * @param {(text: string) => void} tell shows what is wrong with the file
-   */
-  constructor(table, tell) {
-    this.#table = table;
-    this.#defaults = new Map(table.map((binding) => [binding, binding.keys]));
-    this.#tell = tell;
-  }
-
-  get areChanged() {
-    return Object.keys(this.#chosen).length > 0;
-  }
-
-  /** Read the file, once. */
-  load() {
-    return (this.#loading ??= this.#read());
-  }
-
-  async #read() {
+  async function read() {
     const answer = await fetch("keys");
-    if (!answer.ok) return this.#tell(await answer.text());
+    if (!answer.ok) return tell(await answer.text());
     const { file, keys } = await answer.json();
-    const known = new Set(this.#table.filter(({ matches }) => !matches).map(({ label }) => label));
-    const taken = new Set(this.#table.flatMap((one) => (one.matches ? one.keys : [])));
+    const known = new Set(table.filter(({ matches }) => !matches).map(({ label }) => label));
+    const taken = new Set(table.flatMap((one) => (one.matches ? one.keys : [])));
     /** @type {Keys} */
     const chosen = {};
     for (const [label, own] of Object.entries(keys)) {
       if (known.has(label) && Array.isArray(own) && own.every((key) => isKey(key) && !taken.has(key))) {
         chosen[label] = own;
         own.forEach((key) => taken.add(key));
-      } else this.#tell(`Expected a command of the list of shortcuts, and keys such as "T" or "Ctrl Shift Z" that no other line has, found "${label}" = ${JSON.stringify(own)} in ${file}; correct or remove the line.`);
+      } else tell(`Expected a command of the list of shortcuts, and keys such as "T" or "Ctrl Shift Z" that no other line has, found "${label}" = ${JSON.stringify(own)} in ${file}; correct or remove the line.`);
     }
-    this.#apply(chosen);
+    apply(chosen);
   }
 
   /**
@@ -63,16 +47,16 @@ export class KeyChoices {
    * @param {string | null} key
    * @returns  why the choice was not kept; empty if it was
    */
-  async choose({ label }, key) {
-    const others = Object.entries(this.#chosen).map(([own, keys]) => [own, keys.filter((one) => one !== key)]);
+  async function choose({ label }, key) {
+    const others = Object.entries(given).map(([own, keys]) => [own, keys.filter((one) => one !== key)]);
     const chosen = { ...Object.fromEntries(others), [label]: key === null ? [] : [key] };
-    return this.#save(chosen, chosen);
+    return save(chosen, chosen);
   }
 
   /** Return to the keys by default. */
-  async reset() {
-    const why = await this.#save({}, Object.fromEntries(Object.keys(this.#chosen).map((label) => [label, null])));
-    if (why) this.#tell(why);
+  async function reset() {
+    const why = await save({}, Object.fromEntries(Object.keys(given).map((label) => [label, null])));
+    if (why) tell(why);
   }
 
   /**
@@ -80,8 +64,8 @@ export class KeyChoices {
    *
    * @param {string} key
    */
-  replacing(key) {
-    const binding = this.#table.find((one) => this.#defaults.get(one)?.includes(key));
+  function replacing(key) {
+    const binding = table.find((one) => defaults.get(one)?.includes(key));
     return !binding || binding.keys.includes(key) ? key : (binding.keys[0] ?? null);
   }
 
@@ -89,9 +73,9 @@ export class KeyChoices {
    * @param {Keys} chosen
    * @param {Record<string, string[] | null>} changes of lines of the file; null removes one
    */
-  async #save(chosen, changes) {
+  async function save(chosen, changes) {
     try {
-      await postJson("keys", changes, () => this.#apply(chosen));
+      await postJson("keys", changes, () => apply(chosen));
     } catch (error) {
       return String(/** @type {Error} */ (error).message);
     }
@@ -99,12 +83,23 @@ export class KeyChoices {
   }
 
   /** @param {Keys} chosen */
-  #apply(chosen) {
-    this.#chosen = chosen;
+  function apply(chosen) {
+    given = chosen;
     const taken = new Set(Object.values(chosen).flat());
-    for (const [binding, keys] of this.#defaults) binding.keys = chosen[binding.label] ?? (binding.matches ? keys : keys.filter((key) => !taken.has(key)));
-    this.onChange();
+    for (const [binding, keys] of defaults) binding.keys = chosen[binding.label] ?? (binding.matches ? keys : keys.filter((key) => !taken.has(key)));
+    listener();
   }
+
+  return {
+    choose,
+    reset,
+    replacing,
+    /** Read the file, once. */
+    load: () => (loading ??= read()),
+    areChanged: () => Object.keys(given).length > 0,
+    /** @param {() => unknown} act called when keys have changed */
+    onChange: (act) => (listener = act),
+  };
 }
 
 /**

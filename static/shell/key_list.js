@@ -23,7 +23,7 @@ export function mountKeyList(table, choices) {
   const buttons = new Map();
   /** Command whose key is asked for. @type {Binding | null} */
   let asked = null;
-  choices.onChange = () => dialog.open && search();
+  choices.onChange(() => dialog.open && search());
   marks.append(markSection());
   queryField.addEventListener("input", () => search());
   button("show-key-list", () => show());
@@ -58,7 +58,7 @@ export function mountKeyList(table, choices) {
     for (const row of marks.querySelectorAll("dl > div")) row.toggleAttribute("hidden", fitness(query, `${row.textContent}`) === null);
     marks.hidden = marks.querySelector("dl > div:not([hidden])") === null;
     none.hidden = areas.size > 0 || !marks.hidden;
-    reset.disabled = !choices.areChanged;
+    reset.disabled = !choices.areChanged();
   }
 
   /** @param {Binding} binding */

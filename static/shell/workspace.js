@@ -6,7 +6,7 @@
 
 import { usefulWidth } from "../layout/grid_layout.js";
 import { byId } from "../widgets/elements.js";
-import { inArea } from "../widgets/key_matching.js";
+import { command, inArea } from "../widgets/key_matching.js";
 import { makeSeparator, showPosition } from "../widgets/separator.js";
 
 const STORED = "quadrille.panes-fraction";
@@ -22,126 +22,118 @@ const OPEN_PX = 20;
 
 /** @typedef {"folded" | "open" | null} Fold choice of the user; null where it is the automatic one */
 
-export class Workspace {
-  #element = byId("workspace", HTMLElement);
-  #bar = byId("split", HTMLElement);
-  #inspector = byId("inspector", HTMLElement);
-  #button = byId("show-scene", HTMLButtonElement);
-  #store;
+/** @typedef {ReturnType<typeof mountWorkspace>} Workspace */
+
+/** @param {import("../model/store.js").Store} store */
+export function mountWorkspace(store) {
+  const workspace = byId("workspace", HTMLElement);
+  const split = byId("split", HTMLElement);
+  const inspector = byId("inspector", HTMLElement);
+  const opener = byId("show-scene", HTMLButtonElement);
   /** Share chosen by the user; null for the automatic one. */
-  #chosen = Number(localStorage.getItem(STORED)) || null;
+  let chosen = Number(localStorage.getItem(STORED)) || null;
   /** The automatic width by what it depends on, of which only the newest is needed. */
-  #useful = { from: "", width: 0 };
+  let useful = { from: "", width: 0 };
   /** @type {Fold} */
-  #fold = restoredFold();
+  let fold = restoredFold();
 
-  /** @param {import("../model/store.js").Store} store */
-  constructor(store) {
-    this.#store = store;
-    makeSeparator(this.#bar, {
-      position: () => this.#show(),
-      moveTo: (position) => this.#moveTo(position),
-      reset: () => this.#reset(),
-    });
-    this.#bar.addEventListener("keydown", (event) => {
-      if (event.key !== "Enter") return;
-      event.preventDefault();
-      this.toggleScene();
-    });
-    this.#button.addEventListener("click", () => this.toggleScene());
-    let isLookingThrough = false;
-    store.on(["session"], () => this.#show());
-    store.on(["state"], () => {
-      const looks = (store.facts.state?.snapped ?? null) !== null;
-      if (looks && !isLookingThrough && this.#isFolded) this.toggleScene();
-      isLookingThrough = looks;
-    });
-    const sizes = new ResizeObserver(() => this.#show());
-    sizes.observe(this.#element);
-    sizes.observe(this.#inspector);
-  }
-
-  get bindings() {
-    const words = "show hide close collapse scene panel";
-    return inArea("3-D view", [{ label: "3-D view: fold away or open (toggle)", words, run: () => this.toggleScene() }]);
-  }
+  makeSeparator(split, { position: show, moveTo, reset });
+  split.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter") return;
+    event.preventDefault();
+    toggleScene();
+  });
+  opener.addEventListener("click", toggleScene);
+  let isLookingThrough = false;
+  store.on(["session"], show);
+  store.on(["state"], () => {
+    const looks = (store.facts.state?.snapped ?? null) !== null;
+    if (looks && !isLookingThrough && isFolded()) toggleScene();
+    isLookingThrough = looks;
+  });
+  const sizes = new ResizeObserver(() => show());
+  sizes.observe(workspace);
+  sizes.observe(inspector);
 
   /** Fold the 3-D view away, or open it. */
-  toggleScene() {
-    this.#choose(!this.#isFolded);
+  function toggleScene() {
+    choose(!isFolded());
   }
 
   /** Width beside the inspector. */
-  get #width() {
-    return this.#element.clientWidth - this.#inspector.offsetWidth;
+  function width() {
+    return workspace.clientWidth - inspector.offsetWidth;
   }
 
-  get #isFolded() {
-    return this.#fold === null ? this.#isCramped : this.#fold === "folded";
+  function isFolded() {
+    return fold === null ? isCramped() : fold === "folded";
   }
 
-  get #isCramped() {
-    if (this.#inspector.hidden) return false;
-    const width = this.#width - MIN_SCENE_PX;
-    return width < MIN_PANES_PX || (width < CRAMPED_WIDTH_PX && this.#element.clientHeight < CRAMPED_HEIGHT_PX);
+  function isCramped() {
+    if (inspector.hidden) return false;
+    const beside = width() - MIN_SCENE_PX;
+    return beside < MIN_PANES_PX || (beside < CRAMPED_WIDTH_PX && workspace.clientHeight < CRAMPED_HEIGHT_PX);
   }
 
-  /** @param {boolean} isFolded */
-  #choose(isFolded) {
-    this.#fold = isFolded === this.#isCramped ? null : isFolded ? "folded" : "open";
-    if (this.#fold) localStorage.setItem(STORED_FOLD, this.#fold);
+  /** @param {boolean} folds */
+  function choose(folds) {
+    fold = folds === isCramped() ? null : folds ? "folded" : "open";
+    if (fold) localStorage.setItem(STORED_FOLD, fold);
     else localStorage.removeItem(STORED_FOLD);
-    this.#show();
+    show();
   }
 
   /** Apply the widths. Returns the width of the panes. */
-  #show() {
-    const isFolded = this.#isFolded;
-    const whole = this.#element.clientWidth;
-    const bar = this.#bar.offsetWidth;
-    const max = this.#width - MIN_SCENE_PX;
+  function show() {
+    const isAway = isFolded();
+    const whole = workspace.clientWidth;
+    const free = width() - split.offsetWidth;
+    const max = width() - MIN_SCENE_PX;
     const min = Math.min(MIN_PANES_PX, max);
-    const panes = isFolded ? this.#width - bar : Math.round(Math.max(min, Math.min(max, this.#chosen ? this.#chosen * whole : this.#automatic(whole))));
-    this.#element.classList.toggle("is-scene-folded", isFolded);
-    this.#element.style.setProperty("--panes-width", `${panes}px`);
+    const panes = isAway ? free : Math.round(Math.max(min, Math.min(max, chosen ? chosen * whole : automatic(whole))));
+    workspace.classList.toggle("is-scene-folded", isAway);
+    workspace.style.setProperty("--panes-width", `${panes}px`);
     const share = 100 / Math.max(1, whole);
-    showPosition(this.#bar, { now: share * panes, min: share * min, max: share * (this.#width - bar) });
-    this.#button.setAttribute("aria-pressed", String(!isFolded));
-    this.#button.title = `3-D view: ${isFolded ? "open it" : "fold it away"}`;
+    showPosition(split, { now: share * panes, min: share * min, max: share * free });
+    opener.setAttribute("aria-pressed", String(!isAway));
+    opener.title = `3-D view: ${isAway ? "open it" : "fold it away"}`;
     return panes;
   }
 
   /** @param {number} whole width of the workspace */
-  #automatic(whole) {
-    const { session, drawerPx } = this.#store.facts;
+  function automatic(whole) {
+    const { session, drawerPx } = store.facts;
     const aspects = session?.cameras.map(({ width, height }) => width / height) ?? [];
     // The height without a drawer: opening one moves no separator.
-    const height = this.#element.clientHeight + drawerPx;
+    const height = workspace.clientHeight + drawerPx;
     const from = JSON.stringify([aspects, whole, height]);
-    if (from !== this.#useful.from) {
+    if (from !== useful.from) {
       const widths = { usual: USUAL_FRACTION * whole, max: MAX_FRACTION * whole };
-      this.#useful = { from, width: usefulWidth(aspects, widths, height) };
+      useful = { from, width: usefulWidth(aspects, widths, height) };
     }
-    return this.#useful.width;
+    return useful.width;
   }
 
   /** @param {number} position */
-  #moveTo(position) {
-    const edge = this.#width - this.#bar.offsetWidth;
-    if (this.#isFolded && position > edge - OPEN_PX) return;
+  function moveTo(position) {
+    const edge = width() - split.offsetWidth;
+    if (isFolded() && position > edge - OPEN_PX) return;
     const folds = position > edge - MIN_SCENE_PX / 2;
-    if (folds !== this.#isFolded) this.#choose(folds);
+    if (folds !== isFolded()) choose(folds);
     if (folds) return;
-    this.#chosen = position / this.#element.clientWidth;
-    this.#chosen = this.#show() / this.#element.clientWidth;
-    localStorage.setItem(STORED, String(this.#chosen));
+    chosen = position / workspace.clientWidth;
+    chosen = show() / workspace.clientWidth;
+    localStorage.setItem(STORED, String(chosen));
   }
 
-  #reset() {
-    this.#chosen = null;
+  function reset() {
+    chosen = null;
     localStorage.removeItem(STORED);
-    this.#choose(this.#isCramped);
+    choose(isCramped());
   }
+
+  const words = "show hide close collapse scene panel";
+  return { bindings: inArea("3-D view", [command("3-D view: fold away or open (toggle)", words, toggleScene)]) };
 }
 
 /** @returns {Fold} */

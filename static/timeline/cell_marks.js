@@ -164,10 +164,21 @@ export function hatch(context, color, stripes, isCrossed) {
  * @param {string} fill
  */
 export function drawDiamond(context, x, y, radius, fill = "#fff") {
-  const diamond = diamondPath(x, y, radius);
-  Object.assign(context, { fillStyle: fill, strokeStyle: DARK_INK, lineWidth: 1 });
-  context.fill(diamond);
-  context.stroke(diamond);
+  drawMark(context, diamondPath(x, y, radius), fill, 1);
+}
+
+/**
+ * Draw a mark with a dark border.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Path2D} mark
+ * @param {string} fillStyle
+ * @param {number} lineWidth
+ */
+export function drawMark(context, mark, fillStyle, lineWidth) {
+  Object.assign(context, { fillStyle, strokeStyle: DARK_INK, lineWidth });
+  context.fill(mark);
+  context.stroke(mark);
 }
 
 /**
@@ -204,10 +215,10 @@ export function gapOf(axis) {
  * @param {{top: number, bottom: number}} lane
  */
 export function drawDimmed(context, axis, isKept, style, { top, bottom }) {
-  context.fillStyle = style.getPropertyValue("--chrome");
-  context.globalAlpha = DIMMED;
-  eachRun(axis, (frame) => (isKept(frame) ? -1 : 0), 0, (_, x, width) => context.fillRect(x, top - 3, width, bottom - top + 6));
-  context.globalAlpha = 1;
+  const color = style.getPropertyValue("--chrome");
+  eachRun(axis, (frame) => (isKept(frame) ? -1 : 0), 0, (_, x, width) =>
+    fillRect(context, color, x, top - 3, width, bottom - top + 6, DIMMED),
+  );
 }
 
 /**

@@ -1,7 +1,7 @@
 /** Draw plots of curves below one another, on the axis of the timeline. Sizes are CSS pixels. */
 
-import { drawWithin, setText } from "../widgets/canvas.js";
-import { roundUp } from "../widgets/frame_axis.js";
+import { circlePath, drawWithin, fillRect, setText } from "../widgets/canvas.js";
+import { drawValues, toY } from "../widgets/plot.js";
 import { SOURCES, keyframesOf } from "../model/cells.js";
 import { extent, trace } from "../model/series.js";
 import { colorName, dashOf } from "../widgets/series_lines.js";
@@ -11,12 +11,11 @@ import { markPositions } from "./timeline_drawing.js";
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
  * @typedef {import("../model/series.js").Curves} Curves
- * @typedef {{top: number, bottom: number, min: number, max: number}} Scale
+ * @typedef {import("../widgets/plot.js").Scale} Scale
  */
 
 const TICKS_HEIGHT = 16;
 const PLOT_GAP = 6;
-const TICK_GAP = 22;
 /** Distance of the pointer within which it takes a point. */
 const REACH = 8;
 /** Least distance of frames whose poses are dots. */
@@ -44,7 +43,8 @@ export function drawCurves(context, axis, { curves, labels, scales, cells, chose
   const isPosed = (/** @type {number} */ frame) => cells.sources[frame] !== INTERPOLATED;
   curves.plots.forEach((plot, index) => {
     const scale = scales[index];
-    drawFrame(context, axis, scale, style);
+    // Labels at the edges would touch those of the next plot.
+    drawValues(context, style, axis, scale, (y) => y >= scale.top + 5 && y <= scale.bottom - 4);
     drawKeyframes(context, keys, scale, style);
     drawWithin(context, { ...scale, left: axis.left, right: axis.right }, () => {
       context.lineJoin = "round";
@@ -125,11 +125,7 @@ export function pointAt({ curves, scales, chosen }, axis, { x, y }) {
 export function drawRings(context, points, color) {
   context.strokeStyle = color;
   context.lineWidth = 2;
-  for (const { x, y } of points) {
-    context.beginPath();
-    context.arc(x, y, 6, 0, 2 * Math.PI);
-    context.stroke();
-  }
+  for (const { x, y } of points) context.stroke(circlePath(x, y, 6));
 }
 
 /**
@@ -152,38 +148,6 @@ function scaleOf(unit, curves, top, bottom) {
 }
 
 /**
- * @param {Scale} scale
- * @param {number} value
- */
-export function toY({ top, bottom, min, max }, value) {
-  return bottom - ((bottom - top) * (value - min)) / (max - min);
-}
-
-/**
- * Draw the background of a plot, grid lines at round values and their labels.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {FrameAxis} axis
- * @param {Scale} scale
- * @param {CSSStyleDeclaration} style
- */
-function drawFrame(context, axis, scale, style) {
-  context.fillStyle = style.getPropertyValue("--plot");
-  context.fillRect(axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
-  const step = roundUp(((scale.max - scale.min) * TICK_GAP) / (scale.bottom - scale.top));
-  setText(context, "right", "middle");
-  for (let value = Math.ceil(scale.min / step) * step; value <= scale.max; value += step) {
-    const y = Math.round(toY(scale, value));
-    context.fillStyle = style.getPropertyValue("--line");
-    context.fillRect(axis.left, y, axis.right - axis.left, 1);
-    // Labels at the edges would touch those of the next plot.
-    if (y < scale.top + 5 || y > scale.bottom - 4) continue;
-    context.fillStyle = style.getPropertyValue("--muted");
-    context.fillText(String(Number(value.toPrecision(6))), axis.left - 6, y);
-  }
-}
-
-/**
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
  * @param {number} top
@@ -193,10 +157,7 @@ function drawFrame(context, axis, scale, style) {
 function drawTitle(context, axis, top, text, style) {
   setText(context, "left", "top", "600 11px");
   const width = context.measureText(text).width;
-  context.fillStyle = style.getPropertyValue("--plot");
-  context.globalAlpha = 0.8;
-  context.fillRect(axis.left, top, width + 12, 16);
-  context.globalAlpha = 1;
+  fillRect(context, style.getPropertyValue("--plot"), axis.left, top, width + 12, 16, 0.8);
   context.fillStyle = style.getPropertyValue("--muted");
   context.fillText(text, axis.left + 6, top + 3);
 }
@@ -208,10 +169,7 @@ function drawTitle(context, axis, top, text, style) {
  * @param {CSSStyleDeclaration} style
  */
 function drawKeyframes(context, xs, { top, bottom }, style) {
-  context.fillStyle = style.getPropertyValue("--muted");
-  context.globalAlpha = 0.35;
-  for (const x of xs) context.fillRect(x - 0.5, top, 1, bottom - top);
-  context.globalAlpha = 1;
+  for (const x of xs) fillRect(context, style.getPropertyValue("--muted"), x - 0.5, top, 1, bottom - top, 0.35);
 }
 
 /**

@@ -3,12 +3,13 @@
  * Shift a drag marks a range. Points of angles and lengths can be dragged. The program sends curves only while they are open.
  */
 
-import { drawCurves, drawRings, pointAt, scalesOf, toY } from "./curve_drawing.js";
+import { drawCurves, drawRings, pointAt, scalesOf } from "./curve_drawing.js";
 import { CURVE_GROUPS } from "./drawer.js";
-import { prepare } from "../panes/drawing.js";
+import { fillRect, prepare } from "../widgets/canvas.js";
 import { button, byId, make } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { factorOf, numberField } from "../widgets/number_field.js";
+import { toY } from "../widgets/plot.js";
 import { lineSwatch } from "../widgets/series_lines.js";
 import { zoomByWheel } from "./frame_window.js";
 import { drawRange } from "./timeline_drawing.js";
@@ -41,7 +42,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
   let hovered = /** @type {number | null} */ (null);
   /** The point under the pointer that can be dragged, and the values of the plots, as they were at the start of a drag. */
   let point = /** @type {ReturnType<typeof pointAt>} */ (null);
-  let scales = /** @type {import("./curve_drawing.js").Scale[]} */ ([]);
+  let scales = /** @type {import("../widgets/plot.js").Scale[]} */ ([]);
   /** Start of the range that is being marked, or of the drag of a point, CSS pixels. */
   let [marked, heldY] = /** @type {[number | null, number]} */ ([null, 0]);
   /** The labels that the legend was built for. */
@@ -81,7 +82,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
     if (shownGroup === null) return;
     if (changed.has("connected") && store.facts.connected) actions.openCurves(shownGroup);
     if (changed.has("curves")) describe();
-    stage.tabIndex = edits.choices.length > 0 ? 0 : -1;
+    stage.tabIndex = edits.choices().length > 0 ? 0 : -1;
     const moved = changed.has("curves") || changed.has("session") || changed.has("visible");
     if (moved || changed.has("timeline") || changed.has("lanes")) drawLines();
     if (moved || changed.has("target") || changed.has("range")) drawCursor();
@@ -91,7 +92,6 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
   function open() {
     const { drawer } = store.facts;
     const group = CURVE_GROUPS.find((one) => one === drawer) ?? null;
-    stage.hidden = legend.hidden = group === null;
     if (group === null) personName.hidden = true;
     if (group === shownGroup) return;
     shownGroup = group;
@@ -103,7 +103,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
     stage.addEventListener("pointerdown", (event) => event.button === 0 && press(event));
     stage.addEventListener("pointermove", (event) => {
       const frame = axisNow().frameUnder(event, stage);
-      if (edits.drag && point) return dragTo(point.plot, event);
+      if (edits.dragged() && point) return dragTo(point.plot, event);
       if (!stage.hasPointerCapture(event.pointerId)) point = offered(event);
       else if (marked === null) navigation.goTo(frame);
       else if (frame !== marked || store.facts.range) store.set({ range: { first: Math.min(frame, marked), last: Math.max(frame, marked) } });
@@ -114,12 +114,12 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
     stage.addEventListener("pointercancel", () => edits.cancel());
     zoomByWheel(stage, frameWindow, () => axisNow());
     stage.addEventListener("pointerleave", () => {
-      point = edits.drag ? point : null;
+      point = edits.dragged() ? point : null;
       hover(null);
     });
     stage.addEventListener("keydown", (event) => {
       const run = keys[event.key.length === 1 ? event.key.toUpperCase() : event.key];
-      const isIdle = event.key === "Escape" ? !edits.drag : ["ArrowUp", "ArrowDown"].includes(event.key) && edits.why() !== null;
+      const isIdle = event.key === "Escape" ? !edits.dragged() : ["ArrowUp", "ArrowDown"].includes(event.key) && edits.why() !== null;
       if (!run || event.altKey || event.metaKey || isIdle) return;
       event.preventDefault();
       run(event);
@@ -151,7 +151,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
   function dragTo(plot, event) {
     const { min, max, top, bottom } = scales[plot];
     edits.move(((heldY - event.clientY) * (max - min)) / (bottom - top));
-    if (edits.drag?.range) drawAll();
+    if (edits.dragged()?.range) drawAll();
   }
 
   /** @param {PointerEvent} event */
@@ -159,7 +159,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
     const { left, top } = stage.getBoundingClientRect();
     const look = looked();
     const found = look && pointAt(look, axisNow(), { x: event.clientX - left, y: event.clientY - top });
-    return found && edits.choices.includes(found.dof) ? found : null;
+    return found && edits.choices().includes(found.dof) ? found : null;
   }
 
   /** @param {number | null} frame */
@@ -219,7 +219,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
     const { clientWidth, clientHeight } = stage;
     if (clientWidth === 0) return;
     const context = prepare(lines, clientWidth, clientHeight, true);
-    if (!edits.drag) scales = [];
+    if (!edits.dragged()) scales = [];
     const look = looked();
     if (look) drawCurves(context, axisNow(), look, clientHeight, getComputedStyle(stage));
   }
@@ -231,8 +231,8 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
     const { timeline, lanes } = store.facts;
     const shown = data.series.filter(({ label }) => !hidden.has(label));
     if (scales.length !== data.plots.length) scales = scalesOf({ ...data, series: shown }, stage.clientHeight);
-    const series = edits.drag?.range ? shown.map((one) => ({ ...one, values: one.values.map((value, frame) => edits.moved(one.dof, frame, value)) })) : shown;
-    return { curves: { ...data, series }, labels: labelsOf(data), scales, cells: lanes[data.person] ?? timeline, chosen: edits.chosen };
+    const series = edits.dragged()?.range ? shown.map((one) => ({ ...one, values: one.values.map((value, frame) => edits.moved(one.dof, frame, value)) })) : shown;
+    return { curves: { ...data, series }, labels: labelsOf(data), scales, cells: lanes[data.person] ?? timeline, chosen: edits.chosen() };
   }
 
   /** Draw lines at the current frame and the pointer. The legend shows the values at the pointer, or else the frame. */
@@ -244,13 +244,9 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
     const axis = axisNow();
     const { target } = store.facts;
     if (store.facts.range) drawRange(context, axis, store.facts.range, style, clientHeight);
-    context.fillStyle = style.getPropertyValue("--text");
-    if (axis.shows(target)) context.fillRect(axis.middle(target) - 0.5, 0, 1, clientHeight);
-    if (hovered !== null) {
-      context.globalAlpha = 0.5;
-      context.fillRect(axis.middle(hovered) - 0.5, 0, 1, clientHeight);
-      context.globalAlpha = 1;
-    }
+    const ink = style.getPropertyValue("--text");
+    if (axis.shows(target)) fillRect(context, ink, axis.middle(target) - 0.5, 0, 1, clientHeight);
+    if (hovered !== null) fillRect(context, ink, axis.middle(hovered) - 0.5, 0, 1, clientHeight, 0.5);
     readOut(hovered ?? target);
     const look = looked();
     if (!look) return;
@@ -258,7 +254,7 @@ export function mountCurves(store, navigation, actions, frameWindow, edits) {
       const frames = [...(look.chosen.includes(dof ?? -1) ? [target] : []), ...(point && point.dof === dof ? [point.frame] : [])];
       return frames.map((frame) => ({ x: axis.middle(frame), y: toY(look.scales[plot], values[frame]) }));
     });
-    drawRings(context, ringed, style.getPropertyValue("--text"));
+    drawRings(context, ringed, ink);
   }
 
   /** @param {number} frame */
@@ -306,10 +302,10 @@ export function mountCurveTools(store, edits, say) {
   button("smooth-curves", run("smooth", cutoff));
   button("shift-curves", run("shift", shift));
   store.on(["curves", "drawer", "state", "session", "connected"], () => {
-    const count = edits.chosen.length;
+    const count = edits.chosen().length;
     tools.hidden = count === 0;
     byId("curves-chosen", HTMLElement).textContent = count === 1 ? "1 curve" : `${count} curves`;
-    byId("curves-unit", HTMLElement).textContent = SIGNS[edits.unit];
+    byId("curves-unit", HTMLElement).textContent = SIGNS[edits.unit()];
   });
 }
 

@@ -10,6 +10,8 @@ import { makeThumbnailLoader } from "./thumbnail_loader.js";
 /** Entries that are listed at first, and after "more". The others follow as these are resolved. */
 const FEW_LISTED = 10;
 const MAX_LISTED = 200;
+/** Facts that the list is made of. @type {(keyof import("../model/store.js").Facts)[]} */
+const LISTED = ["timeline", "lanes", "session", "keyframeDoubts", "layers"];
 const TICK = "m3 8.5 3.5 3.5L13 4.5";
 
 /** @typedef {import("./doubts.js").Doubt} Doubt */
@@ -22,7 +24,6 @@ export function mountDoubtList(store, queue) {
   const panel = byId("doubts", HTMLElement);
   const list = byId("doubt-list", HTMLOListElement);
   const empty = byId("doubts-empty", HTMLElement);
-  const controls = byId("doubt-controls", HTMLElement);
   const tabCount = byId("doubts-count", HTMLElement);
   const loader = makeThumbnailLoader(panel);
   /** @type {Map<string, HTMLLIElement>} rows by what they show */
@@ -30,26 +31,17 @@ export function mountDoubtList(store, queue) {
   let limit = FEW_LISTED;
   const moreButton = make("button", { type: "button", className: "doubt-more", title: "List less severe entries too" });
   const moreRow = make("li", {}, moreButton);
-  /** @type {(keyof import("../model/store.js").Facts)[]} */
-  const listed = ["drawer", "timeline", "lanes", "session", "keyframeDoubts", "layers"];
   moreButton.addEventListener("click", () => {
     limit = MAX_LISTED;
     show();
     list.children[FEW_LISTED]?.querySelector("button")?.focus();
   });
-  store.subscribe((changed) => {
-    const isOpen = store.facts.drawer === "doubts";
-    panel.hidden = controls.hidden = !isOpen;
-    if (!isOpen) {
-      limit = FEW_LISTED;
-      return;
-    }
-    if (listed.some((fact) => changed.has(fact))) show();
-    if (listed.some((fact) => changed.has(fact)) || changed.has("target") || changed.has("state") || changed.has("reason")) mark();
-  });
+  store.on(["drawer"], () => store.facts.drawer !== "doubts" && (limit = FEW_LISTED));
+  store.onTab("doubts", LISTED, show);
+  store.onTab("doubts", [...LISTED, "target", "state", "reason"], mark);
 
   function show() {
-    const { doubts } = queue;
+    const doubts = queue.doubts();
     const shown = doubts.slice(0, limit);
     const known = rowsByKey;
     rowsByKey = new Map(shown.map((doubt) => [keyOf(doubt), known.get(keyOf(doubt)) ?? makeRow(doubt)]));
@@ -83,7 +75,7 @@ export function mountDoubtList(store, queue) {
 
   /** Mark the entry of the current frame. */
   function mark() {
-    const current = queue.current;
+    const current = queue.current();
     const key = current ? keyOf(current) : null;
     for (const [own, row] of rowsByKey) {
       const isCurrent = own === key;

@@ -35,12 +35,14 @@ export function mountDrawer(store) {
   const panel = byId("drawer", HTMLElement);
   const stage = byId("drawer-stage", HTMLElement);
   const grip = byId("drawer-grip", HTMLElement);
+  const parts = /** @type {HTMLElement[]} */ ([...panel.querySelectorAll("[data-tab]")]);
   const tabs = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("input[name=drawer]")]);
   const toggleButton = button("show-curves", () => openTab(getIsOpen() ? null : getLastTab()));
   button("close-drawer", () => openTab(null));
   for (const tab of tabs) {
     onChange(tab, () => openTab(/** @type {import("../model/series.js").Tab} */ (tab.value)));
   }
+  const getIsOpen = () => store.facts.drawer !== null;
   makeSeparator(grip, {
     position: () => -stage.clientHeight,
     moveTo: (position) => resize(-position),
@@ -92,12 +94,7 @@ export function mountDrawer(store) {
   /** Open the last group of curves, or close the drawer if curves are shown. */
   function toggleCurves() {
     const stored = localStorage.getItem(STORED_CURVES);
-    const isShown = CURVE_GROUPS.some((group) => group === store.facts.drawer);
-    openTab(isShown ? null : (CURVE_GROUPS.find((group) => group === stored) ?? "arms"));
-  }
-
-  function getIsOpen() {
-    return store.facts.drawer !== null;
+    openTab(isCurves(store.facts.drawer) ? null : (CURVE_GROUPS.find((group) => group === stored) ?? "arms"));
   }
 
   function getLastTab() {
@@ -117,8 +114,9 @@ export function mountDrawer(store) {
     pending = null;
     needsContent = false;
     if (tab !== null) localStorage.setItem(STORED_TAB, tab);
-    if (CURVE_GROUPS.some((group) => group === tab)) localStorage.setItem(STORED_CURVES, String(tab));
+    if (isCurves(tab)) localStorage.setItem(STORED_CURVES, String(tab));
     panel.hidden = tab === null;
+    for (const part of parts) part.hidden = part.dataset.tab !== (isCurves(tab) ? "curves" : tab);
     toggleButton.setAttribute("aria-pressed", String(tab !== null));
     for (const one of tabs) one.checked = one.value === tab;
     store.set({ drawer: tab });
@@ -129,7 +127,7 @@ export function mountDrawer(store) {
   function getKind() {
     const { drawer } = store.facts;
     if (drawer === "doubts") return "doubts";
-    return CURVE_GROUPS.some((group) => group === drawer) ? "curves" : "search";
+    return isCurves(drawer) ? "curves" : "search";
   }
 
   /** Apply the stored height, as far as the window has room for it. */
@@ -157,6 +155,11 @@ export function mountDrawer(store) {
 }
 
 /** The bars around the views; the drawer is part of the last one. */
+/** @param {Tab | null} tab */
+function isCurves(tab) {
+  return CURVE_GROUPS.some((group) => group === tab);
+}
+
 function barsAround() {
   return /** @type {HTMLElement[]} */ ([...document.querySelectorAll(".top-bar, #advice, #joint-bar, footer")]);
 }

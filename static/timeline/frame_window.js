@@ -15,24 +15,16 @@ const LINE_PX = 24;
 /** Position of a frame after a page turn, as a fraction of the width. */
 const LEAD = 0.1;
 
-export class FrameWindow {
-  #store;
+/** @typedef {ReturnType<typeof makeFrameWindow>} FrameWindow */
 
-  /** @param {import("../model/store.js").Store} store */
-  constructor(store) {
-    this.#store = store;
-    store.on(["session"], () => this.#keepWithin());
-    store.on(["target"], () => this.#follow());
-  }
+/** @param {import("../model/store.js").Store} store */
+export function makeFrameWindow(store) {
+  store.on(["session"], keepWithin);
+  store.on(["target"], follow);
 
   /** The visible part, also if that is everything. */
-  get span() {
-    return this.#store.facts.visible ?? { start: 0, end: this.#frames };
-  }
-
-  get #frames() {
-    return this.#store.facts.session?.n_frames ?? 1;
-  }
+  const span = () => store.facts.visible ?? { start: 0, end: frames() };
+  const frames = () => store.facts.session?.n_frames ?? 1;
 
   /**
    * Zoom about a position.
@@ -40,72 +32,68 @@ export class FrameWindow {
    * @param {number} factor above 1 to zoom in
    * @param {number} place position in fractional frames
    */
-  zoom(factor, place) {
-    const { start, end } = this.span;
+  function zoom(factor, place) {
+    const { start, end } = span();
     const length = Math.max(LEAST, (end - start) / factor);
     const share = (place - start) / (end - start);
-    this.#show(place - share * length, length);
+    show(place - share * length, length);
   }
 
   /** Zoom in about the current frame. */
-  zoomIn() {
-    this.zoom(STEP, this.#store.facts.target + 0.5);
-  }
-
-  zoomOut() {
-    this.zoom(1 / STEP, this.#store.facts.target + 0.5);
-  }
+  const zoomIn = () => zoom(STEP, store.facts.target + 0.5);
+  const zoomOut = () => zoom(1 / STEP, store.facts.target + 0.5);
 
   /** Show the marked range, or everything if it is shown already or no range is marked. */
-  fit() {
-    const { range } = this.#store.facts;
-    if (!range) return this.#show(0, this.#frames);
+  function fit() {
+    const { range } = store.facts;
+    if (!range) return show(0, frames());
     const margin = Math.max(1, 0.05 * (range.last - range.first));
     const start = Math.max(0, range.first - margin);
     const length = Math.max(LEAST, range.last + 1 + margin - start);
-    const { start: at, end } = this.span;
-    if (Math.abs(at - start) < 0.5 && Math.abs(end - at - length) < 1.5) this.#show(0, this.#frames);
-    else this.#show(start, length);
+    const { start: at, end } = span();
+    if (Math.abs(at - start) < 0.5 && Math.abs(end - at - length) < 1.5) show(0, frames());
+    else show(start, length);
   }
 
   /** @param {number} frames negative to move left */
-  move(frames) {
-    const { start, end } = this.span;
-    this.#show(start + frames, end - start);
+  function move(frames) {
+    const { start, end } = span();
+    show(start + frames, end - start);
   }
 
   /** @param {number} place new centre in fractional frames */
-  centre(place) {
-    const { start, end } = this.span;
-    this.#show(place - (end - start) / 2, end - start);
+  function centre(place) {
+    const { start, end } = span();
+    show(place - (end - start) / 2, end - start);
   }
 
   /**
    * @param {number} start
    * @param {number} length
    */
-  #show(start, length) {
-    const frames = this.#frames;
-    if (length >= frames) {
-      if (this.#store.facts.visible) this.#store.set({ visible: null });
+  function show(start, length) {
+    if (length >= frames()) {
+      if (store.facts.visible) store.set({ visible: null });
       return;
     }
-    const from = Math.max(0, Math.min(frames - length, start));
-    this.#store.set({ visible: { start: from, end: from + length } });
+    const from = Math.max(0, Math.min(frames() - length, start));
+    store.set({ visible: { start: from, end: from + length } });
   }
 
-  #keepWithin() {
-    const { visible } = this.#store.facts;
-    if (visible) this.#show(visible.start, visible.end - visible.start);
+  function keepWithin() {
+    const { visible } = store.facts;
+    if (visible) show(visible.start, visible.end - visible.start);
   }
 
   /** Turn the page when the current frame leaves the visible part. */
-  #follow() {
-    const { visible, target } = this.#store.facts;
+  function follow() {
+    const { visible, target } = store.facts;
     if (!visible || (target >= visible.start && target + 1 <= visible.end)) return;
     const length = visible.end - visible.start;
-    this.#show(target < visible.start ? target - (1 - LEAD) * length : target - LEAD * length, length);
+    show(target < visible.start ? target - (1 - LEAD) * length : target - LEAD * length, length);
   }
+
+  return { zoom, zoomIn, zoomOut, fit, move, centre };
 }
 
 /**

@@ -7,11 +7,11 @@
 import { byId } from "../widgets/elements.js";
 import { mountCurveTools, mountCurves } from "./curves.js";
 import { mountDoubtList } from "./doubt_list.js";
-import { DoubtQueue } from "./doubt_queue.js";
+import { makeDoubtQueue } from "./doubt_queue.js";
 import { mountDrawer } from "./drawer.js";
-import { FrameWindow } from "./frame_window.js";
+import { makeFrameWindow } from "./frame_window.js";
 import { mountJumpMenu } from "./jump_menu.js";
-import { Jumps } from "./jumps.js";
+import { makeJumps } from "./jumps.js";
 import { makePlayback } from "./playback.js";
 import { mountRangeBar } from "./range_bar.js";
 import { mountTimeline } from "./timeline.js";
@@ -30,9 +30,9 @@ import { mountTransport } from "./transport.js";
  */
 export function mount({ store, actions, navigation, reasons, say }, { grid }, { curveEdits }) {
   const playback = makePlayback(store, navigation);
-  const queue = new DoubtQueue(store, navigation, actions, grid);
-  const jumps = new Jumps(store, navigation, (frame) => queue.arriveAt(frame));
-  const frameWindow = new FrameWindow(store);
+  const queue = makeDoubtQueue(store, navigation, actions, grid);
+  const jumps = makeJumps(store, navigation, (frame) => queue.arriveAt(frame));
+  const frameWindow = makeFrameWindow(store);
   mountTransport(store, navigation, playback, actions);
   mountTrackBar(store, actions);
   const drawer = mountDrawer(store);

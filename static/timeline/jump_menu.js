@@ -80,7 +80,7 @@ export function mountJumpMenu(store, jumps, listDoubts) {
       number.textContent = count(found);
       for (const one of buttons) one.disabled = found === 0;
     }
-    const gap = jumps.longestGap;
+    const gap = jumps.longestGap();
     gapButton.disabled = !gap;
     gapButton.textContent = gap
       ? `Longest gap between keyframes: ${count(gap.last - gap.first + 1)}`

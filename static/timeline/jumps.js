@@ -39,25 +39,17 @@ export const KINDS = [
 
 const DOUBT = STATUSES.indexOf("doubtful");
 
-export class Jumps {
-  #store;
-  #navigation;
-  #arriveAtDoubt;
+/** @typedef {ReturnType<typeof makeJumps>} Jumps */
 
-  /**
-   * @param {import("../model/store.js").Store} store
-   * @param {import("../model/navigation.js").Navigation} navigation
-   * @param {(frame: number) => void} arriveAtDoubt called with a doubtful frame after it was requested
-   */
-  constructor(store, navigation, arriveAtDoubt) {
-    this.#store = store;
-    this.#navigation = navigation;
-    this.#arriveAtDoubt = arriveAtDoubt;
-  }
-
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {import("../model/navigation.js").Navigation} navigation
+ * @param {(frame: number) => void} arriveAtDoubt called with a doubtful frame after it was requested
+ */
+export function makeJumps(store, navigation, arriveAtDoubt) {
   /** @param {Kind} kind */
-  count(kind) {
-    const { facts } = this.#store;
+  function count(kind) {
+    const { facts } = store;
     const { timeline } = facts;
     if (kind === "empty") return timeline.frames - timeline.size;
     const is = tests(facts)[kind];
@@ -72,22 +64,22 @@ export class Jumps {
    * @param {Kind} kind
    * @param {1 | -1} way
    */
-  go(kind, way) {
-    const { facts } = this.#store;
+  function go(kind, way) {
+    const { facts } = store;
     const { timeline, target } = facts;
     const is = tests(facts)[kind];
-    this.#navigation.pause();
+    navigation.pause();
     for (let frame = target + way; frame >= 0 && frame < timeline.frames; frame += way) {
       if (!is(frame)) continue;
-      this.#navigation.goTo(frame);
-      if (kind === "doubt") this.#arriveAtDoubt(frame);
+      navigation.goTo(frame);
+      if (kind === "doubt") arriveAtDoubt(frame);
       return;
     }
   }
 
   /** The longest gap between keyframes; null if there is none. */
-  get longestGap() {
-    const { timeline } = this.#store.facts;
+  function longestGap() {
+    const { timeline } = store.facts;
     let [first, last] = [0, -1];
     let previous = -1;
     for (const frame of [...keyframesOf(timeline), timeline.frames]) {
@@ -98,10 +90,10 @@ export class Jumps {
   }
 
   /** Go to the middle of the longest gap between keyframes, the best place for a new one. */
-  toLongestGap() {
-    const gap = this.longestGap;
-    this.#navigation.pause();
-    if (gap) this.#navigation.goTo(Math.floor((gap.first + gap.last) / 2));
+  function toLongestGap() {
+    const gap = longestGap();
+    navigation.pause();
+    if (gap) navigation.goTo(Math.floor((gap.first + gap.last) / 2));
   }
 
   /**
@@ -109,8 +101,8 @@ export class Jumps {
    *
    * @param {number} frame
    */
-  intervalAround(frame) {
-    const { timeline } = this.#store.facts;
+  function intervalAround(frame) {
+    const { timeline } = store.facts;
     const isKey = (/** @type {number} */ at) => (timeline.marks[at] & KEYFRAME) !== 0;
     let [first, last] = [frame, frame];
     while (first > 0 && !(first < frame && isKey(first))) first -= 1;
@@ -118,6 +110,8 @@ export class Jumps {
     // On a keyframe, use the interval that starts there.
     return { first: isKey(frame) && last > frame ? frame : first, last };
   }
+
+  return { count, go, longestGap, toLongestGap, intervalAround };
 }
 
 /**

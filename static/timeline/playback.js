@@ -77,7 +77,7 @@ export function makePlayback(store, navigation) {
   function rest() {
     const { session, rate, target } = store.facts;
     const nextMs = anchor.time + ((target + 1 - anchor.frame) * 1000) / ((session?.fps ?? 1) * rate) - performance.now();
-    const restMs = Math.min(MAX_REST_MS, navigation.isWaiting ? MAX_REST_MS : nextMs - ANIMATION_FRAME_MS);
+    const restMs = Math.min(MAX_REST_MS, navigation.isWaiting() ? MAX_REST_MS : nextMs - ANIMATION_FRAME_MS);
     clearTimeout(timer);
     timer = setTimeout(() => requestAnimationFrame((now) => tick(now)), restMs);
   }
@@ -106,7 +106,7 @@ export function makePlayback(store, navigation) {
       anchor = here();
     }
     ticked = now;
-    if (navigation.isWaiting) return;
+    if (navigation.isWaiting()) return;
     const { first, last } = getInterval();
     let due = anchor.frame + Math.floor(((now - anchor.time) * session.fps * rate) / 1000);
     if (everyFrame && due > target + 1) {

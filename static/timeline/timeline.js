@@ -3,13 +3,12 @@
  * to a frame; with Shift it marks a range. The strip at the bottom is an overview of the whole recording.
  */
 
-import { drawWithin, fillRect } from "../widgets/canvas.js";
+import { drawWithin, fillRect, prepare } from "../widgets/canvas.js";
 import { make } from "../widgets/elements.js";
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
 import { filterTest } from "../model/provenance.js";
 import { earlierCalibration } from "../model/selectors.js";
 import { statesByFrame } from "../model/tasks.js";
-import { prepare } from "../panes/drawing.js";
 import { describeFrame } from "./cell_text.js";
 import { drawCopy, drawDimmed } from "./cell_marks.js";
 import { mountCellTip } from "./cell_tip.js";

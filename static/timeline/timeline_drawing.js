@@ -3,12 +3,12 @@
  * are CSS pixels.
  */
 
-import { drawWithin, fillRect, setText } from "../widgets/canvas.js";
+import { circlePath, drawWithin, fillRect, setText } from "../widgets/canvas.js";
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
 import { TASK_STATES } from "../model/tasks.js";
 import { trace } from "../model/series.js";
 import { shortened } from "../widgets/text.js";
-import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, drawTask, eachRun, fillBands, gapOf, hatch } from "./cell_marks.js";
+import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, drawMark, drawTask, eachRun, fillBands, gapOf, hatch } from "./cell_marks.js";
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
@@ -195,8 +195,7 @@ export function drawDoubtedKeyframes(context, axis, frames, style, { top, bottom
   const y = (top + bottom) / 2;
   for (const x of markPositions(frames, axis)) {
     drawDiamond(context, x, y, 7, style.getPropertyValue("--warning"));
-    context.fillStyle = style.getPropertyValue("--chrome");
-    context.fillRect(x - 0.75, y - 3.5, 1.5, 4.5);
+    fillRect(context, style.getPropertyValue("--chrome"), x - 0.75, y - 3.5, 1.5, 4.5);
     context.fillRect(x - 0.75, y + 2, 1.5, 1.5);
   }
 }
@@ -211,16 +210,8 @@ export function drawDoubtedKeyframes(context, axis, frames, style, { top, bottom
  */
 export function drawAmbiguous(context, axis, frames, { top, bottom }) {
   const middle = (top + bottom) / 2;
-  context.lineWidth = 1.25;
   for (const x of markPositions(frames, axis)) {
-    for (const y of [middle - 2, middle + 2]) {
-      context.beginPath();
-      context.arc(x, y, 2, 0, 2 * Math.PI);
-      context.fillStyle = "#fff";
-      context.strokeStyle = DARK_INK;
-      context.fill();
-      context.stroke();
-    }
+    for (const y of [middle - 2, middle + 2]) drawMark(context, circlePath(x, y, 2), "#fff", 1.25);
   }
 }
 
@@ -248,11 +239,8 @@ export function markPositions(frames, axis) {
  * @param {Band} band
  */
 export function drawReviewed(context, axis, cells, style, { top, bottom }) {
-  context.fillStyle = style.getPropertyValue("--good");
-  const { marks } = cells;
-  eachRun(axis, (frame) => (marks[frame] & REVIEWED ? 0 : -1), 0, (_, x, width) => {
-    context.fillRect(x, top, width, bottom - top);
-  });
+  const [{ marks }, color] = [cells, style.getPropertyValue("--good")];
+  eachRun(axis, (frame) => (marks[frame] & REVIEWED ? 0 : -1), 0, (_, x, width) => fillRect(context, color, x, top, width, bottom - top));
 }
 
 /**

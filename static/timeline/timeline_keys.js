@@ -1,6 +1,6 @@
 /** Keys of navigation, tracking, timeline and drawer. */
 
-import { inArea } from "../widgets/key_matching.js";
+import { command, inArea } from "../widgets/key_matching.js";
 import { KINDS } from "./jumps.js";
 
 /**
@@ -59,7 +59,7 @@ export function drawerBindings(drawer) {
 /** @param {import("../posing/curve_edits.js").CurveEdits} edits */
 export function curveBindings(edits) {
   const { why } = edits;
-  const whyNone = () => (edits.choices.length > 0 ? null : "No curve can be edited here. Open the curves, and choose Arms, Torso or Legs.");
+  const whyNone = () => (edits.choices().length > 0 ? null : "No curve can be edited here. Open the curves, and choose Arms, Torso or Legs.");
   return inArea("Posing", [
     { label: "Curves: choose the next curve (U in the curves)", why: whyNone, run: () => edits.next(false) },
     { label: "Curves: choose one more curve (Shift+U in the curves)", why: whyNone, run: () => edits.next(true) },
@@ -73,15 +73,13 @@ export function curveBindings(edits) {
  * @param {() => string | null} away
  */
 export function queueBindings(queue, away) {
-  const why = () => away() ?? queue.why;
+  const why = () => away() ?? queue.why();
   return inArea("Timeline", [
     { label: "Next doubtful or lost pose by severity", why, run: () => queue.step(1) },
     { label: "Previous doubtful or lost pose by severity", why, run: () => queue.step(-1) },
-    {
-      label: "Accept the doubtful or lost poses here: mark them as reviewed",
-      why: () => away() ?? queue.whyNotAccept,
-      run: () => queue.accept(queue.current),
-    },
+    command("Accept the doubtful or lost poses here: mark them as reviewed", "", () => queue.accept(queue.current()), () =>
+      away() ?? queue.whyNotAccept(),
+    ),
   ]);
 }
 
@@ -119,12 +117,7 @@ function markBindings(store, actions, reasons) {
     { label: "Remove the marks of this frame", run: () => actions.unmark() },
     { keys: ["E"], label: "Reviewed (toggle)", run: () => actions.toggleMark("reviewed") },
     { label: "Interpolate the marked range", why: reasons.range, run: interpolate },
-    {
-      label: "Estimate the poses here again",
-      words: "marked range, or the poses around this frame",
-      why: reasons.away,
-      run: () => actions.estimateAgain(),
-    },
+    command("Estimate the poses here again", "marked range, or the poses around this frame", () => actions.estimateAgain(), reasons.away),
   ];
 }
 

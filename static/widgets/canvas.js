@@ -1,6 +1,28 @@
 /** Draw texts, simple shapes and clipped areas on a canvas. */
 
 /**
+ * Resize a canvas to its pane in device pixels. Return its cleared context, scaled to CSS pixels.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {number} width
+ * @param {number} height
+ * @param {boolean} onProcessor whether to draw on the processor, which is faster for many short lines that change each
+ *   time, especially without a graphics card
+ */
+export function prepare(canvas, width, height, onProcessor) {
+  const ratio = devicePixelRatio;
+  const [deviceWidth, deviceHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== deviceWidth || canvas.height !== deviceHeight) {
+    canvas.width = deviceWidth;
+    canvas.height = deviceHeight;
+  }
+  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: onProcessor }));
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return context;
+}
+
+/**
  * Set how the next texts are drawn.
  *
  * @param {CanvasRenderingContext2D} context
@@ -52,6 +74,19 @@ export function addLine(path, from, to) {
  */
 export function diamondPath(x, y, radius) {
   return new Path2D(`M${x} ${y - radius}L${x + radius} ${y}L${x} ${y + radius}L${x - radius} ${y}Z`);
+}
+
+/**
+ * Make the path of a circle.
+ *
+ * @param {number} x middle
+ * @param {number} y
+ * @param {number} radius
+ */
+export function circlePath(x, y, radius) {
+  const path = new Path2D();
+  path.arc(x, y, radius, 0, 2 * Math.PI);
+  return path;
 }
 
 /**

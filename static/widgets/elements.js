@@ -162,6 +162,18 @@ export function tableRow(name, texts, kind = "td") {
 }
 
 /**
+ * Make a table.
+ *
+ * @param {string} className
+ * @param {string[][]} heads text of each column, and its title if it has one
+ * @param {Node[]} rows
+ */
+export function makeTable(className, heads, rows) {
+  const head = heads.map(([text, title]) => make("th", { scope: "col", ...(title && { title }) }, text));
+  return make("table", className, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows));
+}
+
+/**
  * Show keyboard keys as key caps.
  *
  * @param {string[]} keys alternatives, each of them keys that are pressed together

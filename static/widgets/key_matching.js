@@ -14,6 +14,8 @@
  * @typedef {Command & {keys: string[]}} Binding
  */
 
+/** Steps of the arrow keys, to the right and up. */
+export const ARROWS = new Map([["ArrowLeft", [-1, 0]], ["ArrowRight", [1, 0]], ["ArrowUp", [0, 1]], ["ArrowDown", [0, -1]]]); // prettier-ignore
 /** Characters of keys, where they are not the displayed name. @type {Record<string, string>} */
 const CHARACTERS = { Space: " ", "Shift ,": "<", "Shift .": ">" };
 /** Positions of keys, where they are not the displayed name. @type {Record<string, string>} */
@@ -88,4 +90,17 @@ export function keyOf(event) {
  */
 export function inArea(area, commands, why) {
   return commands.map((command) => ({ area, why, keys: [], ...command }));
+}
+
+/**
+ * Make a command that only the palette has.
+ *
+ * @param {string} label
+ * @param {string} words further words that it is found by
+ * @param {() => void} run
+ * @param {() => string | null} [why] why it is unavailable
+ * @returns {Command}
+ */
+export function command(label, words, run, why) {
+  return { label, words, run, why };
 }

@@ -22,11 +22,12 @@ export class Plot {
    */
   constructor(width, height, xs, ys, top = TOP) {
     this.xs = xs;
-    this.ys = ys;
     this.left = LEFT;
     this.right = Math.max(LEFT + 1, width - RIGHT);
     this.top = top;
     this.bottom = Math.max(top + 1, height - BOTTOM);
+    /** @type {Scale} */
+    this.scale = { ...ys, top, bottom: this.bottom };
   }
 
   /** @param {number} value */
@@ -36,7 +37,7 @@ export class Plot {
 
   /** @param {number} value */
   y(value) {
-    return this.bottom - ((this.bottom - this.top) * (value - this.ys.min)) / (this.ys.max - this.ys.min);
+    return toY(this.scale, value);
   }
 
   /**
@@ -57,16 +58,8 @@ export class Plot {
    * @param {string} unit of x
    */
   drawFrame(context, style, unit) {
-    fillRect(context, style.getPropertyValue("--plot"), this.left, this.top, this.right - this.left, this.bottom - this.top);
-    setText(context, "right", "middle");
-    for (const value of ticks(this.ys, TICK_Y / (this.bottom - this.top))) {
-      const y = Math.round(this.y(value));
-      fillRect(context, style.getPropertyValue("--line"), this.left, y, this.right - this.left, 1);
-      context.fillStyle = style.getPropertyValue("--muted");
-      context.fillText(String(Number(value.toPrecision(6))), this.left - 6, y);
-    }
-    context.textAlign = "center";
-    context.textBaseline = "bottom";
+    drawValues(context, style, this, this.scale);
+    setText(context, "center", "bottom");
     for (const value of ticks(this.xs, TICK_X / (this.right - this.left))) {
       const x = this.x(value);
       fillRect(context, style.getPropertyValue("--muted"), x - 0.5, this.bottom, 1, 3);
@@ -107,6 +100,37 @@ export class Plot {
    */
   within(context, draw) {
     drawWithin(context, this, draw);
+  }
+}
+
+/** @typedef {{top: number, bottom: number, min: number, max: number}} Scale values over a height, CSS pixels */
+
+/**
+ * @param {Scale} scale
+ * @param {number} value
+ */
+export function toY({ top, bottom, min, max }, value) {
+  return bottom - ((bottom - top) * (value - min)) / (max - min);
+}
+
+/**
+ * Draw the background of a plot, grid lines at round values and their labels.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {CSSStyleDeclaration} style
+ * @param {{left: number, right: number}} ends of the lines
+ * @param {Scale} scale
+ * @param {(y: number) => boolean} isLabelled
+ */
+export function drawValues(context, style, { left, right }, scale, isLabelled = () => true) {
+  const height = scale.bottom - scale.top;
+  fillRect(context, style.getPropertyValue("--plot"), left, scale.top, right - left, height);
+  setText(context, "right", "middle");
+  for (const value of ticks(scale, TICK_Y / height)) {
+    const y = Math.round(toY(scale, value));
+    fillRect(context, style.getPropertyValue("--line"), left, y, right - left, 1);
+    context.fillStyle = style.getPropertyValue("--muted");
+    if (isLabelled(y)) context.fillText(String(Number(value.toPrecision(6))), left - 6, y);
   }
 }
 

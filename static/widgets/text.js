@@ -34,6 +34,11 @@ export function capital(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
+/** @param {string} text that may lack a capital and a full stop */
+export function sentence(text) {
+  return `${capital(text)}${text === "" || text.endsWith(".") ? "" : "."}`;
+}
+
 /** @param {number} share 0 to 1 */
 export function percent(share) {
   return share > 0 && share < 0.01 ? "< 1 %" : share < 1 && share > 0.99 ? "> 99 %" : `${Math.round(100 * share)} %`;

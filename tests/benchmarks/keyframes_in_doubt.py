@@ -10,7 +10,6 @@ import shutil
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
 from pathlib import Path
 from zlib import crc32
 
@@ -97,7 +96,7 @@ def statuses(scene: Scene, folder: Path) -> Iterator[tuple[str, str]]:
         for kind, poses in keyframes(person.model, tracked, reference, session.fps):
             again = Path(shutil.copytree(at, Path(scratch) / kind))
             path = load_session(again).annotations_path
-            with closing(AnnotationStore(path)) as store:
+            with AnnotationStore(path) as store:
                 put_poses(store, person, poses, label="by hand", keyframe=True)
             quadrille("track", again)
             found = read_stored_poses(path, person.name, person.model)

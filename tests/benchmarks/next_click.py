@@ -11,7 +11,6 @@ everything on keyframes at equal distances. It is counted how many actions it ta
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -92,7 +91,7 @@ class Annotator:
 
     def proposals(self) -> Proposals:
         """What is proposed now."""
-        with closing(AnnotationStore(self.session.annotations_path, read_only=True)) as store:
+        with AnnotationStore(self.session.annotations_path, read_only=True) as store:
             contradicted = [contradicted_keyframes(store, p.name) for p in self.session.people]
         return propose(self.session, self.poses(), contradicted=contradicted)
 
@@ -136,7 +135,7 @@ class Annotator:
         sources = tuple(np.where(pinned, "pinned", moved).tolist())
         record = replace(pose.record, values=values, sources=sources, keyframe=True, reviewed=True, errors=None,
                          limbs_lost=(), status="", remark="", trace=None)  # fmt: skip
-        with closing(AnnotationStore(self.session.annotations_path)) as store:
+        with AnnotationStore(self.session.annotations_path) as store:
             store.commit("correct", [PoseChange(self.session.people[action.person].name, action.frame, record)])
         self.actions += 1
 

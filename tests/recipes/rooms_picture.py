@@ -17,8 +17,8 @@ HOUSE = {
         ["timeline", "scene"],
         ["posing"],
         ["panes"],
-        ["model", "layout"],
-        ["widgets", "starting", "share"],
+        ["model", "layout", "share"],
+        ["widgets", "starting"],
     ],
     "app/  the viewer": [
         ["main"],

@@ -11,7 +11,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Awaitable, Callable
-from contextlib import asynccontextmanager, closing
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -230,7 +230,7 @@ def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
 def place(session: Session, near: bool) -> None:
     """Put everybody on frame 0, where the true joints are or a hand has put the dancers; near: arms a little off."""
     joints = None if len(session.people) > 1 else read_joints(session.folder / "truth.trc", session.fps)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         for person in session.people:
             model = person.model
             if joints is None:

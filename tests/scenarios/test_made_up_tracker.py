@@ -1,7 +1,6 @@
 """A tracker that is one descriptor: the chain drives it, and help, options and the page's controls come from it."""
 
 import shutil
-from contextlib import closing
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import ClassVar
@@ -57,7 +56,7 @@ def test_the_chain_drives_it(sonar, tmp_path):
     session = load_session(shutil.copytree(SAMPLE, tmp_path / "session"))
     session.annotations_path.unlink(missing_ok=True)
     sink = SimpleNamespace(report=lambda stage, share, text="": None, take=lambda run, step: None)
-    with closing(AnnotationStore(session.annotations_path)) as store, Recording(session.cameras) as recording:
+    with AnnotationStore(session.annotations_path) as store, Recording(session.cameras) as recording:
         values = session.people[0].model.neutral()
         put_poses(store, session.people[0], {2: values})
         plan = TrackPlan(range(5), (0,), SonarSettings())

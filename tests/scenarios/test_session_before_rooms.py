@@ -7,7 +7,6 @@ program read back: the history, and poses and pins after each undo.
 
 import json
 import shutil
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +45,7 @@ def assert_shows(store, step):
 def test_poses_pins_and_history_are_the_same_through_every_undo(session, expected):
     loaded = load_session(session)
     assert [p.name for p in loaded.people] == ["person"]
-    with closing(AnnotationStore(loaded.annotations_path)) as store:
+    with AnnotationStore(loaded.annotations_path) as store:
         assert [entry.label for entry in store.history()] == expected["history"]
         for i, step in enumerate(expected["steps"]):
             if i:

@@ -1,7 +1,6 @@
 """Stores that were damaged in many ways are refused by one error, or show exactly what was written into them."""
 
 from collections import Counter
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -21,10 +20,10 @@ def test_a_damaged_store_is_refused_or_shows_what_was_written(tmp_path, cases, r
     path = tmp_path / "annotations.sqlite"
     written_store(path)
     older = path.read_bytes()
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         store.commit("late pins", [PinChange("bo", f, "head", "front", (f, 1.0)) for f in range(40)])
     data = path.read_bytes()
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         expected = shown(store)
     rng = np.random.default_rng(21)
     outcomes, uncaught, different, unclear = Counter(), [], [], []
@@ -36,7 +35,7 @@ def test_a_damaged_store_is_refused_or_shows_what_was_written(tmp_path, cases, r
             backup.unlink()
         path.with_name(path.name + "-journal").unlink(missing_ok=True)
         try:
-            with closing(AnnotationStore(path, read_only=bool(case % 3 == 0))) as store:
+            with AnnotationStore(path, read_only=bool(case % 3 == 0)) as store:
                 found = shown_or_read(store, case % 3 == 0, expected)
             outcomes["same"] += 1
             if found:

@@ -6,7 +6,6 @@ import shutil
 import signal
 import sys
 import time
-from contextlib import closing
 
 import pytest
 from annotated_copies import ACTIONS, FRAMES, act, add_tasks, new_store, pose, shown
@@ -63,7 +62,7 @@ def content(folder):
 
 
 def labels(folder):
-    with closing(AnnotationStore(folder / STORE, read_only=True)) as store:
+    with AnnotationStore(folder / STORE, read_only=True) as store:
         return {edit.label for edit in store.read_log().edits}
 
 
@@ -80,7 +79,7 @@ def copies(tmp_path):
 def test_a_merge_that_is_killed_leaves_the_copies_and_a_whole_session_or_none(copies, tmp_path, report):
     rng = random.Random(SEED)
     for folder in copies:
-        with closing(AnnotationStore(folder / STORE, author=folder.name)) as store:
+        with AnnotationStore(folder / STORE, author=folder.name) as store:
             for _ in range(30):
                 act(store, rng.randrange(ACTIONS), rng.choice(FRAMES), rng.randrange(10))
     merge_sessions(*copies, tmp_path / "whole", TOLERANCE_M)
@@ -153,7 +152,7 @@ def test_no_acknowledged_edit_is_missing_after_kills_and_merges(copies, tmp_path
                 shutil.rmtree(folder)
                 merged.rename(folder)
                 acknowledged[folder] = both
-    with closing(AnnotationStore(copies[0] / STORE)) as store:
+    with AnnotationStore(copies[0] / STORE) as store:
         add_tasks(store, [("ann", 9, "anna")])  # it can still be written
     report(f"{n_edits} edits, {n_kills} kills, {n_merges} merges")
     assert n_merges

@@ -67,7 +67,7 @@ class Seen:
 
 def stored_edits(session):
     """The number of the edit that each frame holds, read as `quadrille info` and `export` do."""
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         return {
             row.frame: round(store.pose("person", row.frame).values[0] * 100 / STEP_CM)
             for row in store.frames("person")
@@ -188,7 +188,7 @@ def test_a_killed_session_is_read_as_commands_read_it(tmp_path, cases, report, w
         writer.kill()
         writer.wait()
         hot += path.with_name("annotations.sqlite-journal").exists()
-        with closing(AnnotationStore(path, read_only=True)) as store:
+        with AnnotationStore(path, read_only=True) as store:
             poses = store.poses("ann", range(400))
             values = {pose.values[0] for pose in poses.values()}
             odd += [(case, values)] if len(values) != 1 and "commits" in when and len(poses) == 400 else []

@@ -169,7 +169,7 @@ async def test_two_annotators_and_a_program_that_is_killed(tmp_path, cases, repo
         log = read_log(session)
         for one in (anna, ben):
             one.reconcile(log)
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:  # its checksums hold
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:  # its checksums hold
         stored = {
             f.frame: round(store.pose("person", f.frame).values[0] * 100 / STEP_CM) for f in store.frames("person")
         }

@@ -1,7 +1,6 @@
 """Copies of one store, random edits of them, and what a store shows."""
 
 import shutil
-from contextlib import closing
 
 import numpy as np
 
@@ -67,10 +66,10 @@ def merged(one, other, to, tolerance_m=0.025):
     """Merge two closed stores into a new one; returns its path."""
     logs = []
     for path in (one, other):
-        with closing(AnnotationStore(path, read_only=True)) as store:
+        with AnnotationStore(path, read_only=True) as store:
             logs.append(store.read_log())
     found = merge_logs(*logs, tolerance_m)
-    with closing(AnnotationStore(to)) as store:
+    with AnnotationStore(to) as store:
         written = store.write_log(found.log)
         for key, value in renumbered(found.numbered, [e.uid for e in found.log.edits], found.log.done, written).items():
             store.set_setting(key, value)
@@ -79,7 +78,7 @@ def merged(one, other, to, tolerance_m=0.025):
 
 def shown(path):
     """Return all that a store shows of its people, but the history."""
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         bodies = {r.id: r.toml for r in store.model_revisions("ann")}
         poses = {
             k: (
@@ -94,6 +93,6 @@ def shown(path):
 
 def all_edits(path):
     """Return the identities of all edits of a store, and those that are done, in order."""
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         log = store.read_log()
         return [edit.uid for edit in log.edits], log.done

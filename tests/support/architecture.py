@@ -169,8 +169,8 @@ def own_imports():
 
 
 PAGE_ROOMS = [
-    "share",
     "widgets",
+    "share",
     "model",
     "layout",
     "panes",

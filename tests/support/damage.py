@@ -17,7 +17,7 @@ OLD_STORES = Path(__file__).parents[1] / "tracker" / "session" / "store"
 def written_store(path):
     """Write a store with all kinds of content, part of it undone."""
     rng = np.random.default_rng(5)
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         revisions = {name: store.add_model_revision(name, f"name = '{name}'\n" * 40) for name in ("ann", "bo")}
 
         def pose(name, source, **more):

@@ -1,6 +1,5 @@
 """Sessions with random poses in the store: several people, gaps, lost frames, distorted views and a fisheye."""
 
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,7 +43,7 @@ def put_poses(store, person, poses, source="manual", label="put", **more):
 
 def store_poses(session, poses, person=None, **more):
     """Store poses of a person, by default of the first one, in the annotations of a session; see `put_poses`."""
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         put_poses(store, person or session.people[0], poses, **more)
 
 

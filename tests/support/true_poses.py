@@ -1,7 +1,6 @@
 """The sample session with its true poses stored, as if they were tracked."""
 
 import shutil
-from contextlib import closing
 
 from command_line import SAMPLE
 
@@ -18,7 +17,7 @@ def sample_with_poses(folder, n):
     table = read_pose_table(SAMPLE / "truth.csv")
     model = load_model(SAMPLE / "truth_model.toml", table.height_m)
     poses = table.values_for(model)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         revision = store.add_model_revision("person", format_model(model))
         records = [
             PoseRecord(

@@ -1,7 +1,6 @@
 """Merge two copies of one session into a new session folder."""
 
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -119,7 +118,7 @@ def _words(value: Any) -> str:
 def _read(session: Session) -> EditLog:
     if session.uid and not session.annotations_path.exists():  # nobody has opened it yet
         return EditLog((), frozenset(), (), (), {}, {}, ((), (), ()))
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(session.annotations_path, read_only=True) as store:
         return store.read_log()
 
 

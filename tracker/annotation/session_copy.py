@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Generator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def write_session_copy(
         save_session(replace(session, folder=temporary))
         if (session.folder / CALIBRATION_FILE).exists():  # to the bit: writing rounds, and each rounding is a revision
             shutil.copyfile(session.folder / CALIBRATION_FILE, temporary / CALIBRATION_FILE)
-        with closing(AnnotationStore(temporary / session.annotations_path.name)) as store:
+        with AnnotationStore(temporary / session.annotations_path.name) as store:
             written = store.write_log(log)
             for key, value in renumbered(numbered, [e.uid for e in log.edits], log.done, written).items():
                 store.set_setting(key, value)

@@ -7,7 +7,7 @@ of poses between keyframes (`tracker.pipeline.keyframe_stretches`), so that a se
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -78,7 +78,7 @@ def join(
     with ExitStack() as stack:
         stores = {
             part.stretch.number: stack.enter_context(
-                closing(AnnotationStore(part.folder / session.annotations_path.name, read_only=True))
+                AnnotationStore(part.folder / session.annotations_path.name, read_only=True)
             )
             for part in parts
         }
@@ -88,7 +88,7 @@ def join(
             return named
         cuts = {b.stretch.number: joiner.cut(a, b) for a, b in pairwise(parts) if _are_neighbours(a, b)}
         stack.enter_context(SessionLock(session.folder))
-        store = stack.enter_context(closing(AnnotationStore(session.annotations_path)))
+        store = stack.enter_context(AnnotationStore(session.annotations_path))
         writer = _Writer(store, task, f"track frames {division.frames[0]}:{division.range[-1] + 1}")
         statuses = {person.name: Counter[str]() for person in people}
         for n, part in enumerate(parts):

@@ -1,7 +1,7 @@
 """The morning after a batch: a row for each recording, the one that needs a person most first."""
 
 from collections.abc import Sequence
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -184,5 +184,5 @@ def _to_look_at(people: Sequence[_Assessed]) -> tuple[int | None, str]:
 
 def _n_verified(folder: Path, person: str) -> int:
     session = load_session(folder)
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(session.annotations_path, read_only=True) as store:
         return sum(row.keyframe or row.reviewed for row in store.frames(person))

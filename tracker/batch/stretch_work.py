@@ -7,7 +7,7 @@ In that it is tracked like a recording of its own, out from a frame on which eve
 import secrets
 import shutil
 from collections.abc import Sequence
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def begin(session: Session, settings: Settings, frames: range, progress: Progres
         chain = ChainPlan(plan_of(settings, people, frames), find, () if settings.acquire is False else people)
         plan = begin_chain(chain, stored, ProgressSink(progress))
     assert plan.start is not None
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(session.annotations_path, read_only=True) as store:
         of_all = [{row.frame for row in store.frames(session.people[i].name) if row.keyframe} for i in plan.people]
     cuts = divide(frames, set.intersection(*of_all), settings.stretch_frames, session.fps)
     return Division((frames.start, frames.stop, frames.step), plan.people, plan.start, cuts)

@@ -6,7 +6,6 @@ A long recording is begun, tracked in stretches, and joined.
 import hashlib
 import shutil
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -89,7 +88,7 @@ def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done | Div
             _share_bodies(load_session(session.folder), task, folder / "bodies")
             return division
         tracked = TrackedBefore(_track(session, recording, frames, progress))
-    with SessionLock(at), closing(AnnotationStore(at / session.annotations_path.name)) as store:
+    with SessionLock(at), AnnotationStore(at / session.annotations_path.name) as store:
         store.set_setting(_TRACKED, {"task": key, **msgspec.to_builtins(tracked)})
     if task.stretch is not None:
         return Done(tracked.tracked, ())
@@ -163,7 +162,7 @@ def _tracked_before(folder: Path, key: str) -> TrackedBefore | None:
     path = folder / ANNOTATIONS_FILE
     if not path.exists():
         return None
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         setting: Any = store.setting(_TRACKED)
     if setting is None or setting["task"] != key:
         return None
@@ -179,7 +178,7 @@ def _with_known_bodies(session: Session, task: RecordingTask, bodies: Path) -> S
     ]
     if not any(path.is_file() for _, path in known):
         return session
-    with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+    with SessionLock(session.folder), AnnotationStore(session.annotations_path) as store:
         for person, path in known:
             if path.is_file():
                 label = f"body of {session.people[person].name}, acquired in another recording"

@@ -1,7 +1,6 @@
 """Acquire a person's body from the stored poses of a session, and make it the person's present body."""
 
 from collections.abc import Collection, Mapping, Sequence
-from contextlib import closing
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -155,7 +154,7 @@ def posed_frames(session: Session, person: int, frames: Sequence[int], start: in
         for k, s in usable.items()
     }
     keyframes = {k: s for k, s in usable.items() if s.record.keyframe}
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(session.annotations_path, read_only=True) as store:
         pins = {k: store.pins(session.people[person].name, k) for k in keyframes}
     observed = {k: seen_points(session.cameras, model, s.record, pins[k]) for k, s in keyframes.items()}
     cameras = [c.camera for c in session.cameras]

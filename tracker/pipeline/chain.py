@@ -5,7 +5,7 @@ shows them. Each stage is stored when it is done. The same plan goes on where it
 """
 
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -301,7 +301,7 @@ def open_stored_session(session: Session) -> Generator[StoredSession, None, None
         TrackerError: another program has it open, or footage is missing.
     """
     require_files(session)
-    with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+    with SessionLock(session.folder), AnnotationStore(session.annotations_path) as store:
         session = follow_history(session, store)
         with open_observer(session.cameras) as observer:
             yield StoredSession(session, store, observer.in_time())

@@ -1,7 +1,6 @@
 """Set a first pose that a file gives: known joints, or a table of poses."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -175,7 +174,7 @@ def _differences(found: Sequence[str], expected: Sequence[str]) -> str:
 
 def _store(session: Session, person: Person, frame: int, pose: Array, settings: dict[str, object]) -> str | None:
     """Store a keyframe; return why the store could not be backed up."""
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         revision = store.add_model_revision(person.name, format_model(person.model))
         record = PoseRecord(pose, ("imported",) * len(pose), revision, keyframe=True, settings=settings)
         store.commit(f"init from {settings['method']}, frame {frame}", [PoseChange(person.name, frame, record)])

@@ -1,6 +1,5 @@
 """`quadrille assign`: plan which frames are annotated by whom, and write blind copies."""
 
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -69,7 +68,7 @@ def command(arguments: Annotated[AssignArguments, tyro.conf.arg(name="")]) -> No
     _check(arguments)
     at = load_target(arguments.session, arguments.person, several=True)
     _check_folders(arguments)
-    with SessionLock(at.session.folder), closing(AnnotationStore(at.session.annotations_path)) as store:
+    with SessionLock(at.session.folder), AnnotationStore(at.session.annotations_path) as store:
         added = add_tasks(store, _wishes(at, arguments))
         tasks = read_tasks(store)
         copies = _write_copies(at.session, store, tasks, arguments)

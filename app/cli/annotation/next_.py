@@ -1,6 +1,5 @@
 """`quadrille next`: the frame, limb and view where a correction lowers the expected error of a recording most."""
 
-from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,7 +62,7 @@ def next_clicks(at: Target, frames: range, count: int) -> dict[str, Any]:
     ]
     contradicted: list[frozenset[int]] = []
     if session.annotations_path.exists():
-        with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+        with AnnotationStore(session.annotations_path, read_only=True) as store:
             contradicted = [contradicted_keyframes(store, p.name) for p in session.people]
     found = propose(session, poses, count, contradicted=contradicted)
     clicks = [_record(c, session.people[c.person].name) for c in found.clicks]

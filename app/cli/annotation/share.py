@@ -1,6 +1,5 @@
 """`quadrille share`: write a stretch of a session as a folder that opens in a browser, to be looked at."""
 
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -85,7 +84,7 @@ def _comments(session: "Session") -> list["SharedComment"]:
     from tracker.annotation.comments import read_comments
     from tracker.session.store.annotation_store import AnnotationStore
 
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(session.annotations_path, read_only=True) as store:
         return [
             SharedComment(c.row.person, c.row.frame, c.row.limb, c.row.text, c.row.author, c.resolved)
             for c in read_comments(store)

@@ -1,6 +1,5 @@
 """`quadrille tasks`: list the tasks of a plan and decide on them; comments."""
 
-from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -72,12 +71,12 @@ def command(arguments: Annotated[TasksArguments, tyro.conf.arg(name="")]) -> Non
     at = load_target(arguments.session, arguments.person, several=not deeds or deeds == ["resolve"])
     path = at.session.annotations_path
     if deeds:
-        with SessionLock(at.session.folder), closing(AnnotationStore(path)) as store:
+        with SessionLock(at.session.folder), AnnotationStore(path) as store:
             _do(deeds[0], at.session, store, at.people[0], arguments)
     if not path.exists():
         raise TrackerError(f"expected a plan in {at.session.folder}, found no annotations; run quadrille assign first")
     names = {at.session.people[i].name for i in at.people}
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         tasks = [t for t in read_tasks(store) if t.row.person in names and arguments.of in (None, t.row.annotator)]
         comments = [c for c in read_comments(store) if c.row.person in names]
         speed = speed_record(measure_speed(store)) if arguments.json else {}

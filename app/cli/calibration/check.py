@@ -1,6 +1,5 @@
 """`quadrille check`: find the cameras whose calibration the contours of tracked people contradict, and correct them."""
 
-from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -111,7 +110,7 @@ def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["Fr
     from tracker.session.store.annotation_store import AnnotationStore
 
     found.require_applicable(scores)
-    with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+    with SessionLock(session.folder), AnnotationStore(session.annotations_path) as store:
         if follow_history(session, store) is not session:
             raise TrackerError(
                 "expected the calibration that was checked, found one that an interrupted correction had left; it is "

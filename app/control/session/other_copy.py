@@ -80,8 +80,7 @@ class OtherCopies:
 
     def leave(self) -> None:
         """End the comparison."""
-        with self._session_state.lock:
-            self._session_state.set(other_copy=None)
+        self._session_state.set(other_copy=None)
 
     def set_tolerance(self, tolerance_m: float) -> None:
         """Set the distance of a joint, metres, up to which two poses count as one."""

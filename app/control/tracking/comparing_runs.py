@@ -39,8 +39,7 @@ class ComparingRuns:
         found = self._compared(first, last)
         if not any(found.frames):
             raise nothing_replaced(first, last)
-        with self._session_state.lock:
-            self._session_state.set(range_comparison=found)
+        self._session_state.set(range_comparison=found)
 
     def compare_run(self, frames: range) -> None:
         """Compare the poses of a run that has just ended with those that it replaced, in the background.
@@ -51,8 +50,7 @@ class ComparingRuns:
 
     def leave(self) -> None:
         """End the comparison."""
-        with self._session_state.lock:
-            self._session_state.set(range_comparison=None)
+        self._session_state.set(range_comparison=None)
 
     def close(self) -> None:
         """End the thread."""
@@ -69,8 +67,7 @@ class ComparingRuns:
         found = self._compared(run.start, run[-1], with_keyframes=False)
         if found.stretches:
             self._runs += 1
-            with self._session_state.lock:
-                self._session_state.set(range_comparison=replace(found, run=self._runs))
+            self._session_state.set(range_comparison=replace(found, run=self._runs))
 
     def _refresh(self) -> None:
         before = self._session_state.state.range_comparison

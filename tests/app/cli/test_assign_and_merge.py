@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -27,7 +26,7 @@ def annotate(folder, x, frames, author, keyframe=True):
     (person,) = load_session(folder).people
     values = person.model.neutral()
     values[0] = x
-    with closing(AnnotationStore(folder / "annotations.sqlite", author=author)) as store:
+    with AnnotationStore(folder / "annotations.sqlite", author=author) as store:
         revision = store.add_model_revision(person.name, format_model(person.model))
         record = PoseRecord(values, ("manual",) * len(values), revision, keyframe=keyframe, status="lost")
         for k in frames:
@@ -99,7 +98,7 @@ def test_two_annotators_work_blind_and_their_copies_are_merged(run, session, tmp
     ]  # fmt: skip
     for folder in (a, b, tmp_path / "anna_pass_2"):
         assert sorted(stored(folder)) == [1]
-        with closing(AnnotationStore(folder / "annotations.sqlite")) as store:
+        with AnnotationStore(folder / "annotations.sqlite") as store:
             store.go_to(None)  # nothing of the planned frames is in the history either
             assert store.pins("person", 0) == []
             assert store.redo() == "Set frame 0"
@@ -220,7 +219,7 @@ def test_the_merged_session_has_the_body_and_the_calibration_of_its_history(run,
     loaded = load_session(b)
     corrections = np.zeros((len(loaded.cameras), N_CORRECTIONS))
     corrections[0, 1] = 0.02
-    with closing(AnnotationStore(b / "annotations.sqlite")) as store:
+    with AnnotationStore(b / "annotations.sqlite") as store:
         changed = change_calibration(loaded, store, with_corrections(loaded, corrections), "calibrate")
     annotate(a, 2.0, [1], "anna")
     annotate(b, 2.0, [2], "ben")
@@ -228,7 +227,7 @@ def test_the_merged_session_has_the_body_and_the_calibration_of_its_history(run,
     found = load_session(into)
     assert found.people[0].model.name == "gavrila38"
     assert same_calibration(found, changed)
-    with closing(AnnotationStore(into / "annotations.sqlite")) as store:
+    with AnnotationStore(into / "annotations.sqlite") as store:
         assert revisions_of_poses(store, "person") == {0: 1, 1: 1, 2: 2}
         assert follow_history(found, store) is found
 

@@ -2,7 +2,6 @@
 
 import csv
 import json
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ def posed(run, session):
     """The sample with known poses on some frames, none of them a keyframe."""
     for frame in FRAMES:
         assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", str(frame), "--json")[0] == 0
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
         store.commit("no keyframes", [MarkChange("person", frame, False, False) for frame in FRAMES])
     return session
 
@@ -52,7 +51,7 @@ def test_poses_are_assessed_but_stay(run, posed, estimate):
 
 @pytest.mark.slow
 def test_a_keyframe_is_assessed_and_stays(run, posed, estimate):
-    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+    with AnnotationStore(posed / "annotations.sqlite") as store:
         store.commit("keyframes", [MarkChange("person", k, True, True) for k in (APART, 24)], author="eve")
         store.commit("pin", [PinChange("person", APART, "left_wrist", "FRONT", (10.0, 20.0))])
     before = stored(posed)
@@ -74,7 +73,7 @@ def test_a_keyframe_is_assessed_and_stays(run, posed, estimate):
     (row,) = [r for r in csv.DictReader(table.open()) if r["frame"] == str(APART)]
     assert (row["status"], row["keyframe"]) == (doubt["status"], "true")
     assert float(next(value for name, value in row.items() if "left_wrist" in name and "error" in name)) > 0
-    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+    with AnnotationStore(posed / "annotations.sqlite") as store:
         assert len(store.pins("person", APART)) == 1
         store.undo()
         assert (store.pose("person", APART).status, store.pose("person", APART).errors) == ("", None)
@@ -82,7 +81,7 @@ def test_a_keyframe_is_assessed_and_stays(run, posed, estimate):
 
 @pytest.mark.slow
 def test_alternatives_are_proposed_and_only_those_that_may_be_stay(run, posed, estimate):
-    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+    with AnnotationStore(posed / "annotations.sqlite") as store:
         pose = store.pose("person", 21)
         other = Alternative(pose.values + 0.1, pose.model_revision, 2.0)
         store.commit("alternative", [PoseChange("person", 21, pose, (other,))])
@@ -91,7 +90,7 @@ def test_alternatives_are_proposed_and_only_those_that_may_be_stay(run, posed, e
     ((proposed, source),) = asked.proposals[21, 0]
     np.testing.assert_array_equal(proposed, other.values)
     assert source == "alternative"
-    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+    with AnnotationStore(posed / "annotations.sqlite") as store:
         assert store.alternatives("person", 21) == ()
 
 

@@ -1,7 +1,6 @@
 """`quadrille check`: a camera that is off is named, corrected and can be undone; what it refuses."""
 
 import json
-from contextlib import closing
 from types import SimpleNamespace
 
 import numpy as np
@@ -55,7 +54,7 @@ def test_a_turned_camera_is_named_corrected_and_undone(run, posed):
     assert left["since_frame"] is None
     assert report["explained"]["held_out_better"] > 0.8 * report["explained"]["held_out_frames"]
     assert (posed / "calibration.toml").read_text() != wrong
-    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+    with AnnotationStore(posed / "annotations.sqlite") as store:
         assert store.history(1)[0].label == "calibration of LEFT corrected"
     assert json.loads(run("check", posed, "--json")[1])["named"] == []
 
@@ -87,7 +86,7 @@ def test_without_poses_it_says_what_to_do(run, session):
 
 
 def test_frames_outside_of_the_poses_are_refused(run, session):
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
         store.commit("nothing", [MarkChange("person", 0, False, False)])
     assert_refused(run("check", session, "--frames", "0:10"), ["expected at least 3 frames", "found 0"])
 

@@ -4,7 +4,6 @@ import shutil
 import subprocess
 import sys
 import textwrap
-from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -97,7 +96,7 @@ def test_a_killed_correction_is_whole_or_not_there(tmp_path):
     for n in range(100):
         folder = tmp_path / str(n)
         is_done = killed_after(folder, n)
-        with closing(AnnotationStore(folder / "annotations.sqlite")) as store:
+        with AnnotationStore(folder / "annotations.sqlite") as store:
             found = content(follow_history(load_session(folder), store))
             labels = [e.label for e in store.history()]
         is_new = is_same(found, after)

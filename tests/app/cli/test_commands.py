@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from contextlib import closing
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
@@ -147,7 +146,7 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
         assert after[k].sources == ("tracked",) * 22
         assert after[k].settings["method"] == "chamfer"
         assert after[k].cost_px > 0
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
         assert store.undo() == "track frames 0:4"  # one entry, however many frames
         assert [row.frame for row in store.frames("person")] == [0, 2]
 
@@ -186,7 +185,7 @@ def test_tracking_says_that_kernels_may_have_to_be_compiled(run, session, tmp_pa
 @pytest.mark.slow
 def test_tracking_leaves_what_is_locked(run, session):
     run("init", session, *WITH_POSE, "--frame", "0")
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
         store.set_setting("locked", {"person": ["left_elbow.extension", "no_joint.twist"], "nobody": ["torso.x"]})
     names = load_session(session).people[0].model.value_names
     assert run("track", session, "--frames", "0:4")[0] == 0
@@ -266,7 +265,7 @@ def test_an_estimate_that_is_interrupted_leaves_the_first_pass_and_goes_on(run, 
     summary = json.loads(run(*words)[1])  # a finished run starts over, as one entry
     assert (summary["frames"], summary["resumed_at"]) == (5, None)
     assert "all frames together moved a limb in 1 pose\n" in run(*words[:-1])[1]
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
         assert [store.undo() for _ in range(4)] == ["track frames 0:5"] * 4
         assert [row.frame for row in store.frames("person")] == [0]
     estimate.asked.clear()
@@ -357,7 +356,7 @@ def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
 
 def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
     assert run("init", session, "--method", "poses", "--poses", SAMPLE / "truth.csv", "--frame", "3")[0] == 0
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         record = store.pose("person", 3)
     assert record.keyframe
     assert set(record.sources) == {"imported"}
@@ -395,7 +394,7 @@ def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
     other = Path(shutil.copytree(SAMPLE, tmp_path / "other"))
     for folder in (session, other):
         run("init", folder, "--joints", SAMPLE / "truth.trc")
-    with closing(AnnotationStore(other / "annotations.sqlite")) as store:
+    with AnnotationStore(other / "annotations.sqlite") as store:
         record = store.pose("person", 0)
         moved = record.values + np.pad([0.03, 0.0, 0.04], (0, 19))
         store.commit("move", [PoseChange("person", 0, type(record)(moved, record.sources, record.model_revision))])

@@ -3,7 +3,6 @@
 import csv
 import json
 import shutil
-from contextlib import closing
 from dataclasses import replace
 from itertools import product
 
@@ -27,7 +26,7 @@ POSES[:, MODEL.value_names.index("left_elbow.extension")] = 1.2  # a bent arm ca
 
 def annotate(folder, person, poses, model=MODEL, keyframe=True):
     """Store poses by frame as an annotator's work."""
-    with closing(AnnotationStore(folder / "annotations.sqlite")) as store:
+    with AnnotationStore(folder / "annotations.sqlite") as store:
         source = "manual" if keyframe else "tracked"
         put_poses(store, Person(person, model, ""), poses, source, "Annotate", keyframe=keyframe)
 

@@ -1,7 +1,6 @@
 """`quadrille info` on poses of a calibration that was corrected since."""
 
 import json
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ def test_poses_of_an_earlier_calibration_are_counted(run, session):
     loaded = load_session(session)
     corrections = np.zeros((len(loaded.cameras), N_CORRECTIONS))
     corrections[0, 1] = 0.01  # radians
-    with closing(AnnotationStore(loaded.annotations_path)) as store:
+    with AnnotationStore(loaded.annotations_path) as store:
         change_calibration(loaded, store, with_corrections(loaded, corrections), "corrected")
     assert run("init", session, *WITH_POSE, "--frame", 5)[0] == 0
     out = output_of(run("info", session, "--no-check"))

@@ -1,7 +1,6 @@
 """`quadrille judge`: its JSON, text and report, and what it refuses. The tracking is that of known poses."""
 
 import json
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -40,7 +39,7 @@ def imported(run, session, tmp_path, monkeypatch, film_once):
     assert run("import", session, tmp_path / "net.trc", "--as", "net")[0] == 0
 
     def best_motion(session, observer, name, people, settings, sink):
-        with closing(AnnotationStore(session.annotations_path)) as store:
+        with AnnotationStore(session.annotations_path) as store:
             revision = store.add_model_revision("person", format_model(model))
             errors = np.broadcast_to(0.02**2 * np.eye(3), (len(model.point_names), 3, 3))
             changes, pose = [], None

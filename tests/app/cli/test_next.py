@@ -1,7 +1,6 @@
 """`quadrille next` and `track --between-keyframes` from end to end: what they print, and what they refuse."""
 
 import json
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ def pose(folder, limb, frame, sigma_m):
     (person,) = load_session(folder).people
     own = next(x for x in limbs(person.model) if limb_display_name(x.name) == limb)
     values = person.model.neutral()
-    with closing(AnnotationStore(folder / "annotations.sqlite")) as store:
+    with AnnotationStore(folder / "annotations.sqlite") as store:
         revision = store.add_model_revision(person.name, format_model(person.model))
         for k in FRAMES:
             sigmas = np.full(len(person.model.point_names), 0.006)

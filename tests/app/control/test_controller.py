@@ -2,7 +2,6 @@
 
 import threading
 import time
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -74,7 +73,7 @@ def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
     controller = opened()
     start = grab(controller, "torso")
     controller.dragging.move(PAGE, tuple(start + 40), 1)
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as other:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as other:
         np.testing.assert_array_equal(other.pose("person", 0).values, controller.state.poses[0])
     controller.dragging.move(PAGE, tuple(start + 60), 2)
     controller.dragging.cancel(PAGE)
@@ -131,7 +130,7 @@ def test_values_nobody_touched_keep_their_source(session, controller):
     controller.search.step()
     wait_for(lambda: controller.state.search.evaluations and not controller.state.search.running)
     drag(controller, "left_wrist", (10.0, 0.0))
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         sources = store.pose("person", 0).sources
     names = controller.models[0].value_names
     assert sources[names.index("left_elbow.extension")] == "manual"
@@ -171,7 +170,7 @@ def test_a_stopped_search_keeps_the_best_so_far_on_disk(session, controller):
     controller.activities.stop()
     assert not controller.state.search.running
     assert controller.state.search.kind == "search"  # it stands, and can go on
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         np.testing.assert_array_equal(store.pose("person", 0).values, controller.state.poses[0])
     evaluations = controller.state.search.evaluations
     controller.search.step()

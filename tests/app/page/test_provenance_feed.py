@@ -1,7 +1,6 @@
 """Which page receives where a pose comes from, and what it says."""
 
 import shutil
-from contextlib import closing
 
 import pytest
 from gestures import drag
@@ -17,7 +16,7 @@ def controller(session, opened):
     """Frame 0 is dragged by hand; frame 1 is tracked between two keyframes, frame 2 imported, frame 3 empty."""
     controller = opened()
     values = controller.state.poses[0]
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
 
         def record(source, **more):
             return PoseRecord(values, (source,) * len(values), 1, **more)

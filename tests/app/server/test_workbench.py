@@ -4,7 +4,6 @@ import shutil
 import signal
 import sqlite3
 import threading
-from contextlib import closing
 from types import SimpleNamespace
 
 import numpy as np
@@ -105,7 +104,7 @@ def test_unsaved_edits_are_kept_offered_and_written(open_with, session, run, pla
     found = stored(session)[0]
     np.testing.assert_array_equal(found.values, edit_on_a_full_disk.values)  # to the bit
     assert found.keyframe
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
         assert [p.point for p in store.pins("person", 0)] == ["left_wrist"]
         assert [entry.label for entry in store.history()] == [
             "set pin left wrist in FRONT, frame 0", "drag left wrist, frame 0", "drag torso, frame 0",
@@ -205,14 +204,14 @@ def test_a_rescue_file_of_another_session_is_refused(open_with, session, run, tm
     other = shutil.copytree(SAMPLE, tmp_path / "other")
     AnnotationStore(other / "annotations.sqlite").close()
     if store_id(other) == store_id(session):
-        with closing(AnnotationStore(other / "annotations.sqlite")) as store:
+        with AnnotationStore(other / "annotations.sqlite") as store:
             store.set_setting("store_id", "another")
     status, _, err = run("restore", other, "--rescue", path)
     assert (status, "edits of another session" in err) == (1, True)
 
 
 def store_id(session):
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         return store.id
 
 

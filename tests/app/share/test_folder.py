@@ -1,7 +1,6 @@
 """`quadrille share`: what it writes, what it keeps to itself, what it refuses."""
 
 import json
-from contextlib import closing
 from dataclasses import replace
 
 import cv2
@@ -64,7 +63,7 @@ def test_a_folder_has_a_picture_of_each_view_and_frame(run, couple, tmp_path):
 
 
 def test_no_login_and_no_path_of_this_machine_is_in_the_files(run, couple, tmp_path):
-    with closing(AnnotationStore(couple.annotations_path)) as store:
+    with AnnotationStore(couple.annotations_path) as store:
         store.commit("Set", [PoseChange("ann", 0, store.pose("ann", 0))], author="login-of-ann")
         assert store.pose("ann", 0).author == "login-of-ann"
     for name in ("review", "review.html"):

@@ -4,7 +4,6 @@ import hashlib
 import json
 import os
 import random
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ N_VALUES = len(MODEL.value_names)
 
 @pytest.fixture
 def store(tmp_path):
-    with closing(AnnotationStore(tmp_path / "annotations.sqlite")) as store:
+    with AnnotationStore(tmp_path / "annotations.sqlite") as store:
         yield store
 
 
@@ -196,6 +195,6 @@ def test_mutated_files_are_written_or_refused(tmp_path, store):
     assert written_ones > 0
     assert len(refused) > 100
     assert max(map(len, refused)) < 2000
-    with closing(AnnotationStore(tmp_path / "annotations.sqlite", read_only=True)) as again:
+    with AnnotationStore(tmp_path / "annotations.sqlite", read_only=True) as again:
         for frame in again.frames("ann"):
             assert len(again.pose("ann", frame.frame).values) == N_VALUES

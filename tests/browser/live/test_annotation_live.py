@@ -1,7 +1,5 @@
 """The real program: frames are planned, annotated, verified and rejected in the page, and a restart keeps that."""
 
-from contextlib import closing
-
 import pytest
 from page_driver import command, dragging, shows
 
@@ -68,7 +66,7 @@ async def test_a_plan_is_annotated_and_reviewed(tab, folder):
     await at(page, 20)
     assert await page.evaluate(values) == before  # a verdict changes no pose
 
-    with closing(AnnotationStore(load_session(folder).annotations_path, read_only=True)) as store:
+    with AnnotationStore(load_session(folder).annotations_path, read_only=True) as store:
         assert [(t.row.frame, t.state) for t in read_tasks(store)] == [
             (0, "annotated"),
             (20, "verified"),

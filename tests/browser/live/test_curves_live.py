@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -40,7 +39,7 @@ async def test_a_dragged_curve_moves_the_pose_of_one_frame(browser, folder):
 
 
 def poses_of(folder):
-    with closing(AnnotationStore(folder / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(folder / "annotations.sqlite", read_only=True) as store:
         return {frame: record.values for frame, record in store.poses("person", range(50)).items()}
 
 

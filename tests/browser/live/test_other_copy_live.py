@@ -1,7 +1,6 @@
 """Two annotators in the page: a copy is opened, its difference gone to, the mean taken, and its origin named."""
 
 import shutil
-from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -30,12 +29,12 @@ def copies(tmp_path):
     own = default_pose(model, [c.camera for c in session.cameras], np.eye(3), 0.0)
     other = own.copy()
     other[model.value_names.index("left_shoulder.elevation")] += 0.5
-    with closing(AnnotationStore(anna / "annotations.sqlite")) as store:
+    with AnnotationStore(anna / "annotations.sqlite") as store:
         revision = store.add_model_revision("person", format_model(model))
         record = PoseRecord(own, ("manual",) * len(own), revision, keyframe=True)
         store.commit("anna", [PoseChange("person", FRAME, record)], author="anna")
     ben = shutil.copytree(anna, tmp_path / "ben")
-    with closing(AnnotationStore(ben / "annotations.sqlite")) as store:
+    with AnnotationStore(ben / "annotations.sqlite") as store:
         store.commit("ben", [PoseChange("person", FRAME, replace(record, values=other))], author="ben")
     return anna, ben, mean_pose(model, [own, other])
 
@@ -65,7 +64,7 @@ async def test_the_mean_of_two_copies_is_taken_and_undone(browser, copies):
         provenance = page.locator("[data-section=provenance]")
         await provenance.get_by_text("Taken from the mean of anna and ben", exact=True).wait_for()
         await provenance.get_by_text("Keyframe by carl").wait_for()
-        with closing(AnnotationStore(anna / "annotations.sqlite", read_only=True)) as store:
+        with AnnotationStore(anna / "annotations.sqlite", read_only=True) as store:
             np.testing.assert_allclose(store.pose("person", FRAME).values, mean, atol=1e-9)
         await page.keyboard.press("Control+z")
         await provenance.get_by_text("Keyframe by anna").wait_for()

@@ -1,7 +1,6 @@
 """Range actions against the real program on the sample: what is on the page, in the store, and after undo."""
 
 import shutil
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -39,7 +38,7 @@ async def test_a_range_is_interpolated_reviewed_cleared_and_given_back(live):
     await shows(page, "quadrille.state.timeline[4]?.reviewed", 30)
     await page.locator("#range-clear").click()
     await shows(page, "Object.keys(quadrille.state.timeline).length === 2", 30)
-    with closing(AnnotationStore(folder / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(folder / "annotations.sqlite", read_only=True) as store:
         assert [row.frame for row in store.frames("person")] == [0, 10]
         for expected in ("quadrille.state.timeline[4]?.reviewed", "!quadrille.state.timeline[4].reviewed",
                          "!quadrille.state.timeline[4] && quadrille.state.timeline[10]"):  # fmt: skip
@@ -68,5 +67,5 @@ async def test_the_poses_around_a_correction_are_estimated_again_and_given_back(
 
 
 def poses_of(folder):
-    with closing(AnnotationStore(folder / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(folder / "annotations.sqlite", read_only=True) as store:
         return {frame: record.values for frame, record in store.poses("person", range(50)).items()}

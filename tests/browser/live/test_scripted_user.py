@@ -6,7 +6,6 @@ person in the footage: fitted to the true joints it stays 12 to 17 mm off.
 """
 
 import shutil
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -73,7 +72,7 @@ class Hands:
 
     @property
     def values(self):
-        with closing(AnnotationStore(self._session.annotations_path, read_only=True)) as store:
+        with AnnotationStore(self._session.annotations_path, read_only=True) as store:
             stored = store.pose(self._name, self.frame)
             return None if stored is None else stored.values
 

@@ -1,6 +1,6 @@
 """The real program with two people: each page has its own frame and undo, sees the other, and edits in turn."""
 
-from contextlib import asynccontextmanager, closing
+from contextlib import asynccontextmanager
 
 import pytest
 import pytest_asyncio
@@ -69,7 +69,7 @@ async def test_two_pages_work_on_one_session(browser, program, folder):
         await shows(anna, "quadrille.state.state.undo === null")
         await shows(ben, "quadrille.state.state.undo?.startsWith('drag left wrist, frame 20')")
         await shows(ben, "quadrille.state.state.source !== 'manual'")
-        with closing(AnnotationStore(load_session(folder).annotations_path, read_only=True)) as store:
+        with AnnotationStore(load_session(folder).annotations_path, read_only=True) as store:
             assert [row.frame for row in store.frames("person")] == [20]
 
         await ben.reload()

@@ -1,7 +1,5 @@
 """Two copies of one store, merged."""
 
-from contextlib import closing
-
 import pytest
 from annotated_copies import ACTIONS, FRAMES, act, all_edits, copied, merged, new_store, pose, shown
 from hypothesis import HealthCheck, given, settings
@@ -20,7 +18,7 @@ STEPS = st.lists(st.tuples(st.integers(0, ACTIONS - 1), st.sampled_from(FRAMES),
 
 
 def play(path, steps):
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         for step in steps:
             act(store, *step)
     return path

@@ -1,7 +1,6 @@
 """Where long recordings are cut, how their stretches are joined, and what becomes of names and of failures."""
 
 import json
-from contextlib import closing
 from pathlib import Path
 
 import msgspec
@@ -79,7 +78,7 @@ class Scene:
         copy, _ = store_motion(
             folder, [MODEL] * len(self.session.people), n_frames=40, gaps={(i, f) for i in (0, 1) for f in range(40)}
         )
-        with closing(AnnotationStore(copy.annotations_path)) as store:
+        with AnnotationStore(copy.annotations_path) as store:
             for i, person in enumerate(self.session.people):
                 revision = store.model_revisions(person.name)[0].id
                 who = names[i] if names else i
@@ -93,7 +92,7 @@ class Scene:
         return TrackedStretch(stretch, folder, Tracked(n, {}, 1.0 + number, stretch.first + 3, ""))
 
     def stored(self, person="ann"):
-        with closing(AnnotationStore(self.session.annotations_path, read_only=True)) as store:
+        with AnnotationStore(self.session.annotations_path, read_only=True) as store:
             return store.poses(person, range(40)), [e.label for e in store.history()]
 
 
@@ -134,7 +133,7 @@ def test_a_seam_over_the_tolerance_is_named_and_doubted(tmp_path):
 
 def test_stretches_that_share_a_keyframe_have_no_seam(tmp_path):
     scene = Scene(tmp_path, cuts=((0, 20), (20, 39)))
-    with closing(AnnotationStore(scene.session.annotations_path)) as store:
+    with AnnotationStore(scene.session.annotations_path) as store:
         record = PoseRecord(scene.pose(0, 20), ("manual",) * len(MODEL.neutral()), 1, keyframe=True)
         store.commit("place", [PoseChange("ann", 20, record)])
     parts = [scene.part(0, keyframes={20}), scene.part(1, keyframes={20})]

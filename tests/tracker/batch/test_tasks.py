@@ -1,7 +1,6 @@
 """A task tracks a session once, also where it is done again, and shares the body that it has acquired."""
 
 import shutil
-from contextlib import closing
 from dataclasses import replace
 
 import pytest
@@ -35,7 +34,7 @@ def manifest(tmp_path):
 
 def labels(folder):
     """Entries of the history."""
-    with closing(AnnotationStore(folder / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(folder / "annotations.sqlite", read_only=True) as store:
         return [entry.label for entry in store.history()]
 
 

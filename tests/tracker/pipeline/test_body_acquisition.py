@@ -1,6 +1,5 @@
 """A body acquired in a session: which frames count, what is stored, and that keyframes follow."""
 
-from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -25,7 +24,7 @@ from tracker.session.store.records import PinChange, PoseChange, PoseRecord
 
 @pytest.fixture
 def store(session):
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         yield store
 
 

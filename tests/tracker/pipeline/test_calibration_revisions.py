@@ -2,7 +2,6 @@
 
 import operator
 import shutil
-from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -40,7 +39,7 @@ def session(tmp_path):
 
 @pytest.fixture
 def store(session):
-    with closing(AnnotationStore(session.annotations_path)) as opened:
+    with AnnotationStore(session.annotations_path) as opened:
         yield opened
 
 

@@ -2,7 +2,6 @@
 
 import re
 import shutil
-from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -94,7 +93,7 @@ def opened(tmp_path, sample_folder):
     session = load_session(shutil.copytree(sample_folder, tmp_path / "session"))
     session.annotations_path.unlink(missing_ok=True)
     observer = SimpleNamespace(cameras=session.cameras, with_cameras=lambda chosen: None)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         yield StoredSession(session, store, observer)
 
 
@@ -132,7 +131,7 @@ def put(opened, frame, keyframe=False):
 
 
 def rows(opened):
-    with closing(AnnotationStore(opened.session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(opened.session.annotations_path, read_only=True) as store:
         return {row.frame: store.pose("person", row.frame) for row in store.frames("person")}
 
 
@@ -228,7 +227,7 @@ def test_sizes_are_acquired_and_stored_before_tracking(opened, found, walkers, a
     start = poses[FRAME]
     assert (start.sources[0], start.status, start.settings["method"]) == ("searched", "good", "voxels")
     np.testing.assert_allclose(start.values, retarget_pose(before.neutral(), before, body), atol=1e-6)
-    with closing(AnnotationStore(opened.session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(opened.session.annotations_path, read_only=True) as store:
         assert [e.label for e in store.history()] == [
             "track frames 0:6", "acquire sizes of person", "find people, frame 3"
         ]  # fmt: skip
@@ -284,7 +283,7 @@ def test_sizes_of_an_earlier_calibration_are_acquired_again(opened, found, walke
     corrections = np.zeros((len(opened.session.cameras), N_CORRECTIONS))
     corrections[0, 1] = 0.01
     changed = with_corrections(opened.session, corrections)
-    with closing(AnnotationStore(opened.session.annotations_path)) as store:
+    with AnnotationStore(opened.session.annotations_path) as store:
         opened.session = change_calibration(opened.session, store, changed, "corrected")
         assert opened.outdated_sizes() == ["person"]
         store.undo()

@@ -2,7 +2,6 @@
 
 import threading
 import time
-from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -470,7 +469,7 @@ def found_people(session, scale):
 @pytest.mark.parametrize("scale", [1.0, 1.05])
 def test_poses_and_bodies_are_one_entry_of_the_history(session, scale):
     found = found_people(session, scale)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         changed = store_found(session, store, found)
         (entry,) = store.history()
         record = store.pose("person", 7)

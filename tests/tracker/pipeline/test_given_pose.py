@@ -1,7 +1,6 @@
 """First poses that a file gives are stored as keyframes, or refused before anything is written."""
 
 import shutil
-from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +26,7 @@ def joints(session):
 
 
 def keyframes(session):
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         return {row.frame: row.source for row in store.frames(session.people[0].name)}
 
 

@@ -1,7 +1,5 @@
 """First poses and evidence from imported key points, in sessions without footage."""
 
-from contextlib import closing
-
 import numpy as np
 import pytest
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
@@ -110,7 +108,7 @@ def test_people_without_key_points_are_named(tmp_path):
 def test_a_detector_that_was_learnt_is_read_again_for_the_same_body_alone(tmp_path):
     session, _ = imported(tmp_path)
     learnt = learn_seen_bodies(session, read_points(session, "net"))
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         assert stored_seen_bodies(session, store, "net") is None
         store.set_setting(SEEN_BODIES, seen_bodies_record(session, "net", learnt, {}))
         again = stored_seen_bodies(session, store, "net")
@@ -144,7 +142,7 @@ def test_joints_for_sizes_count_as_one_altogether(tmp_path):
 def test_poses_of_key_points_are_stored_and_keyframes_stay(tmp_path):
     session, (motion,) = imported(tmp_path)
     model = session.people[0].model
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         put_poses(store, session.people[0], {3: model.neutral()}, keyframe=True)
         assert store_keypoint_poses(session, store, (0,), range(2, 8), "net") == {0: 5}
         records = store.poses("ann", range(N))

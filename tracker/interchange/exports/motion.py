@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -288,7 +287,7 @@ def read_motion(
     elif frames is None:
         within = range(found[0], found[-1] + 1)
     calibrations = read_posed_revisions(session.annotations_path, [p.name for p in session.people])
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(session.annotations_path, read_only=True) as store:
         verifications = store.tasks.verifications()
     return ExportedMotion(session, within, tuple(people), having, n_lost, calibrations, verifications)
 

@@ -10,7 +10,7 @@ import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from tracker.errors import OvertakenEditError
 from tracker.session.store import edit_tree, own_undo, rows
@@ -41,9 +41,9 @@ _ID = "store_id"
 
 
 class AnnotationStore:
-    """The annotations of a session. Safe to use from several threads; one program may write at a time.
+    """The annotations of a session; a context manager. Safe to use from several threads.
 
-    When a method returns, its changes are on the disk.
+    One program may write at a time. When a method returns, its changes are on the disk.
     """
 
     def __init__(self, path: str | Path, read_only: bool = False, author: str | None = None) -> None:
@@ -68,6 +68,12 @@ class AnnotationStore:
     def close(self) -> None:
         """Release the file."""
         self._connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     @property
     def id(self) -> str:

@@ -7,7 +7,6 @@ was present when it was made: that of the last such entry before its own.
 
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,7 +47,7 @@ def read_posed_revisions(path: Path, people: Sequence[str]) -> PosedRevisions:
     """
     if not path.exists():
         return PosedRevisions()
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         return PosedRevisions(present_revision(store) or 1, {name: revisions_of_poses(store, name) for name in people})
 
 

@@ -1,6 +1,5 @@
 """Read the stored poses of a person in the bodies that they were made with."""
 
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,7 +39,7 @@ def read_stored_poses(path: Path, person: str, model: BodyModel, frames: range =
     """
     if not path.exists():
         return {}
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         records = store.poses(person, frames)
         tomls = {r: store.model_revision(r).toml for r in {record.model_revision for record in records.values()}}
         present = format_model(model)

@@ -1,7 +1,5 @@
 """Two poses about as good: marked, drawn dashed, taken in place of each other, undone."""
 
-from contextlib import closing
-
 import numpy as np
 import pytest
 
@@ -25,7 +23,7 @@ def tracked(couple, session, opened):
     lifted = bob.copy()
     lifted[couple.models[BOB].value_names.index("left_shoulder.elevation")] += 0.8
     revisions = couple.state.revisions
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
 
         def found(person, frame, values, *others):
             record = PoseRecord(values, ("tracked",) * len(values), revisions[person], status="doubtful", cost_px=2.0)
@@ -108,7 +106,7 @@ def test_without_another_pose_there_is_nothing_to_take(tracked):
 def test_a_keyframe_shows_its_alternative_only_while_two_merged_copies_disagree(couple, session, opened, is_disputed):
     ann, model = couple.state.poses[ANN], couple.state.models[ANN]
     other = model.retract(ann, 0.1 * (np.arange(model.n_dofs) < 2))
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    with AnnotationStore(session / "annotations.sqlite") as store:
         record = PoseRecord(ann, ("manual",) * len(ann), couple.state.revisions[ANN], keyframe=True)
         back = Alternative(other, couple.state.revisions[ANN], None)
         store.commit("Merge", [PoseChange("ann", 0, record, (back,))])

@@ -1,7 +1,5 @@
 """Sizes edited by hand: a draft, a new revision of the body, keyframes refitted or kept, undo, restart, wrong input."""
 
-from contextlib import closing
-
 import numpy as np
 import pytest
 from gestures import PAGE, drag, drag_on, pixel_of
@@ -144,7 +142,7 @@ def test_previous_sizes_are_one_click_away(posed):
     assert length(posed.body_sizes.model(0)) == pytest.approx(before)
     posed.body_sizes.apply(0, refit=True)
     assert length(posed.session.people[0].model) == pytest.approx(before)
-    with closing(AnnotationStore(posed.session.annotations_path, read_only=True)) as store:
+    with AnnotationStore(posed.session.annotations_path, read_only=True) as store:
         assert len(store.model_revisions("person")) == 2  # the body that was there before, not a third
 
 

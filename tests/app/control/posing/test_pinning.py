@@ -1,7 +1,5 @@
 """Pins in the program: gestures, the fit that follows, undo, and what is on disk after each."""
 
-from contextlib import closing
-
 import numpy as np
 import pytest
 from gestures import FRONT, PAGE, drag, pixel_of, wait_for
@@ -24,7 +22,7 @@ def pin(controller, point, position_px, camera=FRONT, live=False, to_px=None):
 
 
 def stored_pins(session, frame=0):
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         pins = store.pins("person", frame)
     return pins
 
@@ -196,7 +194,7 @@ def test_fit_says_who_determined_what(session, controller):
     assert controller.state.undo == "fit to pins and edges, frame 0"
     assert controller.state.cost_px < cost_px
     assert controller.state.people[0].source == "pinned"
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         pose = store.pose("person", 0)
     by_name = dict(zip(controller.models[0].value_names, pose.sources, strict=True))
     assert by_name["left_elbow.extension"] == "pinned"
@@ -287,7 +285,7 @@ def test_fit_vouches_for_the_pinned_and_leaves_doubts_about_others(couple, sessi
     controller = opened()
     pin(controller, "left_wrist", pixel_of(controller, "left_wrist") + 3.0)
     controller.pinning.fit(0)
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         ann, bob = store.pose("ann", 0), store.pose("bob", 0)
     assert (ann.keyframe, ann.status) == (True, "")
     assert (bob.keyframe, bob.status, bob.remark) == (False, "doubtful", "left arm relocated")

@@ -88,7 +88,7 @@ def test_people_are_placed_by_twenty_drags_and_one_fit(recording, seed, request,
     session = load_session(shutil.copytree(source, tmp_path / "session"))
     with ExitStack() as open_now:
         footage = open_now.enter_context(closing(Recording(session.cameras)))
-        store = open_now.enter_context(closing(AnnotationStore(session.annotations_path)))
+        store = open_now.enter_context(AnnotationStore(session.annotations_path))
         frames = FrameCache(Observer(session.cameras, footage), rest_s=0)
         controller = open_now.enter_context(closing(Controller(session, Saver(session, store), frames)))
         wait_for(lambda: controller.state.cost_px is not None)

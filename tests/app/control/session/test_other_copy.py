@@ -1,7 +1,6 @@
 """Another copy of the session: where it differs, its poses drawn, and decisions between both that undo takes back."""
 
 import shutil
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -24,7 +23,7 @@ def both(session, tmp_path, controller):
     for frame in (0, 1):
         drag_on(controller, frame, "torso", (4.0, 0.0))
     ben = shutil.copytree(session, tmp_path / "ben")
-    with closing(AnnotationStore(ben / "annotations.sqlite")) as store:
+    with AnnotationStore(ben / "annotations.sqlite") as store:
         store.commit("by ben", [PoseChange("person", frame, moved(store, controller, frame)) for frame in (1, 2)])
     return controller, ben
 

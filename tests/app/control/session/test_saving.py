@@ -1,7 +1,6 @@
 """A state says "saved" only if the disk has every pose and pin that was shown, on every path that edits."""
 
 import time
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -195,6 +194,6 @@ def test_an_edit_is_kept_while_the_store_can_neither_be_read_nor_written(session
         assert controller.state.save_error == "the drive is gone; plug it in"
         assert not controller.state.saved
     controller.history.save()
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         np.testing.assert_array_equal(store.pose("person", 0).values, values)
     assert controller.state.undo == "drag left wrist, frame 0"

@@ -1,7 +1,5 @@
 """Work on ranges of frames through the controller: what is stored, what stays, and how it is taken back."""
 
-from contextlib import closing
-
 import numpy as np
 import pytest
 from gestures import drag_on, wait_for
@@ -27,7 +25,7 @@ def cells(controller):
 
 
 def stored(session, frame):
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         return store.pose("person", frame)
 
 

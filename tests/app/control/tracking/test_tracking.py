@@ -4,7 +4,6 @@ import gc
 import threading
 import time
 import weakref
-from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +41,7 @@ def test_a_run_goes_out_from_a_frame_in_both_directions_and_keeps_its_pose(place
     wait_for(lambda: ended)
     assert ended == [True]
     assert tracker.seen == [2, 1, 0, *range(2, last + 1)]
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         assert tracker.last[3].poses[0][0] == pytest.approx(start + STEP_M)  # the second leg begins at the start, too
         assert store.pose("person", 2).values[0] == start
         assert len(store.frames("person")) == last + 1
@@ -77,7 +76,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     assert placed.state.track.message == "done: 7 frames, 1 doubtful, 1 lost"
     assert placed.state.frame == 9
     assert placed.state.undo == "track forward from frame 3"
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         assert [(row.frame, row.source, row.status) for row in store.frames("person")] == [
             (2, "manual", ""), (3, "tracked", "good"), (4, "tracked", "doubtful"), (5, "tracked", "good"),
             (6, "tracked", "good"), (7, "tracked", "lost"), (8, "tracked", "good"), (9, "tracked", "good"),
@@ -167,7 +166,7 @@ def test_pause_and_go_on_are_one_entry(placed, tracker, session):
     placed.tracking.pause()
     assert not placed.state.track.running
     assert placed.state.track.at == 5
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+    with AnnotationStore(session / "annotations.sqlite", read_only=True) as store:
         assert [row.frame for row in store.frames("person")] == [2, 3, 4, 5]
     placed.navigation.seek(3)
     placed.tracking.resume()

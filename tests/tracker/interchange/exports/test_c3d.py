@@ -1,6 +1,5 @@
 """C3D files, read by ezc3d."""
 
-from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +24,7 @@ def test_ezc3d_finds_the_joint_centers_labels_units_rate_and_residuals(tmp_path,
     session, truth = store_motion(tmp_path / "s", [model], gaps={(0, 3)})
     session = replace(session, fps=29.97)  # a rate that is no whole number
     errors = np.full((len(model.point_names), 3, 3), np.diag([0.01, 0.02, 0.02]) ** 2)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         store.commit("Assess", [PoseChange("ann", 4, replace(store.pose("ann", 4), errors=errors))])
     motion = read_motion(session, (0,), range(2, 7))
     write_person_c3d(motion, ExportOptions(axes, units), [tmp_path / "a.c3d"], lambda: None)

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import shutil
-from contextlib import closing
 from dataclasses import replace
 
 import cv2
@@ -103,7 +102,7 @@ def test_checksums_splits_and_a_card_with_fields_to_fill_in(tmp_path, couple):
 
 def test_people_without_a_label_are_counted(tmp_path, couple):
     session, _ = couple
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         store.commit("mark", [MarkChange("bob", 3, keyframe=True, reviewed=True)])
     folder, recording = exported(tmp_path, session, only="keyframes")
     coco = COCO(str(recording / "labels" / "coco.json"))

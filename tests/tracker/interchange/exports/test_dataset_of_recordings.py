@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from contextlib import closing
 from dataclasses import replace
 
 import pytest
@@ -111,11 +110,11 @@ def test_people_of_one_name_may_be_different(three, dataset):
 def test_a_refused_recording_leaves_nothing(tmp_path, three):
     before = sorted(tmp_path.iterdir())
     with_poses = three[2].read().session
-    with closing(AnnotationStore(with_poses.annotations_path)) as store:
+    with AnnotationStore(with_poses.annotations_path) as store:
         store.undo()
     with pytest.raises(SessionError, match="expected poses of 'ann'"):
         plan_dataset(three, ExportOptions(), SplitChoice())
-    with closing(AnnotationStore(with_poses.annotations_path)) as store:
+    with AnnotationStore(with_poses.annotations_path) as store:
         store.redo()
     # Footage that cannot be read shows only while the second recording is written.
     motion = three[1].read()

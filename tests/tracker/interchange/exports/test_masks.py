@@ -1,7 +1,6 @@
 """Masks of parts and people in each view, read by Pillow."""
 
 import json
-from contextlib import closing
 from dataclasses import replace
 
 import cv2
@@ -113,7 +112,7 @@ def test_people_who_are_not_exported_have_a_label_of_their_own(tmp_path, couple)
 
 def test_a_person_without_a_selected_pose_in_a_frame_is_somebody(tmp_path, couple):
     session, _ = couple
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         store.commit("mark", [MarkChange("bob", 2, keyframe=True, reviewed=True)])
     motion = read_motion(session, (0, 1), only="keyframes")
     assert [list(motion.frames), motion.chosen] == [[1, 2], (0, 1)]

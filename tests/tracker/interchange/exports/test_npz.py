@@ -1,6 +1,5 @@
 """NPZ files, read by NumPy without pickle."""
 
-from contextlib import closing
 from dataclasses import replace
 
 import cv2
@@ -22,7 +21,7 @@ def test_arrays_have_poses_joints_covariances_and_cameras(tmp_path, axes):
     models = [MODELS["gavrila38"], MODELS["gavrila22"]]
     session, truth = store_motion(tmp_path / "s", models, gaps={(0, 3)}, lost={(1, 5)})
     errors = np.full((len(models[0].point_names), 3, 3), np.diag([0.01, 0.02, 0.03]) ** 2)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         changed = replace(store.pose("ann", 4), errors=errors)
         store.commit("Assess", [PoseChange("ann", 4, changed)], author="eve")
     motion = read_motion(session, (0, 1), [1, 3, 4, 5])

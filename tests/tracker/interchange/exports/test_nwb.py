@@ -1,6 +1,5 @@
 """NWB files, read and checked by pynwb and ndx-pose."""
 
-from contextlib import closing
 from dataclasses import replace
 
 import cv2
@@ -26,7 +25,7 @@ def test_ndx_pose_finds_points_cameras_and_provenance(tmp_path, axes):
     session, truth = store_motion(tmp_path / "s", [model, MODELS["gavrila22"]], gaps={(0, 3)})
     session = replace(session, cameras=tuple(replace(c, offset=5) for c in session.cameras))
     errors = np.full((len(model.point_names), 3, 3), np.diag([0.01, 0.02, 0.03]) ** 2)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         changed = replace(store.pose("ann", 4), errors=errors)
         store.commit("Assess", [PoseChange("ann", 4, changed)], author="eve")
     path, T = tmp_path / "a.nwb", file_from_world(session, axes)

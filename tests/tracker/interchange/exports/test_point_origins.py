@@ -1,6 +1,5 @@
 """Where each joint of a stored pose comes from, through edits of several people."""
 
-from contextlib import closing
 from dataclasses import replace
 
 import pytest
@@ -18,7 +17,7 @@ MODEL = MODELS["gavrila38"]
 def edited(tmp_path):
     """A tracked pose: anna sets the left shoulder, ben the right one, anna confirms it; returns its versions."""
     session, _ = store_motion(tmp_path / "s", [MODEL], n_frames=2)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         for author, side in (("anna", "left"), ("ben", "right")):
             record = store.pose("ann", 0)
             is_own = [name.startswith(f"{side}_shoulder") for name in MODEL.value_names]

@@ -1,7 +1,6 @@
 """Provenance of exported poses, and which poses are exported."""
 
 import json
-from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +25,7 @@ MODEL = MODELS["gavrila38"]
 
 def edited(session, person, frame, author, **changes):
     """Change the pose of a person in a frame."""
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         record = replace(store.pose(person, frame), **changes)
         store.commit("Edit", [PoseChange(person, frame, record)], author=author)
         return record
@@ -44,7 +43,7 @@ def session(tmp_path):
         session, "ann", 2, "eve", sources=sources, status="doubtful", errors=factors @ np.swapaxes(factors, 1, 2),
         limbs_lost=tuple(0.1 * (i + 1) for i in range(len(limbs(MODEL)))),
     )  # fmt: skip
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         store.commit("Review", [MarkChange("ann", 4, keyframe=False, reviewed=True)])
     return session
 
@@ -78,7 +77,7 @@ def test_covariances_turn_with_the_axes_of_the_file(tmp_path, session, axes):
     found = written(tmp_path, session, axes=axes)
     pose = next(p for p in found["people"]["ann"] if p["frame"] == 2)
     rows = np.array(pose["covariances_m2"])
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         errors = store.pose("ann", 2).errors
     axis = {"calibration": 2, "y-up": 1}[axes]  # the world's vertical axis in the file
     diagonal = rows[:, (0, 3, 5)]
@@ -90,7 +89,7 @@ def test_poses_of_an_earlier_calibration_are_named(tmp_path, session):
     first = session.cameras[0]
     K = first.camera.K + np.array([[0, 0, 2.0], [0, 0, 0], [0, 0, 0]])
     moved = replace(session, cameras=(replace(first, camera=replace(first.camera, K=K)), *session.cameras[1:]))
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         change_calibration(session, store, moved, "corrected")
     edited(session, "ann", 5, "eve")
     found = written(tmp_path, load_session(session.folder))
@@ -130,7 +129,7 @@ def test_frames_of_a_list_are_exported_alone(session):
 
 
 def test_a_verified_pose_names_who_verified_it_until_it_is_edited(tmp_path, session):
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         plan.add_tasks(store, [("ann", 2, "eve"), ("ann", 4, ""), ("ann", 5, "")])
         for frame, state in ((2, "verified"), (4, "verified"), (5, "verified"), (5, "rejected")):
             plan.decide(store, ("ann", frame), state, author="rita")

@@ -2,7 +2,6 @@
 
 import csv
 import json
-from contextlib import closing
 from dataclasses import replace
 
 import cv2
@@ -226,7 +225,7 @@ def test_the_area_is_that_of_the_silhouette(couple):
 def test_files_name_the_calibration_and_the_poses_of_an_earlier_one(tmp_path):
     """The pose of frame 2 was made again after a camera was corrected, that of frame 1 before."""
     session, _ = store_motion(tmp_path / "s", [MODELS["gavrila22"]], n_frames=3)
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         pose = store.pose("ann", 2)
         corrections = np.zeros((3, N_CORRECTIONS))
         corrections[0, 0] = 0.01
@@ -318,7 +317,7 @@ def test_lost_poses_are_left_out_on_request_and_nobody_is_refused(couple):
 
 def test_a_keyframe_is_never_left_out_as_lost(couple):
     session, _ = couple
-    with closing(AnnotationStore(session.annotations_path)) as store:
+    with AnnotationStore(session.annotations_path) as store:
         store.commit("mark", [MarkChange("bob", 5, keyframe=True, reviewed=True)])
     motion = read_motion(session, (0, 1), skip_lost=True)
     assert (5 in motion.people[1].poses, motion.n_lost) == (True, 0)

@@ -1,7 +1,5 @@
 """Stored poses decide who is who in key points of several people, whatever the order in which they are seen."""
 
-from contextlib import closing
-
 import numpy as np
 import pytest
 from observed_people import BODY_25, make_session, seen, write_openpose
@@ -60,7 +58,7 @@ def imported(session, tmp_path, first="ben"):
 
 def store(session, name, edited=(), moved=(0.0, 0.0, 0.0)):
     model = next(p.model for p in session.people if p.name == name)
-    with closing(AnnotationStore(session.annotations_path)) as opened:
+    with AnnotationStore(session.annotations_path) as opened:
         revision = opened.add_model_revision(name, format_model(model))
         changes = []
         for k, body in enumerate(bodies(session, name, moved)):

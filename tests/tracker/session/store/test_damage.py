@@ -1,7 +1,6 @@
 """What is wrong with a store is found when it is opened, and one sentence says what to do."""
 
 import shutil
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from tracker.session.store.records import Alternative, PinChange, PoseChange, Po
 def path(tmp_path):
     """A store with a pose, an alternative, a pin and a setting."""
     path = tmp_path / "annotations.sqlite"
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         revision = store.add_model_revision("ann", "a = 1")
         pose = PoseRecord(np.array([1.0, 2.0]), ("manual", "tracked"), revision, cost_px=1)
         store.commit("place", [PoseChange("ann", 3, pose, (Alternative(pose.values + 1, revision, 2),))])
@@ -66,7 +65,7 @@ def test_the_message_names_the_frames(path):
 
 
 def test_everything_that_is_written_passes_when_it_is_opened_again(path):
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         pose = store.pose("ann", 3)
         edit = store.commit("drag", [PoseChange("ann", 4, pose)]).edit
         store.amend(edit, [PoseChange("ann", 4, None), PoseChange("bö", 4, pose)])
@@ -111,12 +110,12 @@ def test_a_damaged_pose_of_an_older_version_is_found_before_the_upgrade(tmp_path
 
 def edited(path, frame):
     """Open a store, edit it, and close it."""
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         store.commit("drag", [PoseChange("ann", frame, store.pose("ann", 3))])
 
 
 def frames_of(path):
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         return [row.frame for row in store.frames("ann")]
 
 
@@ -186,7 +185,7 @@ def test_going_back_takes_the_newest_backup_that_passes_and_keeps_the_damaged_fi
     assert restored.kept.read_bytes() == b""
     assert restored.kept.with_name(restored.kept.name + "-journal").read_bytes() == b"of the damaged file"
     assert frames_of(path) == [3, 10]
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         assert store.undo() == "drag"
 
 
@@ -201,7 +200,7 @@ def test_going_back_without_a_backup_that_passes(path):
 
 def test_a_folder_that_takes_no_backups_can_be_worked_in(path):
     (path.parent / "backups").write_text("a file")
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         assert "no backup of" in store.backup_error
         store.commit("drag", [PoseChange("ann", 7, store.pose("ann", 3))])
     assert frames_of(path) == [3, 7]
@@ -256,7 +255,7 @@ def place(store, frame):
 @pytest.mark.parametrize("way", ["renamed", "copied"])
 def test_a_folder_that_comes_back_is_written_again(folder, tmp_path, way):
     away = tmp_path / "away"
-    with closing(AnnotationStore(folder / "annotations.sqlite")) as store:
+    with AnnotationStore(folder / "annotations.sqlite") as store:
         place(store, 1)
         folder.rename(away)
         with pytest.raises(SessionError, match=r"are not there .*bring the session's folder back"):
@@ -273,11 +272,11 @@ def test_a_folder_that_comes_back_is_written_again(folder, tmp_path, way):
 
 def test_another_store_in_the_place_of_the_one_that_went_away_is_not_written(folder, tmp_path):
     path = folder / "annotations.sqlite"
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         place(store, 1)
         folder.rename(tmp_path / "away")
         folder.mkdir()
-        with closing(AnnotationStore(path)) as other:
+        with AnnotationStore(path) as other:
             place(other, 7)
         with pytest.raises(SessionError, match="others than those that were opened"):
             place(store, 2)

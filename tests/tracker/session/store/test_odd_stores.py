@@ -144,7 +144,7 @@ OF_TIMES = [
 
 def read_all(path):
     """Read all that commands and the page read."""
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         store.history()
         store.setting("locked")
         counts = store.value_counts()
@@ -191,7 +191,7 @@ GOOD_SETTINGS = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in SETTINGS.items() for value in values])
 def test_odd_settings_are_named(path, name, value):
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         store.set_setting(name, GOOD_SETTINGS[name])
         assert store.setting(name) == GOOD_SETTINGS[name]
         store.set_setting(name, value)
@@ -203,7 +203,7 @@ def test_odd_settings_are_named(path, name, value):
 
 
 def test_settings_of_other_names_are_any_json(path):
-    with closing(AnnotationStore(path)) as store:
+    with AnnotationStore(path) as store:
         store.set_setting("unknown", GOOD_SETTINGS["unknown"])
         assert store.setting("unknown") == {"any": [1]}
 
@@ -226,7 +226,7 @@ def test_odd_rows_are_named(path, statement):
 def test_odd_times_are_named(path, statement):
     """Times order edits and decisions, and are reckoned with."""
     changed(path, statement.format("yesterday"))
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         with pytest.raises(DamagedStoreError, match=r"expected a time in UTC such as 20.*, found 'yesterday'"):
             store.read_log()
         if "edits" in statement:

@@ -29,7 +29,7 @@ def path(tmp_path):
 
 
 def labels(path):
-    with closing(AnnotationStore(path, read_only=True)) as store:
+    with AnnotationStore(path, read_only=True) as store:
         return [entry.label for entry in store.history()]
 
 

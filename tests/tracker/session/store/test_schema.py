@@ -73,14 +73,14 @@ def version_5(version_4):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_10_decisions_named_no_pose_and_counted_by_their_time(version_10, read_only):
     before = version_10.read_bytes()
-    with closing(AnnotationStore(version_10, read_only=read_only)) as store:
+    with AnnotationStore(version_10, read_only=read_only) as store:
         assert [(s.author, s.pose) for s in store.tasks.states()] == [("rita", None)]
         assert [(t.row.frame, t.state) for t in read_tasks(store)] == [(1, "verified"), (2, "draft")]
     assert (version_10.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_10_takes_poses_of_decisions_and_is_still_checked(version_10):
-    with closing(AnnotationStore(version_10)) as store:
+    with AnnotationStore(version_10) as store:
         first = store.pose("ann", 1)
         store.commit("Drag", [PoseChange("ann", 1, PoseRecord(first.values + 1, ("manual",) * 2, 1, keyframe=True))])
         assert [t.state for t in read_tasks(store)] == ["annotated", "draft"]
@@ -99,7 +99,7 @@ def uids(path):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_9_edits_had_no_identities_and_nothing_was_planned(version_9, read_only):
     before = version_9.read_bytes()
-    with closing(AnnotationStore(version_9, read_only=read_only)) as store:
+    with AnnotationStore(version_9, read_only=read_only) as store:
         assert [(e.edit, e.author, e.undone) for e in store.history()] == [
             (4, "eve", True), (3, "", False), (2, "", False), (1, "eve", False),
         ]  # fmt: skip
@@ -114,7 +114,7 @@ def test_two_copies_of_a_store_of_version_9_agree_about_its_edits(version_9, tmp
     copy.write_bytes(version_9.read_bytes())
     read = AnnotationStore(copy, read_only=True).tasks.keyframe_edits()
     for path in (version_9, copy):
-        with closing(AnnotationStore(path)) as store:
+        with AnnotationStore(path) as store:
             store.commit("new", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("manual",) * 2, 1))])
     mine, theirs = uids(version_9), uids(copy)
     assert mine[:4] == theirs[:4]
@@ -142,7 +142,7 @@ def test_copies_of_a_store_of_version_9_that_were_edited_apart_before_their_upgr
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_8_searches_were_not_kept_and_nothing_was_assessed_later(version_8, read_only):
     before = version_8.read_bytes()
-    with closing(AnnotationStore(version_8, read_only=read_only)) as store:
+    with AnnotationStore(version_8, read_only=read_only) as store:
         assert [(r.frame, r.status, r.assessed_since) for r in store.frames("ann")] == [
             (1, "", False), (2, "lost", False), (3, "doubtful", False),
         ]  # fmt: skip
@@ -153,7 +153,7 @@ def test_in_version_8_searches_were_not_kept_and_nothing_was_assessed_later(vers
 
 
 def test_a_store_of_version_8_takes_searches_and_assessments_and_is_still_checked(version_8):
-    with closing(AnnotationStore(version_8)) as store:
+    with AnnotationStore(version_8) as store:
         trace = (Search("limbs", ("left_arm",), 41.0, 12.5, True), Search("samples", (), 12.5, None, False))
         store.commit("track", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("tracked",) * 2, 1, trace=trace))])
         keyframe = store.pose("ann", 1)
@@ -166,7 +166,7 @@ def test_a_store_of_version_8_takes_searches_and_assessments_and_is_still_checke
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_7_errors_were_not_known(version_7, read_only):
     before = version_7.read_bytes()
-    with closing(AnnotationStore(version_7, read_only=read_only)) as store:
+    with AnnotationStore(version_7, read_only=read_only) as store:
         assert [(r.frame, r.status, r.limbs_lost) for r in store.frames("ann")] == [
             (1, "", ()), (2, "lost", (0.5, 0.01)), (3, "doubtful", (0.5, 0.01)),
         ]  # fmt: skip
@@ -175,7 +175,7 @@ def test_in_version_7_errors_were_not_known(version_7, read_only):
 
 
 def test_a_store_of_version_7_takes_errors_and_is_still_checked(version_7):
-    with closing(AnnotationStore(version_7)) as store:
+    with AnnotationStore(version_7) as store:
         errors = np.array([[[4, 1, 0], [1, 5, 2], [0, 2, 6]], np.eye(3)])
         store.commit("track", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("tracked",) * 2, 1, errors=errors))])
     np.testing.assert_array_equal(AnnotationStore(version_7).pose("ann", 4).errors, errors)
@@ -184,7 +184,7 @@ def test_a_store_of_version_7_takes_errors_and_is_still_checked(version_7):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_6_limbs_were_not_assessed(version_6, read_only):
     before = version_6.read_bytes()
-    with closing(AnnotationStore(version_6, read_only=read_only)) as store:
+    with AnnotationStore(version_6, read_only=read_only) as store:
         assert [(r.frame, r.status, r.limbs_lost) for r in store.frames("ann")] == [
             (1, "", ()), (2, "lost", ()), (3, "lost", ()),
         ]  # fmt: skip
@@ -194,7 +194,7 @@ def test_in_version_6_limbs_were_not_assessed(version_6, read_only):
 
 
 def test_a_store_of_version_6_takes_limbs_and_is_still_checked(version_6):
-    with closing(AnnotationStore(version_6)) as store:
+    with AnnotationStore(version_6) as store:
         record = PoseRecord(np.zeros(2), ("tracked",) * 2, 1, status="lost", limbs_lost=(0.9, 0.01))
         store.commit("track", [PoseChange("ann", 4, record)])
     assert AnnotationStore(version_6).frames("ann")[-1].limbs_lost == (0.9, 0.01)
@@ -209,7 +209,7 @@ def test_damage_of_a_store_of_version_6_is_found_before_it_is_upgraded(version_6
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_5_there_were_no_checksums(version_5, read_only):
     before = version_5.read_bytes()
-    with closing(AnnotationStore(version_5, read_only=read_only)) as store:
+    with AnnotationStore(version_5, read_only=read_only) as store:
         assert xs(store) == {1: store.pose("ann", 1).values[0], 2: 2.0, 3: 3.0}
         assert (store.pose("ann", 2).settings, store.pose("ann", 3).reviewed) == ({"step_deg": 5}, True)
         assert [a.cost_px for a in store.alternatives("ann", 3)] == [2.0]
@@ -217,7 +217,7 @@ def test_in_version_5_there_were_no_checksums(version_5, read_only):
 
 
 def test_a_store_of_version_5_is_backed_up_as_it_was_and_then_checked(version_5):
-    with closing(AnnotationStore(version_5)) as store:
+    with AnnotationStore(version_5) as store:
         (backup,) = backups_of(version_5)
         with closing(sqlite3.connect(backup)) as db:
             assert schema.version(db) == 5
@@ -236,14 +236,14 @@ def test_a_store_of_version_5_is_backed_up_as_it_was_and_then_checked(version_5)
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_4_there_were_no_alternatives(version_4, read_only):
     before = version_4.read_bytes()
-    with closing(AnnotationStore(version_4, read_only=read_only)) as store:
+    with AnnotationStore(version_4, read_only=read_only) as store:
         assert [(r.frame, r.reviewed) for r in store.frames("ann")] == [(1, True), (2, False), (3, True)]
         assert store.alternatives("ann", 3) == ()
     assert (version_4.read_bytes() == before) == read_only
 
 
 def test_a_store_of_version_4_takes_alternatives(version_4):
-    with closing(AnnotationStore(version_4)) as store:
+    with AnnotationStore(version_4) as store:
         here = store.pose("ann", 3)
         store.commit("track", [PoseChange("ann", 3, here, (Alternative(here.values + 1, here.model_revision, 2.0),))])
     (found,) = AnnotationStore(version_4).alternatives("ann", 3)
@@ -253,7 +253,7 @@ def test_a_store_of_version_4_takes_alternatives(version_4):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_3_nobody_had_reviewed_but_keyframes(version_3, read_only):
     before = version_3.read_bytes()
-    with closing(AnnotationStore(version_3, read_only=read_only)) as store:
+    with AnnotationStore(version_3, read_only=read_only) as store:
         assert [(r.frame, r.keyframe, r.reviewed) for r in store.frames("ann")] == [
             (1, True, True), (2, False, False), (3, False, False),
         ]  # fmt: skip
@@ -264,7 +264,7 @@ def test_in_version_3_nobody_had_reviewed_but_keyframes(version_3, read_only):
 
 
 def test_a_store_of_version_3_takes_marks_and_gives_them_back(version_3):
-    with closing(AnnotationStore(version_3)) as store:
+    with AnnotationStore(version_3) as store:
         store.commit("review", [MarkChange("ann", 3, keyframe=False, reviewed=True)])
         assert [r.reviewed for r in store.frames("ann")] == [True, False, True]
         assert (store.undo(), store.undo(), store.redo()) == ("review", "track", "track")
@@ -306,7 +306,7 @@ def test_older_version_keeps_everything(version_1):
 
 def test_older_version_that_is_only_read_stays_as_it_is(version_1):
     before = version_1.read_bytes()
-    with closing(AnnotationStore(version_1, read_only=True)) as store:
+    with AnnotationStore(version_1, read_only=True) as store:
         assert store.pose("ann", 2).remark == ""
         assert [row.view_costs_px for row in store.frames("ann")] == [(), (), ()]
         assert [row.frame for row in store.frame_poses("ann", range(9))] == [1, 2, 3]
@@ -317,7 +317,7 @@ def test_older_version_that_is_only_read_stays_as_it_is(version_1):
 @pytest.mark.parametrize("read_only", [False, True])
 def test_settings_that_version_2_kept_with_each_pose(version_2, read_only):
     before = version_2.read_bytes()
-    with closing(AnnotationStore(version_2, read_only=read_only)) as store:
+    with AnnotationStore(version_2, read_only=read_only) as store:
         assert (store.pose("ann", 1).settings, store.pose("ann", 1).values[0]) == ({"step_deg": 7}, 0.3)
     assert (version_2.read_bytes() == before) == read_only
 

@@ -1,7 +1,6 @@
 """Imported files leave as they came; mended poses change their own points alone."""
 
 import json
-from contextlib import closing
 
 import numpy as np
 import pytest
@@ -73,7 +72,7 @@ def store(session, bodies, edited=(EDITED,), joints=None, person="ann"):
     """Store poses; on edited frames all values are a person's, or those of some joints alone."""
     model = session.people[0].model
     by_hand = [joints is None or name.rpartition(".")[0] in joints for name in model.value_names]
-    with closing(AnnotationStore(session.annotations_path)) as annotations:
+    with AnnotationStore(session.annotations_path) as annotations:
         revision = annotations.add_model_revision(person, format_model(model))
         changes = [
             PoseChange(person, k, PoseRecord(b.values, tuple("manual" if k in edited and own else "tracked" for own in

@@ -1,7 +1,5 @@
 """Mended poses turn the skeleton of a BVH file; all else of it leaves as it came."""
 
-from contextlib import closing
-
 import numpy as np
 import pytest
 from observed_files import write_bvh_chain
@@ -50,7 +48,7 @@ def sent(session, tmp_path, poses, by_hand=lambda name: True):
     assert not plan.problems, plan.problems
     store_import(session, plan)
     model = session.people[0].model
-    with closing(AnnotationStore(session.annotations_path)) as annotations:
+    with AnnotationStore(session.annotations_path) as annotations:
         revision = annotations.add_model_revision("ann", format_model(model))
         changes = []
         for k, values in enumerate(poses):
