@@ -74,3 +74,13 @@ def factor(blocks: Array) -> BlockFactor | None:
                 own -= below[d + j - 1, t - j] @ below[j - 1, t - j].T
             below[d - 1, t] = dtrtrs(diagonal[t], own.T, lower=1)[0].T
     return BlockFactor(diagonal, below)
+
+
+def product(blocks: Array, vector: Array) -> Array:
+    """Return a matrix, with blocks as `factor` reads them, times a vector, (T, n)."""
+    out = np.einsum("tij,tj->ti", blocks[0], vector)
+    for d in range(1, min(len(blocks), len(vector))):
+        own = blocks[d, : len(vector) - d]
+        out[d:] += np.einsum("tij,tj->ti", own, vector[:-d])
+        out[:-d] += np.einsum("tij,ti->tj", own, vector[d:])
+    return out
