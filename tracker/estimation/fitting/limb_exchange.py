@@ -8,6 +8,7 @@ import numpy as np
 from tracker.body.dimensions import mirror_part
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel, PosedBody
+from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
 from tracker.estimation.fitting.gauss_newton import JOINT_M, UNKNOWN, PointTargets, PosePrior, ResidualBlock, solve
 from tracker.geometry.arrays import Array
 
@@ -24,7 +25,7 @@ def exchanged(body: PosedBody, pair: tuple[Limb, Limb]) -> Array:
     of_pair = np.isin(body.model.point_parts, np.concatenate([limb.parts for limb in pair]))
     blocks = _mirrored(body, np.flatnonzero(of_pair).tolist())
     moving = pair[0].dofs | pair[1].dofs
-    return solve(body.model, body.values, blocks, moving, max_iterations=40, tolerance=1e-4).pose
+    return solve(body.model, body.values, blocks, moving, gain=MIN_DECREASE).pose
 
 
 def turned_round(body: PosedBody) -> Array:
@@ -33,7 +34,7 @@ def turned_round(body: PosedBody) -> Array:
     half_turn = np.zeros(model.n_dofs)
     half_turn[np.flatnonzero((model.dof_joint == 0) & ~model.dof_is_length)[-1]] = np.pi
     blocks = _mirrored(body, range(len(model.point_names)))
-    return solve(model, model.retract(body.values, half_turn), blocks, None, max_iterations=25, tolerance=1e-3).pose
+    return solve(model, model.retract(body.values, half_turn), blocks, gain=MIN_DECREASE).pose
 
 
 def _mirrored(body: PosedBody, moved: Sequence[int]) -> list[ResidualBlock]:

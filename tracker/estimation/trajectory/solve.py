@@ -27,7 +27,7 @@ from tracker.estimation.fitting.gauss_newton import (
     value_mask,
 )
 from tracker.estimation.trajectory.motion_model import LEARNING_ROUNDS, MotionModel, acceleration, motion_points
-from tracker.geometry.arrays import Array, Mask
+from tracker.geometry.arrays import TINY, Array, Mask
 
 
 class BlockFactor(NamedTuple):
@@ -96,6 +96,16 @@ def factor(blocks: Array) -> BlockFactor | None:
                 own -= below[d + j - 1, t - j] @ below[j - 1, t - j].T
             below[d - 1, t] = dtrtrs(diagonal[t], own.T, lower=1)[0].T
     return BlockFactor(diagonal, below)
+
+
+def product(blocks: Array, vector: Array) -> Array:
+    """Return a matrix, with blocks as `factor` reads them, times a vector, (T, n)."""
+    out = np.einsum("tij,tj->ti", blocks[0], vector)
+    for d in range(1, min(len(blocks), len(vector))):
+        own = blocks[d, : len(vector) - d]
+        out[d:] += np.einsum("tij,tj->ti", own, vector[:-d])
+        out[:-d] += np.einsum("tij,ti->tj", own, vector[d:])
+    return out
 
 
 _BLOCK_FRAMES, _OVERLAP_FRAMES = 120, 20
@@ -262,18 +272,28 @@ class _Solver:
         return here, damping
 
     def _step(self, here: _State, held: Mask, damping: float) -> tuple[_State, float] | None:
-        """Return the path after a step, and the gain that its equations promise; None if they are not definite."""
-        known = factor(self._held_equations(here, held, damping))
-        if known is None:
-            return None
-        gradient = np.where(held, 0.0, here.gradient)
-        change = -known.solve(gradient)
-        damped = damping * np.einsum("tii->ti", here.hessian[0]) * change
-        promised = 0.5 * float(np.vdot(damped - gradient, change))
+        """Return the path after a step, and the gain that its equations promise; None if they promise none.
+
+        Degrees of freedom that the step takes to a limit stop there, and the others step again as that demands (D. P.
+        Bertsekas 1982, SIAM J. Control Optim. 20:221). Clipped alone, they would leave the others on the wrong way.
+        """
+        model, stopped = self.path.model, np.zeros_like(here.gradient)
+        while True:
+            known = factor(self._held_equations(here, held, damping))
+            if known is None:
+                return None
+            gradient = here.gradient + product(here.hessian, stopped)
+            step = np.where(held, stopped, -known.solve(np.where(held, 0.0, gradient)))
+            beyond = [*map(model.retract, here.poses, step)]
+            poses = self._within_limits(beyond, here.poses)
+            crossed = ~held & (np.abs(_differences(model, poses, beyond)) > TINY)
+            if not crossed.any():
+                break
+            held, stopped = held | crossed, np.where(crossed, _differences(model, poses, here.poses), stopped)
+        promised = -float(np.vdot(here.gradient + product(here.hessian, step) / 2, step))
         if promised < self.min_decrease:
-            return here, promised
-        moved = map(self.path.model.retract, here.poses, change)
-        return self._linearized(self._within_limits(moved, here.poses), here), promised
+            return None if promised < 0 else (here, promised)
+        return self._linearized(poses, here), promised
 
     def _held(self, here: _State) -> Mask:
         """Return the degrees of freedom that stay: locked ones, and those that press against a limit, (T, n_dofs)."""
@@ -345,3 +365,8 @@ class _Solver:
         cost, gradient, hessian = (sum(parts[1:], start=parts[0]) for parts in zip(*found, strict=True))
         here = NormalEquations(float(cost), gradient, hessian)
         return (pose, here), here
+
+
+def _differences(model: BodyModel, poses: Sequence[Array], others: Sequence[Array]) -> Array:
+    """Return the steps in the degrees of freedom from other poses to poses, (T, n_dofs), rad and metres."""
+    return np.array([model.difference(*at) for at in zip(poses, others, strict=True)])

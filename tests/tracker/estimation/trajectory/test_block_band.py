@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.estimation.trajectory.solve import factor
+from tracker.estimation.trajectory.solve import factor, product
 
 
 def band(T, n, m, seed=0):
@@ -21,10 +21,11 @@ def band(T, n, m, seed=0):
 
 
 @pytest.mark.parametrize(("T", "n", "m"), [(1, 3, 2), (2, 2, 2), (3, 4, 2), (9, 3, 2), (7, 2, 1), (6, 2, 3)])
-def test_it_solves_and_inverts_as_the_whole_matrix_does(T, n, m):
+def test_it_solves_inverts_and_multiplies_as_the_whole_matrix_does(T, n, m):
     whole, blocks = band(T, n, m)
     known, right = factor(blocks), np.random.default_rng(1).normal(size=(T, n))
     np.testing.assert_allclose(known.solve(right).ravel(), np.linalg.solve(whole, right.ravel()), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(product(blocks, right).ravel(), whole @ right.ravel())
     inverse, found = np.linalg.inv(whole), known.inverse()
     for d in range(m + 1):
         for t in range(T - d):

@@ -83,6 +83,35 @@ def test_fixed_poses_and_locked_degrees_of_freedom_stay():
     assert np.abs(others - MODEL.neutral()).max() > 0.01
 
 
+class Counted(GaussianPrior):
+    """Evidence that counts how often it is read."""
+
+    n_reads = 0
+
+    def linearize(self, model, pose, kinematics):
+        Counted.n_reads += 1
+        return super().linearize(model, pose, kinematics)
+
+
+def test_limits_do_not_mislead_the_angles_that_depend_on_them(monkeypatch):
+    """Each frame wants many angles beyond their limits, and others depend on these: its evidence shows half of them.
+
+    Few readings of the evidence lead to the path. With limits that only cut steps, 405 led to one 50 nats dearer.
+    """
+    rng, n = np.random.default_rng(0), MODEL.n_dofs
+    J = rng.normal(size=(n // 2, n)) / 0.02
+    wanted = [MODEL.neutral() + rng.normal(size=n) for _ in range(T)]
+    evidence = [[Counted(pose, J.T @ J + np.eye(n))] for pose in wanted]
+    groups = motion_points(MODEL).groups
+    motion = MotionModel(groups, np.full(len(groups), 1e-2))
+    monkeypatch.setattr(MotionModel, "learned", lambda *_: motion)
+    path = path_of(np.tile(MODEL.neutral(), (T, 1)), evidence)
+    monkeypatch.setattr(Counted, "n_reads", 0)
+    poses = solved(path)
+    assert Counted.n_reads <= 15 * T
+    assert cost_of(path, poses, motion) < 605
+
+
 def far_apart(one, other):
     return max(np.abs(MODEL.points_world(a) - MODEL.points_world(b)).max() for a, b in zip(one, other, strict=True))
 
