@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.estimation.trajectory.solve import factor, product
+from tracker.estimation.trajectory.block_band import factor, product
 
 
 def band(T, n, m, seed=0):
