@@ -24,28 +24,17 @@ def usual(evidence: Array, models: Sequence[BodyModel]) -> Array:
     return np.asarray(np.maximum(high, high[counterparts(models)]))
 
 
-def part_deficits(nats: Array, models: Sequence[BodyModel]) -> Array:
-    """Return how far the evidence of each part on each frame is below its usual, (T, P), nats.
-
-    Evidence counts as it is, not per visible sample: a limb that is lost behind the body loses samples.
-
-    Args:
-        nats: evidence in all views, (T, P): `RegionScore.nats` of each frame, summed over the views.
-        models: all people.
-    """
-    return usual(nats, models) - nats
-
-
 def elsewhere_nats(nats: Array, models: Sequence[BodyModel]) -> Array:
     """Return how much likelier each part is elsewhere than where it is drawn, (T, P), nats.
 
     Where a part is, its evidence on a frame is normal around its usual, as widely as over the run. Elsewhere it is
     normal around 0, as widely. This is the log ratio of both. A part that looks like its surroundings, and one that is
     often hidden, therefore say little. Each side varies around its own: a leg that is lost in all frames lies below the
-    other one, which does not make either vary.
+    other one, which does not make either vary. Evidence counts as it is, not per visible sample: a limb that is lost
+    behind the body loses samples.
 
     Args:
-        nats: see `part_deficits`.
+        nats: evidence in all views, (T, P): `RegionScore.nats` of each frame, summed over the views.
         models: all people.
     """
     best, below = usual(nats, models), nats - np.percentile(nats, _QUARTILES[1], axis=0)
@@ -75,5 +64,5 @@ def worst_views(nats: Array, models: Sequence[BodyModel]) -> IntArray:
         nats: evidence in each view, (T, V, P).
         models: all people.
     """
-    lacks = np.stack([part_deficits(of_view, models) for of_view in nats.transpose(1, 0, 2)])
+    lacks = np.stack([usual(of_view, models) - of_view for of_view in nats.transpose(1, 0, 2)])
     return np.asarray(lacks.argmax(axis=0))

@@ -24,8 +24,7 @@ def exchanged(body: PosedBody, pair: tuple[Limb, Limb]) -> Array:
     """Return the pose, (n_values,), in which two limbs lie where the other was, as far as the joints allow."""
     of_pair = np.isin(body.model.point_parts, np.concatenate([limb.parts for limb in pair]))
     blocks = _mirrored(body, np.flatnonzero(of_pair).tolist())
-    moving = pair[0].dofs | pair[1].dofs
-    return solve(body.model, body.values, blocks, moving, gain=MIN_DECREASE).pose
+    return solve(body.model, body.values, blocks, pair[0].dofs | pair[1].dofs, gain=MIN_DECREASE).pose
 
 
 def turned_round(body: PosedBody) -> Array:

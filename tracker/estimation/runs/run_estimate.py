@@ -205,8 +205,7 @@ class _RunEstimate:
             seen.append(tuple(map(with_colors_only, views)))
         self._facing |= {i: Facing.of(of_person) for i, of_person in nats.items()}
         for i in (i for i, facing in self._facing.items() if facing.is_turned):
-            model = self._run.subjects.models[i]
-            turned = [turned_round(PosedBody(model, self._poses[k][i])) for k in self._frames]
+            turned = [turned_round(self._bodies(k)[i]) for k in self._frames]
             self._take(self._frames, i, np.array(turned))
         frames = [LearningFrame(views, self._bodies(k)) for k, views in zip(at, seen, strict=True)]
         return learn_regions(frames, observer.working_cameras, observer.empty_scenes())
