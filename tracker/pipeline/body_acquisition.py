@@ -96,10 +96,12 @@ def acquire_body(
     while True:
         begin, end = number / rounds, (number + 1) / rounds
         between = (begin + end) / 2  # tracking takes about half of a round
-        tracked = _tracked_with(body, session, observer, person, frames, known, part_of(report, begin, between))
+        good, usable = _tracked_with(body, observer, frames, known, part_of(report, begin, between))
+        # In a dark room, or in a body of other sizes, hardly a frame is good; one shows no joint's centre.
+        tracked = good if len(good.bodies) >= settings.n_frames else usable
         acquired = _acquire(observer, _with_joints(tracked, joints), settings, part_of(report, between, end))
         body, number = acquired.body, number + 1
-        is_enough = len(tracked.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
+        is_enough = len(good.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
         if number == rounds or is_enough or not acquired.is_better:
             return acquired
 
@@ -330,17 +332,14 @@ def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTa
 
 
 def _tracked_with(
-    body: BodyModel, session: Session, observer: Observer, person: int, frames: Sequence[int], known: PosedFrames,
-    report: Report,
-) -> PosedFrames:  # fmt: skip
-    """Track the person with a body of other sizes, and return the poses of the present one."""
-    present = session.people[person].model
+    body: BodyModel, observer: Observer, frames: Sequence[int], known: PosedFrames, report: Report
+) -> tuple[PosedFrames, PosedFrames]:
+    """Track the person with a body of other sizes, and return the poses of the present one; see `_with_tracked`."""
+    present = next(iter(known.bodies.values()))[0].model
     if body is present:
-        return _with_tracked(session, observer, person, frames, known, report)
-    people = [replace(p, model=body) if i == person else p for i, p in enumerate(session.people)]
-    resized = replace(session, people=tuple(people))
-    tracked = _with_tracked(resized, observer, person, frames, _in_body(known, body), report)
-    return _in_body(tracked, present)
+        return _with_tracked(observer, frames, known, report)
+    good, usable = _with_tracked(observer, frames, _in_body(known, body), report)
+    return _in_body(good, present), _in_body(usable, present)
 
 
 def _in_body(frames: PosedFrames, body: BodyModel) -> PosedFrames:
@@ -354,24 +353,23 @@ def _in_body(frames: PosedFrames, body: BodyModel) -> PosedFrames:
 
 
 def _with_tracked(
-    session: Session, observer: Observer, person: int, frames: Sequence[int], known: PosedFrames,
-    report: Report,
-) -> PosedFrames:  # fmt: skip
-    """Track the person from the first known frame, in both directions, and add the good frames."""
+    observer: Observer, frames: Sequence[int], known: PosedFrames, report: Report
+) -> tuple[PosedFrames, PosedFrames]:
+    """Track the person from the first known frame, in both directions; return the known frames with those that are
+    good, and with doubtful ones too."""
     first = min(known.bodies)
     ahead, behind = [k for k in frames if k >= first], [k for k in frames if k <= first][::-1]
     room = max(_MOST_TRACKED // 2, _MOST_TRACKED - min(len(ahead), len(behind)))
     ways = [way[:room] for way in (ahead, behind) if len(way) > 1]
     own, done, total = known.bodies[first], 0, max(1, sum(map(len, ways)))
     subjects = Subjects.of([b.model for b in own], keyframes={k: {0: known.bodies[k][0].values} for k in known.placed})
-    bodies = dict(known.bodies)
+    tracked: dict[str, dict[int, tuple[PosedBody, ...]]] = {"good": {}, "doubtful": {}, "lost": {}}
     for way in ways:
         run = TrackingRun(observer, subjects, [b.values for b in own], way)
         for found in ChamferTracker(TrackSettings()).estimates(run):
             done += 1
             report("tracking", done / total)
-            if found.statuses[0] == "good":
-                people = zip(subjects.models, found.poses, strict=True)
-                bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
-    assert all(b[0].model is session.people[person].model for b in bodies.values())
-    return known._replace(bodies=bodies)
+            people = zip(subjects.models, found.poses, strict=True)
+            tracked[found.statuses[0]].setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
+    good = {**tracked["good"], **known.bodies}
+    return known._replace(bodies=good), known._replace(bodies=tracked["doubtful"] | good)

@@ -150,10 +150,10 @@ def test_each_round_tracks_with_the_body_of_the_one_before(session, store, monke
     put(session, store, f3=record(session, store, status="good"))
     present, tracked_with, fitted_from, costs = session.people[0].model, [], [], [2.0, 1.0, 4.0, 0.0]
 
-    def track(own, observer, person, frames, known, report):
-        tracked_with.append(own.people[person].model.height_m)
-        assert all(b[0].model is own.people[person].model for b in known.bodies.values())
-        return known
+    def track(observer, frames, known, report):
+        (body,) = {b[0].model for b in known.bodies.values()}
+        tracked_with.append(body.height_m)
+        return known, known
 
     def acquire(observer, bodies, person, placed, settings, report, seen):
         fitted_from.append(bodies[3][0].model)
@@ -198,10 +198,32 @@ def test_a_round_in_which_most_frames_are_good_is_the_last(session, store, monke
     found = SimpleNamespace(body=session.people[0].model, cost_before_px=3.0, cost_after_px=2.0)
     rounds = []
 
-    def track(own, observer, person, frames, known, report):
-        return known._replace(bodies=dict.fromkeys(range(6), known.bodies[3]))
+    def track(observer, frames, known, report):
+        good = known._replace(bodies=dict.fromkeys(range(6), known.bodies[3]))
+        return good, good
 
     monkeypatch.setattr(body_acquisition, "_with_tracked", track)
     monkeypatch.setattr(body_acquisition, "acquire_from_contours", lambda *_: rounds.append(1) or found)
     acquire_body(session, None, 0, range(10), AcquisitionSettings(n_frames=2, rounds=4))
     assert len(rounds) == 1
+
+
+@pytest.mark.parametrize(("n_good", "used"), [(3, range(3)), (2, range(8))])
+def test_doubtful_frames_count_where_too_few_tracked_ones_are_good(n_good, used, session, store, monkeypatch):
+    """The statuses of a body of other sizes, or in the dark, are doubtful though its poses are right."""
+    put(session, store, f0=record(session, store, status="good"))
+    statuses = {k: "good" if k < n_good else "doubtful" if k < 8 else "lost" for k in range(10)}
+    fitted, body = [], session.people[0].model
+
+    def estimates(_, run):
+        for k in run.frames:
+            yield SimpleNamespace(frame=k, statuses=(statuses[k],), poses=(body.neutral(),))
+
+    def acquire(observer, bodies, *_):
+        fitted.append(sorted(bodies))
+        return SimpleNamespace(body=body, is_better=False)
+
+    monkeypatch.setattr(body_acquisition.ChamferTracker, "estimates", estimates)
+    monkeypatch.setattr(body_acquisition, "acquire_from_contours", acquire)
+    acquire_body(session, None, 0, range(10), AcquisitionSettings(n_frames=3))
+    assert fitted == [list(used)]
