@@ -76,31 +76,26 @@ def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) 
     return model.move(last, np.clip(step, -bound, bound))
 
 
-class _EulerJoint(NamedTuple):
-    """A joint whose rotations have two sets of angles each."""
+class _EulerJoints(NamedTuple):
+    """The joints of a body whose rotations have two sets of angles each."""
 
     dofs: IntArray
-    """Its degrees of freedom, (3,)."""
+    """Their degrees of freedom, (J, 3)."""
     values: IntArray
-    """Indices of its angles in a pose, (3,)."""
-    middle_sum: float
-    """Sum of the middle angles of both sets, rad."""
-    limits: Array
-    """Lowest and highest of each angle, (3, 2), rad."""
+    """Indices of their angles in a pose, (J, 3)."""
+    middle_sums: Array
+    """Sum of the middle angles of both sets, (J,), rad."""
+    low: Array
+    """Lowest of each angle, (J, 3), rad."""
+    high: Array
+    """Highest of each angle, (J, 3), rad."""
     centers: Array
-    """Angles in the middle between both limits, (3,), rad; NaN without limits."""
-
-    @classmethod
-    def of(cls, model: BodyModel, joint: int, middle_sum: float) -> "_EulerJoint":
-        """Return what is known of a joint, by its index."""
-        dofs = np.flatnonzero((model.dof_joint == joint) & ~model.dof_is_length)
-        limits = model.limits[dofs]
-        centers = [np.mean(x) if np.isfinite(x).all() else np.nan for x in limits]
-        return cls(dofs, model.dof_value[dofs], middle_sum, limits, np.array(centers))
+    """Angles in the middle between both limits, (J, 3), rad; NaN without limits."""
 
     def other(self, angles: Array, near: Array) -> Array:
-        """Return the other set of angles of the same rotations, (..., 3), each by the turn nearest to another, rad."""
-        out = np.stack([angles[..., 0] + np.pi, self.middle_sum - angles[..., 1], angles[..., 2] + np.pi], axis=-1)
+        """Return the other angles of the same rotations, (..., J, 3), each by the turn nearest to another, rad."""
+        first, middle, last = np.moveaxis(angles, -1, 0)
+        out = np.stack([first + np.pi, self.middle_sums - middle, last + np.pi], axis=-1)
         return np.asarray(out - 2 * np.pi * np.round((out - near) / (2 * np.pi)))
 
 
@@ -127,44 +122,42 @@ def nearest_equivalent(
     Returns:
         Of the two sets of angles of each joint the nearer one, among those within the limits, (..., n_values).
     """
-    out = np.array(poses)
-    for joint in _euler_joints(model):
-        if active_dofs is not None and not active_dofs[joint.dofs].all():
-            continue
-        near, own = reference[..., joint.values], out[..., joint.values]
-        low, high = joint.limits.T
-        other = joint.other(own, np.where(np.isnan(joint.centers), near, joint.centers))
-        own_fits, other_fits = (np.isclose(x, np.clip(x, low, high)).all(axis=-1) for x in (own, other))
-        is_nearer = ((other - near) ** 2).sum(axis=-1) < ((own - near) ** 2).sum(axis=-1)
-        is_other = (other_fits & (is_nearer | ~own_fits))[..., None]
-        out[..., joint.values] = np.where(is_other, np.clip(other, low, high), own)
+    out, joints = np.array(poses), _euler_joints(model)
+    near, own = reference[..., joints.values], out[..., joints.values]
+    other = joints.other(own, np.where(np.isnan(joints.centers), near, joints.centers))
+    within = [np.clip(x, joints.low, joints.high) for x in (own, other)]
+    own_fits, other_fits = (np.isclose(*pair).all(axis=-1) for pair in zip((own, other), within, strict=True))
+    is_nearer = ((other - near) ** 2).sum(axis=-1) < ((own - near) ** 2).sum(axis=-1)
+    is_free = True if active_dofs is None else active_dofs[joints.dofs].all(axis=-1)
+    is_other = other_fits & (is_nearer | ~own_fits) & is_free
+    out[..., joints.values] = np.where(is_other[..., None], within[1], own)
     return out
 
 
 def _step_and_flips(model: BodyModel, to: Array, start: Array) -> tuple[Array, list[int]]:
     """Return the shortest step, and the middle degrees of freedom of joints that go to their other set of angles."""
-    step, flipped = model.difference(to, start), list[int]()
+    step, joints = model.difference(to, start), _euler_joints(model)
     winds = ~model.dof_is_length & np.isinf(model.limits).all(axis=1)
     step = np.where(winds, np.remainder(step + np.pi, 2 * np.pi) - np.pi, step)
-    for joint in _euler_joints(model):
-        rotation = step[joint.dofs]
-        if rotation @ rotation <= np.pi**2 / 2:  # to the other set, both outer angles go by 180 degrees less
-            continue
-        other = joint.other(np.asarray(to)[joint.values], start[joint.values]) - start[joint.values]
-        if other @ other < rotation @ rotation:
-            step[joint.dofs] = other
-            flipped.append(int(joint.dofs[1]))
-    return step, flipped
+    begins, rotations = start[joints.values], step[joints.dofs]
+    others = joints.other(np.asarray(to)[joints.values], begins) - begins
+    # To the other set, both outer angles go by 180 degrees less.
+    lengths, shorter = (rotations**2).sum(axis=1), (others**2).sum(axis=1)
+    is_other = (lengths > np.pi**2 / 2) & (shorter < lengths)
+    step[joints.dofs[is_other]] = others[is_other]
+    return step, joints.dofs[is_other, 1].tolist()
 
 
 @lru_cache(maxsize=16)
-def _euler_joints(model: BodyModel) -> Sequence[_EulerJoint]:
-    out = []
-    for i, joint in enumerate(model.joints):
-        middle_sum = middle_angle_sum(joint)
-        if middle_sum is not None:
-            out.append(_EulerJoint.of(model, i, middle_sum))
-    return out
+def _euler_joints(model: BodyModel) -> _EulerJoints:
+    sums = [middle_angle_sum(joint) for joint in model.joints]
+    known = [i for i, middle in enumerate(sums) if middle is not None]
+    dofs = [np.flatnonzero((model.dof_joint == i) & ~model.dof_is_length) for i in known]
+    at = np.array(dofs, dtype=np.int64).reshape(-1, 3)
+    limits = model.limits[at]
+    centers = np.where(np.isfinite(limits), limits, np.nan).mean(axis=-1)
+    middle_sums = np.array([sums[i] for i in known], dtype=np.float64)
+    return _EulerJoints(at, model.dof_value[at], middle_sums, limits[..., 0], limits[..., 1], centers)
 
 
 def middle_angle_sum(joint: Joint) -> float | None:
