@@ -21,6 +21,7 @@ from tracker.estimation.by_frame.pose_score import (
 from tracker.estimation.by_frame.settings import OWN_TRUST, EstimationSettings, RecoverSettings
 from tracker.estimation.fitting.contour_residuals import PartCosts
 from tracker.estimation.fitting.gauss_newton import ResidualBlock, with_locked_dofs
+from tracker.estimation.fitting.hypothesis import distance_m
 from tracker.estimation.fitting.keypoints import keypoint_blocks, keypoints_of
 from tracker.estimation.tracking.confidence import views_of_limbs
 from tracker.estimation.trajectory.hypotheses import DISTINCT_M, HypothesisSet
@@ -99,7 +100,10 @@ class FrameHypotheses:
         self._join(self._scored(np.array(poses), tuple(p.source for p in proposals)))
 
     def among(self, bodies: Bodies) -> "FrameHypotheses":
-        """Return the same person and hypotheses with the other people in other poses."""
+        """Return the same person and hypotheses with the other people in other poses; itself where these are alike."""
+        others = [(old, new) for i, (old, new) in enumerate(zip(self.bodies, bodies, strict=True)) if i != self.person]
+        if all(distance_m(old, new) <= DISTINCT_M for old, new in others):
+            return self
         out = FrameHypotheses(self.evidence, bodies, self.person, self._settings, self._scorer.active_dofs)
         out._tried = self._tried
         out._found = out._scored(self.found.poses, self.found.sources)

@@ -156,7 +156,16 @@ def test_locked_degrees_of_freedom_stay_in_every_proposal(film, gavrila, monkeyp
         assert pose[value] == own.bodies[0].values[value]
 
 
-def test_people_are_estimated_in_turn(gavrila):
+def test_people_are_estimated_in_turn(gavrila, monkeypatch):
+    """Hypotheses are scored again on the frame alone where the other person's arm has moved since."""
+    among, again = FrameHypotheses.among, []
+
+    def spied(frame, bodies):
+        out = among(frame, bodies)
+        again.append((frame.person, out is not frame))
+        return out
+
+    monkeypatch.setattr(FrameHypotheses, "among", spied)
     true = moving(gavrila, 5)
     beside = true[::-1].copy()
     true[:, 1] -= 0.5
@@ -166,6 +175,7 @@ def test_people_are_estimated_in_turn(gavrila):
     found = result_of(steps)
     assert [film.errors_m(found[i], i).max() < NEAR_M for i in range(2)] == [True, True]
     assert [[k for k in found[i] if found[i][k].entry] for i in range(2)] == [[2], [1]]
+    assert again == [(person, person == 0 and k == 1) for person in range(2) for k in range(5)]
 
 
 def test_blocks_give_nearly_what_one_block_gives(gavrila, monkeypatch):
