@@ -25,7 +25,7 @@ KEYS = {
 def quick(monkeypatch):
     """A fit of one step in each round."""
     solve = size_fit.solve_bundle
-    monkeypatch.setattr(size_fit, "solve_bundle", lambda problem, state, *rest: solve(problem, state, 1, *rest[1:]))
+    monkeypatch.setattr(size_fit, "solve_bundle", lambda bundle, state, _, report: solve(bundle, state, 1, report=report))
 
 
 def files_of(session):
