@@ -132,11 +132,10 @@ def test_each_room_of_the_library_names_what_others_use():
 WRITERS = {
     "tracker.batch.join": "stretches of a long recording, as they were tracked",
     "tracker.pipeline.body_acquisition": "the start, in other sizes",
-    "tracker.pipeline.estimated_rows": "poses of a run and of an audit, by `run_estimate`",
     "tracker.pipeline.find_people": "starts that are found",
     "tracker.pipeline.given_pose": "starts that are given",
     "tracker.pipeline.keypoint_poses": "poses by key points, by `solve_path`",
-    "tracker.pipeline.tracked_changes": "poses of the first pass",
+    "tracker.pipeline.tracked_changes": "poses of the first pass, of a run and of an audit, by `run_estimate`",
 }
 """Modules of the library that write poses, and which: the pose of a run is decided in one place."""
 

@@ -16,14 +16,12 @@ from app.control.posing.alternatives import Alternatives
 from app.control.posing.body_acquisition import BodyAcquisition
 from app.control.posing.body_sizes import BodySizeEditing
 from app.control.posing.dof_locks import DofLocks
-from app.control.posing.dragging import Dragging
-from app.control.posing.held_points import HeldPoints
+from app.control.posing.dragging import Dragging, HeldPoints
 from app.control.posing.pinning import Pinning
 from app.control.posing.pose_edits import PoseEdits
 from app.control.search.cost_landscape import CostLandscapes
 from app.control.search.cost_map import CostMaps
-from app.control.search.replay import Replay
-from app.control.search.search_runs import SearchRuns
+from app.control.search.search_runs import Replay, SearchRuns
 from app.control.search.searching import SearchRunner
 from app.control.session.activities import Activities
 from app.control.session.annotating import Annotating

@@ -10,8 +10,7 @@ from typing import Any
 
 from app.export.report_files import write_text, writing
 from tracker.evaluation.agreement.comparison import Agreement, AngleAgreement, JointAgreement, compare
-from tracker.evaluation.agreement.consensus import mean_points
-from tracker.evaluation.agreement.copies import Copies
+from tracker.evaluation.agreement.copies import Copies, mean_points
 from tracker.evaluation.agreement.statistics import Icc, Limits
 from tracker.formats.trc import write_trc
 from tracker.geometry.arrays import Array

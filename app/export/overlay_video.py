@@ -15,8 +15,7 @@ from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
-from tracker.footage.animation_writer import AnimationWriter
-from tracker.footage.video_writer import VideoWriter
+from tracker.footage.video_writer import AnimationWriter, VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image
 from tracker.geometry.cameras import Camera
 from tracker.interchange.exports.faces import recording_of

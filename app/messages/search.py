@@ -265,7 +265,7 @@ class KeyframeDoubt(Part, frozen=True):
 
 
 class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
-    """Frames whose pose does not agree with the motion around it (`tracker/body/motion/consistency.py`)."""
+    """Frames whose pose does not agree with the motion around it (`tracker/body/motion/keyframe_doubts.py`)."""
 
     frames: tuple[int, ...]
     """All of them, ascending. A doubted keyframe stands for its neighbours."""

@@ -3,22 +3,29 @@
 A browser lets any page on the internet send requests to this machine, so listening on loopback alone protects nothing.
 Every request must name the server by an expected name (against DNS rebinding). If it has an Origin, that must have the
 same name and port. Every account of this machine reaches loopback, so a request must also have the token.
+
+Keep the token of this user's starts, so that open tabs connect again after a restart.
 """
 
 import hashlib
 import ipaddress
 import logging
+import os
 import re
 import secrets
+import stat
+import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-from app.server.token_file import kept_token
 from app.state.role import Role
+from tracker import system
 from tracker.errors import TrackerError
+from tracker.files import write_text_atomic
 
 _LOG = logging.getLogger(__name__)
 _HOST = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+)(?::(?P<port>[0-9]{1,5}))?")
@@ -224,3 +231,43 @@ def _same(origin: str, called: re.Match[str]) -> bool:
 
 def _address(host: Mapping[str, str] | re.Match[str], default_port: str) -> tuple[str, str]:
     return host["name"].lower(), host["port"] or default_port
+
+
+_NAME = "token"
+_KEPT_S = 7 * 86400.0
+"""Age from which a token is replaced."""
+_MAX_BYTES = 200
+
+
+def kept_token(folder: Path) -> str:
+    """Return the token kept in a folder, or a new one, which is kept there.
+
+    A file that another account may read, or that is not this user's, is replaced. If the folder cannot be written,
+    the token holds for this start alone.
+
+    Args:
+        folder: private to this user; made where it is missing.
+    """
+    path = folder / _NAME
+    token = _read(path)
+    if token is None:
+        token = secrets.token_urlsafe(32)
+        with suppress(OSError):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            write_text_atomic(path, token, mode=0o600)
+    return token
+
+
+def _read(path: Path) -> str | None:
+    """Return a token that only this user could have written and read, and that is not too old."""
+    try:
+        file = system.open_unlinked(path)
+    except OSError:
+        return None
+    with os.fdopen(file, "rb") as opened:
+        found = os.fstat(file)
+        is_private = stat.S_ISREG(found.st_mode) and system.is_private(found)
+        if not is_private or not 0 <= time.time() - found.st_mtime < _KEPT_S:
+            return None
+        text = opened.read(_MAX_BYTES).decode("ascii", "replace")
+    return text if len(text) >= 43 and text.replace("-", "").replace("_", "").isalnum() and text.isascii() else None

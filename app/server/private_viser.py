@@ -1,5 +1,9 @@
-"""Start viser where only this program can reach it."""
+"""Start viser where only this program can reach it.
 
+Forward requests under `/viser/` to viser, which has no check of its own.
+"""
+
+import asyncio
 import contextlib
 import hmac
 import inspect
@@ -10,10 +14,15 @@ import tempfile
 from collections.abc import Generator
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+from urllib.parse import unquote
 
+import aiohttp
 import viser
 import websockets.asyncio.server
+from aiohttp import web
+from yarl import URL
 
 from app.runtime.temporary_folder import TemporaryFolder
 from tracker.errors import TrackerError
@@ -108,3 +117,123 @@ def _served_on(listener: socket.socket, secret: str) -> Generator[None, None, No
         yield
     finally:
         websockets.asyncio.server.serve = original
+
+
+# viser's client is one page that unpacks itself: inline script and style, WebAssembly, workers from blobs.
+POLICY = (
+    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
+    "worker-src 'self' blob: data:; style-src 'self' 'unsafe-inline' blob: data:; img-src 'self' blob: data:; "
+    "font-src 'self' data:; connect-src {sources} blob: data:; frame-src 'self' blob: data:; object-src 'none'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+
+# Headers of viser that a browser needs; hop-by-hop headers must not be forwarded.
+_PASSED_DOWN = ("Content-Type", "Content-Length", "Content-Encoding")
+_MAX_MESSAGE_BYTES = 256 << 20
+_HEARTBEAT_S = 20.0
+
+Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
+
+
+def is_viser(path: str) -> bool:
+    """Return whether a request path belongs to viser."""
+    return path == "/viser" or path.startswith("/viser/")
+
+
+class ViserProxy:
+    """A reverse proxy to one viser server; an asynchronous context that owns its connections."""
+
+    def __init__(self, place: ViserPlace) -> None:
+        self._place = place
+        self._session: aiohttp.ClientSession | None = None
+
+    async def __aenter__(self) -> Self:
+        path, port, secret = self._place
+        connector = aiohttp.UnixConnector(str(path), limit=0) if path else aiohttp.TCPConnector(limit=0)
+        # Bodies are forwarded as compressed as they arrive.
+        self._session = aiohttp.ClientSession(
+            "http://viser" if path else f"http://127.0.0.1:{port}",
+            auto_decompress=False,
+            connector=connector,
+            headers={SECRET: secret},
+        )
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._session is not None
+        await self._session.close()
+
+    async def handle(self, request: web.Request) -> web.StreamResponse:
+        """Answer one request under `/viser`, WebSocket or not."""
+        if ".." in unquote(unquote(request.raw_path.partition("?")[0])).replace("\\", "/").split("/"):
+            raise web.HTTPNotFound
+        try:
+            if request.headers.get("Upgrade", "").lower() == "websocket":
+                return await self._socket(request)
+            if request.path == "/viser":
+                raise web.HTTPFound("viser/")  # relative addresses, and those in viser's page, need the slash
+            return await self._fetch(request)
+        except aiohttp.ClientError as error:
+            raise web.HTTPBadGateway(text="The 3-D view does not answer; start quadrille again.\n") from error
+
+    async def _fetch(self, request: web.Request) -> web.StreamResponse:
+        assert self._session is not None
+        path = request.raw_path.removeprefix("/viser")
+        headers = {"Accept-Encoding": request.headers.get("Accept-Encoding", "identity")}
+        async with self._session.get(URL(path, encoded=True), headers=headers, allow_redirects=False) as upstream:
+            passed = {name: upstream.headers[name] for name in _PASSED_DOWN if name in upstream.headers}
+            response = web.StreamResponse(status=upstream.status, headers=passed)
+            await response.prepare(request)
+            async for chunk in upstream.content.iter_chunked(1 << 16):
+                await response.write(chunk)
+            await response.write_eof()
+            return response
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        assert self._session is not None
+        # viser recognizes versions of its client by the subprotocol: pass on the one that viser chose.
+        offered = [p.strip() for p in request.headers.get("Sec-WebSocket-Protocol", "").split(",") if p.strip()]
+        async with self._session.ws_connect(
+            "/", protocols=offered, max_msg_size=_MAX_MESSAGE_BYTES, compress=0
+        ) as upstream:
+            chosen = [upstream.protocol] if upstream.protocol else []
+            downstream = web.WebSocketResponse(
+                protocols=chosen, heartbeat=_HEARTBEAT_S, max_msg_size=_MAX_MESSAGE_BYTES, compress=False
+            )
+            await downstream.prepare(request)
+            pumps = {
+                asyncio.ensure_future(_pump(upstream, downstream)),
+                asyncio.ensure_future(_pump(downstream, upstream)),
+            }
+            try:
+                await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                for pump in pumps:
+                    pump.cancel()
+                await asyncio.gather(*pumps, return_exceptions=True)
+            return downstream
+
+
+async def _pump(source: Socket, target: Socket) -> None:
+    """Forward messages until the source closes, then close the target with the same code.
+
+    Sending waits while the target's buffer is full, which stops reading from the source.
+    """
+    while True:
+        message = await source.receive()
+        try:
+            if message.type is aiohttp.WSMsgType.BINARY:
+                await target.send_bytes(message.data)
+            elif message.type is aiohttp.WSMsgType.TEXT:
+                await target.send_str(message.data)
+            else:
+                code = source.close_code
+                # 1005 and 1006 mean that no code was received, and must not be sent.
+                sendable = code is not None and (1000 <= code <= 1003 or 1007 <= code <= 1014 or code >= 3000)
+                reason = message.extra.encode() if isinstance(message.extra, str) else b""
+                await target.close(code=code if sendable and code else aiohttp.WSCloseCode.GOING_AWAY, message=reason)
+                return
+        except ConnectionError:
+            return

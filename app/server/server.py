@@ -17,7 +17,7 @@ import aiohttp
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from app.server import connections, viser_proxy
+from app.server import connections, private_viser
 from app.server.access import NO_TOKEN, Access, root_of
 from app.server.page_requests import ROLE, answer_errors
 from app.server.private_viser import ViserPlace
@@ -60,7 +60,7 @@ def create_app(panes: PaneEndpoint, viser: ViserPlace, access: Access, static: P
     app = web.Application(middlewares=[_guard(access), answer_errors])
     app[_SOCKETS] = weakref.WeakSet()
     app[_ROOTS] = access.roots
-    proxy, files = viser_proxy.ViserProxy(viser), PageFiles(static)
+    proxy, files = private_viser.ViserProxy(viser), PageFiles(static)
 
     async def page(request: web.Request) -> web.StreamResponse:
         if access.token is None or "token" not in request.query:
@@ -186,7 +186,7 @@ async def _add_headers(request: web.Request, response: web.StreamResponse) -> No
     host = request.headers.get("Host", "")
     # The guard has seen the Host header by now: it is a plain name, or the answer is a refusal, which connects nowhere.
     sources = connect_sources(host) if response.status != 403 else "'none'"
-    policy = viser_proxy.POLICY if viser_proxy.is_viser(request.path) else POLICY
+    policy = private_viser.POLICY if private_viser.is_viser(request.path) else POLICY
     response.headers["Content-Security-Policy"] = policy.format(sources=sources)
     response.headers["X-Content-Type-Options"] = "nosniff"
     response.headers["Referrer-Policy"] = "no-referrer"

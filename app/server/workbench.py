@@ -28,12 +28,11 @@ from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever
 from app.server.session_routes import SessionRoutes, refusal
 from app.server.static_files import static_folder
-from app.server.thumbnail_routes import ThumbnailRoutes
-from app.server.thumbnails import Thumbnails
+from app.server.thumbnails import ThumbnailRoutes, Thumbnails
 from app.session import proxies
 from app.session.annotator import annotator_or_login
-from app.session.footage_crops import FootageCrops
 from app.session.footage_indices import footage_indices
+from app.session.footage_pictures import FootageCrops
 from app.session.frame_cache import FrameCache
 from app.session.recent_sessions import remember
 from app.storage import rescue

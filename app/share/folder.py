@@ -5,8 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.server.page_bundle import bundle_script, bundle_styles
-from app.server.static_files import static_folder
+from app.server.static_files import bundle_script, bundle_styles, static_folder
 from app.session.footage_indices import footage_indices
 from app.share.content import SharedComment, describe
 from app.share.overlay_lines import UNITS_PER_PX, compact, view_lines

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from tracker.annotation.comments import Comment
 from tracker.annotation.next_click import Click, Proposals
-from tracker.annotation.plan import Task
+from tracker.annotation.plan import Comment, Task
 from tracker.annotation.speed import Speed
 
 

@@ -162,7 +162,7 @@ class ReviewPart:
     reasons: ReasonState = field(default_factory=ReasonState)
     """Why the shown pose is in doubt, as far as a page asks."""
     inconsistent_frames: tuple[int, ...] = ()
-    """Frames whose poses disagree with their neighbours, ascending (see `tracker.body.motion.consistency`)."""
+    """Frames whose poses disagree with their neighbours, ascending (see `tracker.body.motion.keyframe_doubts`)."""
     keyframe_doubts: tuple[KeyframeDoubt, ...] = ()
     """Keyframes that their neighbours or views contradict, by person and frame."""
 

@@ -25,7 +25,7 @@ from tracker.formats.pose_csv import read_pose_table
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
-from tracker.simulate.experiments.line_chart import Line, line_chart
+from tracker.simulate.experiments.contour_report import Line, line_chart
 
 TABLES = ("observability", "observability reliability")
 LENGTHS_PX = (20, 40, 80, 120, 160, 240, 320)

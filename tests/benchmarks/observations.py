@@ -16,7 +16,7 @@ from doc_tables import Conditions, benchmark_parser, read_words, show, table, wo
 from joint_errors import area_cell
 
 from tracker.api.work import ProgressSink
-from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import BodyPoints
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.pose_errors import OFF_M
 from tracker.evaluation.judging.judge import Judgement, judge, judge_person

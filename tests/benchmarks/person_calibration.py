@@ -26,8 +26,8 @@ from filmed_people import aligned, blanks, dancing, observed, rig
 from tracker.calibration.check.point_problem import triangulate_all
 from tracker.calibration.check.reprojection import Observations
 from tracker.calibration.self_calibration.keypoint_calibration import calibrate_by_person
-from tracker.calibration.self_calibration.keypoint_files import footage_session, plan_of_files
 from tracker.calibration.self_calibration.person_calibration import PersonCalibration
+from tracker.calibration.self_calibration.person_files import footage_session, plan_of_files
 from tracker.errors import CalibrationError
 from tracker.formats.calibrations.reading import read_cameras
 from tracker.geometry import rigid

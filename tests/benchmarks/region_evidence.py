@@ -27,8 +27,14 @@ from true_starts import joint_centers, limb_joints
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.estimation.appearance.region_deficit import elsewhere_nats, worst_parts
-from tracker.estimation.appearance.region_model import LearningFrame, RegionModel, learn_regions, learning_frames
+from tracker.estimation.appearance.region_model import (
+    LearningFrame,
+    RegionModel,
+    elsewhere_nats,
+    learn_regions,
+    learning_frames,
+    worst_parts,
+)
 from tracker.estimation.by_frame.frame_problem import Bodies, trust, with_body
 from tracker.estimation.by_frame.pose_score import common_evidence, scorer_without_prediction
 from tracker.estimation.chamfer.settings import TrackSettings

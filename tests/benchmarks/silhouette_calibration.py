@@ -19,7 +19,7 @@ from filmed_people import aligned, blanks
 from filmed_silhouettes import EXACT, FilmedSilhouettes, Segmentation, filmed
 from person_calibration import HEADS, HEIGHTS_M, LENS_NAMES, read_arguments, recording_row, reprojected
 
-from tracker.calibration.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
+from tracker.calibration.self_calibration.person_files import FilmedPerson, calibrate_filmed_person
 from tracker.calibration.self_calibration.silhouette_calibration import calibrate_by_silhouettes
 from tracker.compute.progress import unreported
 from tracker.errors import CalibrationError

@@ -5,7 +5,7 @@ import inspect
 from pathlib import Path
 
 import quadrille
-from tracker.api.pose_series import PoseSeries
+from tracker.api.results import PoseSeries
 from tracker.api.work import Found, Tracked
 from tracker.estimation.acquisition.from_contours import Acquisition
 from tracker.evaluation.judging.judge import Judgement

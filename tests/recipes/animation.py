@@ -20,7 +20,7 @@ from playwright.async_api import Page, async_playwright
 from program import Program
 
 from tracker.evaluation.references import read_joints
-from tracker.footage.animation_writer import AnimationWriter
+from tracker.footage.video_writer import AnimationWriter
 from tracker.session.session import Session, load_session
 
 PICTURES_A_SECOND = 7

@@ -4,10 +4,9 @@ import shutil
 
 import numpy as np
 
-from tracker.annotation.comments import add_comment
-from tracker.annotation.merge import merge_logs
+from tracker.annotation.merge_sessions import merge_logs
 from tracker.annotation.numbered_settings import renumbered
-from tracker.annotation.plan import add_tasks, decide, read_tasks
+from tracker.annotation.plan import add_comment, add_tasks, decide, read_tasks
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model, load_model
 from tracker.session.store.annotation_store import AnnotationStore

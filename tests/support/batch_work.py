@@ -7,8 +7,7 @@ from pathlib import Path
 from tracker.api.work import Tracked
 from tracker.batch.manifest import Manifest
 from tracker.batch.plan import BatchPlan, PlannedRecording, Settings
-from tracker.batch.tasks import Done
-from tracker.batch.worker import work
+from tracker.batch.worker import Done, work
 from tracker.errors import TrackerError
 
 

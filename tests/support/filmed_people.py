@@ -5,7 +5,7 @@ import rigs
 from observed_people import BODY_25
 
 from tracker.body.model import BodyModel
-from tracker.calibration.boards.lens_fit import blank_camera
+from tracker.calibration.boards.rig_fit import blank_camera
 from tracker.formats.model_toml import load_model
 from tracker.interchange.observations.observed import ObservationSet, ObservedPoints
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.estimation.fitting.sliding import SINGULAR
+from tracker.estimation.fitting.twists import SINGULAR
 from tracker.evidence.contours import occluding_contours
 from tracker.geometry.shapes import EllipticalCone
 

@@ -3,4 +3,8 @@
 Imports all rooms of the tracker; none imports it. docs/library.md describes it.
 """
 
-__all__ = ["pose_series", "results", "sessions", "work"]
+__all__ = [
+    "results",
+    "sessions",
+    "work",
+]

@@ -17,8 +17,7 @@ from tempfile import TemporaryFile
 
 import msgspec
 
-from tracker.session.holder import Holder, is_alive, is_of_this_system, read_holder, this_holder
-from tracker.session.lock import LOCK_FILE
+from tracker.session.lock import LOCK_FILE, Holder, is_alive, is_of_this_system, read_holder, this_holder
 
 BEAT_S = 2.0
 """Time between two signs of life of a worker, s."""

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.api.pose_series import PoseSeries
-from tracker.api.results import read_poses
+from tracker.api.results import PoseSeries, read_poses
 from tracker.batch.manifest import Manifest, State
 from tracker.batch.plan import Settings
 from tracker.batch.stretches import SeamRow

@@ -2,18 +2,16 @@
 
 It imports no other room.
 
-Public: `numba_options`, `threads`, `quantiles`, `sampling`, `progress`, and of `kernel_cache` which kernels are
+Public: `jit`, `threads`, `quantiles`, `sampling`, `progress`, and of `kernel_cache` which kernels are
 compiled.
 """
 
 __all__ = [
     "distribution",
     "extensions",
-    "float32",
     "interpretation",
     "jit",
     "kernel_cache",
-    "numba_options",
     "progress",
     "quantiles",
     "sampling",

@@ -54,8 +54,8 @@ class Evaluation:
     per_frame: tuple["FrameError", ...]
     """The error of each frame."""
     offsets_mm: Mapping[str, tuple[float, ...]] | None = None
-    """Mean difference of each joint from the reference in the frame of its proximal part, (3,), see `joint_offsets`;
-    None without poses of the estimate."""
+    """Mean difference of each joint from the reference in the frame of its proximal part, (3,); None without poses
+    of the estimate. See `stored_evaluation`."""
     mpjpe_without_offsets_mm: float | None = None
     """`mpjpe_mm` after each joint's offset is taken away."""
     per_joint_without_offsets_mm: Mapping[str, float] | None = None

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from tracker.evidence.foreground import Foreground, Prepared, prepare_views
-from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.edges import StaticEdgeModel
 from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.view_evidence import (
     DEFAULT_EDGES,

@@ -1,7 +1,7 @@
 """Find the silhouettes of a frame in all views, from the user's masks or by background subtraction.
 
 Silhouettes are in *raw* pixels: as filmed, lens distortion included, at working scale. A look-up table
-(`tracker.evidence.voxels.sensor_lookup`) leads from points in space to them (MTHC01 Sect. 2).
+(`tracker.evidence.voxels.carving`) leads from points in space to them (MTHC01 Sect. 2).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,19 +13,21 @@ import cv2
 import numpy as np
 
 from tracker.errors import RecordingError, Remedy
-from tracker.evidence.images.background_model import BackgroundModel, background_of_clip, background_of_recording
 from tracker.evidence.images.background_subtraction import (
     SHADOWS_AND_HIGHLIGHTS,
+    BackgroundModel,
     Changes,
     Mask,
     Shading,
     apply_gain,
+    background_of_clip,
+    background_of_recording,
+    clean_silhouette,
     exposure_and_threshold,
     smooth_image,
     subtract_background,
 )
 from tracker.evidence.images.edges import SPACING_PX
-from tracker.evidence.images.silhouette_cleaning import clean_silhouette
 from tracker.evidence.images.working_view import WorkingView
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import parts_of_mask

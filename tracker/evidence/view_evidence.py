@@ -25,9 +25,8 @@ from tracker.evidence.images.edge_segments import (
     accept_segments,
     sample_segments,
 )
-from tracker.evidence.images.edges import Edges
+from tracker.evidence.images.edges import Edges, StaticEdgeModel
 from tracker.evidence.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
-from tracker.evidence.images.static_edges import StaticEdgeModel
 from tracker.evidence.keypoints import ViewKeypoints
 from tracker.geometry.arrays import Array, FloatArray, Image, Mask
 from tracker.geometry.cameras import Camera, Region

@@ -5,7 +5,6 @@ A frame is bit-identical however it is reached. Imports `geometry`. Callers use 
 """
 
 __all__ = [
-    "animation_writer",
     "camera_source",
     "chapters",
     "flash",

@@ -10,9 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.float32 import FAR, FAR2, HALF, ONE, TINY, ZERO
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
+from tracker.compute.jit import FAR, FAR2, FAST_MATH, HALF, NO_REFCOUNT, ONE, TINY, ZERO, njit
 from tracker.geometry.arrays import FloatArray, IntArray
 
 LANES = 16

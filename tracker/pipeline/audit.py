@@ -20,8 +20,13 @@ from tracker.estimation.tracking.tracker import Subjects
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
-from tracker.pipeline.estimated_rows import assessed_by_run, assessed_keyframe, estimated_row, pose_change
-from tracker.pipeline.tracked_changes import settings_record
+from tracker.pipeline.tracked_changes import (
+    assessed_by_run,
+    assessed_keyframe,
+    estimated_row,
+    pose_change,
+    settings_record,
+)
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 from tracker.session.store.annotation_store import AnnotationStore

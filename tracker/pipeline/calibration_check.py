@@ -5,9 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.calibration.check.diagnosis import Diagnosis, diagnose, glance
+from tracker.calibration.check.diagnosis import CameraFinding, Diagnosis, diagnose, findings, glance, sentence
 from tracker.calibration.check.fault_search import prior_sigmas
-from tracker.calibration.check.findings import CameraFinding, findings, sentence
 from tracker.calibration.check.lens_priors import NEWS
 from tracker.calibration.check.residual_pieces import ResidualPieces, residual_pieces
 from tracker.calibration.check.single_frames import FrameScore, find_change, score_frame

@@ -12,8 +12,8 @@ from typing import Any, Protocol
 from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, part_of
 from tracker.errors import Remedy, TrackerError
-from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
+from tracker.estimation.acquisition.from_keypoints import BodyPoints
 from tracker.estimation.fitting.gauss_newton import PointTargets
 from tracker.estimation.initialization.first_pose import FirstPoses
 from tracker.estimation.initialization.frame_trials import Trying

@@ -15,9 +15,15 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
-from tracker.estimation.tracking.confidence import classify_limbs, probabilities, status_named, worst
+from tracker.estimation.tracking.confidence import (
+    classify_limbs,
+    probabilities,
+    status_named,
+    uncertain,
+    without_uncertainty,
+    worst,
+)
 from tracker.estimation.tracking.pose_errors import limb_odds, point_covariances
-from tracker.estimation.tracking.remarks import uncertain, without_uncertainty
 from tracker.estimation.tracking.tracker import Keyframes
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array

@@ -13,9 +13,8 @@ from tracker.body.dimensions import HEIGHT_LIMITS_M
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.sampling import spread_indices
 from tracker.errors import Remedy, TrackerError
-from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.estimation.acquisition.from_joints import place_joints
-from tracker.estimation.acquisition.from_keypoints import SeenBody, fit_to_keypoints, learn_seen_body
+from tracker.estimation.acquisition.from_keypoints import BodyPoints, SeenBody, fit_to_keypoints, learn_seen_body
 from tracker.estimation.acquisition.segment_lengths import segment_lengths
 from tracker.estimation.fitting.gauss_newton import PointTargets
 from tracker.estimation.fitting.hypothesis import Hypothesis

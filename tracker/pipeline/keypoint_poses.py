@@ -7,8 +7,7 @@ import numpy as np
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, part_of, result_of, unreported
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.body_points import BodyPoints
-from tracker.estimation.acquisition.from_keypoints import fit_to_keypoints, learn_seen_body
+from tracker.estimation.acquisition.from_keypoints import BodyPoints, fit_to_keypoints, learn_seen_body
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, solve, weak_pull
 from tracker.estimation.fitting.interpenetration import SelfPenetration
 from tracker.estimation.fitting.keypoints import KeypointBlock

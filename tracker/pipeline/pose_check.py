@@ -18,7 +18,7 @@ from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
 from tracker.estimation.tracking.tracker import Subjects
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
-from tracker.pipeline.estimated_rows import assessed_by_run
+from tracker.pipeline.tracked_changes import assessed_by_run
 from tracker.session.session import Session
 from tracker.session.store.records import PoseRecord
 

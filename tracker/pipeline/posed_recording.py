@@ -17,7 +17,7 @@ from tracker.estimation.fitting.hypothesis import SAME_POSE_M
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.estimation.tracking.tracker import TrackedFrame
 from tracker.estimation.tracking.view_regions import regions
-from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.edges import StaticEdgeModel
 from tracker.evidence.observer import Observer
 from tracker.session.session import Session
 from tracker.session.store.stored_poses import read_stored_poses

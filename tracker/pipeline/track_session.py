@@ -28,11 +28,19 @@ from tracker.estimation.trajectory.solve import even_blocks
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
 from tracker.pipeline.calibration_check import contradiction
-from tracker.pipeline.estimated_rows import assessed_keyframe, estimated_row, pose_change
 from tracker.pipeline.keyframe_stretches import between_keyframes, seam_of, with_seam
 from tracker.pipeline.methods import compared_by
 from tracker.pipeline.posed_recording import PosedRecording
-from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson, settings_record, tracked_changes
+from tracker.pipeline.tracked_changes import (
+    PoseWriter,
+    RunChange,
+    StoredPerson,
+    assessed_keyframe,
+    estimated_row,
+    pose_change,
+    settings_record,
+    tracked_changes,
+)
 from tracker.session.store.records import AssessmentChange, PoseChange, PoseRecord
 
 

@@ -10,7 +10,6 @@ __all__ = [
     "folder",
     "footage_files",
     "frame_list",
-    "holder",
     "lock",
     "locked_dofs",
     "matching",

@@ -23,7 +23,7 @@ from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
 from tracker.session.folder import appearing, require_free
 from tracker.session.session import PALETTE, Person, Session, load_session, save_session
-from tracker.session.store.identities import derived_uid
+from tracker.session.store.records import derived_uid
 from tracker.simulate.motion.postures import Role, solve_posture
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.model_figure import ModelFigure

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from app.cli.annotation.task_report import format_plan, record
+from app.cli.annotation.tasks import format_plan, record
 from app.cli.arguments import Names, OptionalName, OptionalWhole, Paths, SessionArg
 from app.cli.target import Target, load_target
 from app.runtime.json_output import format_json
@@ -86,7 +86,7 @@ def _annotator(text: str) -> str:
     Raises:
         TrackerError: it is none.
     """
-    from app.participants.names import joined_name
+    from app.participants.participants import joined_name
 
     name = joined_name(text)
     if not name:
@@ -163,7 +163,7 @@ def _write_copies(
     session: "Session", store: "AnnotationStore", tasks: "list[Task]", arguments: AssignArguments
 ) -> list[dict[str, Any]]:
     """Write the blind copies; returns an entry for each."""
-    from tracker.annotation.blind_copy import write_blind_copy, write_second_pass
+    from tracker.annotation.session_copies import write_blind_copy, write_second_pass
 
     copies: list[dict[str, Any]] = []
     log = store.read_log() if arguments.blind else None

@@ -81,7 +81,7 @@ def command(arguments: Annotated[ShareArguments, tyro.conf.arg(name="")]) -> Non
 def _comments(session: "Session") -> list["SharedComment"]:
     """Read the comments of a session."""
     from app.share.content import SharedComment
-    from tracker.annotation.comments import read_comments
+    from tracker.annotation.plan import read_comments
     from tracker.session.store.annotation_store import AnnotationStore
 
     with AnnotationStore(session.annotations_path, read_only=True) as store:

@@ -119,7 +119,7 @@ def _by_board(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
 
 def _by_person(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
     from app.cli.calibration.person_report import format_record, record_of
-    from tracker.calibration.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
+    from tracker.calibration.self_calibration.person_files import FilmedPerson, calibrate_filmed_person
 
     filmed = FilmedPerson(
         arguments.people,

@@ -13,7 +13,7 @@ from app.runtime.progress import Reporter
 from tracker.errors import Remedy, TrackerError
 
 if TYPE_CHECKING:
-    from tracker.calibration.check.findings import CameraFinding
+    from tracker.calibration.check.diagnosis import CameraFinding
     from tracker.calibration.check.single_frames import FrameScore
     from tracker.pipeline.calibration_check import CalibrationCheck
     from tracker.session.session import Session

@@ -10,9 +10,16 @@ from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
-from tracker.annotation.comments import add_comment, read_comments, resolve_comment
 from tracker.annotation.frame_choice import FrameChoice, choose_frames, dealt
-from tracker.annotation.plan import add_tasks, decide, read_tasks, require_seen
+from tracker.annotation.plan import (
+    add_comment,
+    add_tasks,
+    decide,
+    read_comments,
+    read_tasks,
+    require_seen,
+    resolve_comment,
+)
 from tracker.annotation.speed import measure_speed
 from tracker.body.limbs import limbs
 from tracker.errors import TrackerError

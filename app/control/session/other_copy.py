@@ -15,13 +15,13 @@ from app.state.state import State
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.retarget import retarget_pose
-from tracker.evaluation.agreement.consensus import mean_pose
 from tracker.evaluation.agreement.copies import (
     Subject,
     annotator_names,
     check_same_recording,
     farthest_joint,
     is_annotated,
+    mean_pose,
     notes_on,
 )
 from tracker.geometry.arrays import Array

@@ -12,8 +12,7 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.people import KeyframeDoubt
 from app.state.state import State
 from tracker.body.limbs import display_name
-from tracker.body.motion.consistency import inconsistent_frames
-from tracker.body.motion.keyframe_doubts import neighbour_gaps, raised_views
+from tracker.body.motion.keyframe_doubts import inconsistent_frames, neighbour_gaps, raised_views
 from tracker.session.store.records import FramePose, FrameRow
 
 _REST_S = 0.3

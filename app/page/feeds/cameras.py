@@ -8,7 +8,7 @@ from app.drawing.misfit_field import MisfitField
 from app.messages.base import made_of
 from app.messages.cameras import CalibrationMessage, CameraCheck, CameraClock, ClocksMessage, ComparedMoment, FoundClock
 from app.state.calibration import CalibrationState, ClocksState
-from tracker.calibration.check.findings import CameraFinding
+from tracker.calibration.check.diagnosis import CameraFinding
 from tracker.compute.sampling import without_gaps
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_correction import KINDS, in_units

@@ -25,7 +25,9 @@ KEYS = {
 def quick(monkeypatch):
     """A fit of one step in each round."""
     solve = size_fit.solve_bundle
-    monkeypatch.setattr(size_fit, "solve_bundle", lambda bundle, state, _, report: solve(bundle, state, 1, report=report))
+    monkeypatch.setattr(
+        size_fit, "solve_bundle", lambda bundle, state, _, report: solve(bundle, state, 1, report=report)
+    )
 
 
 def files_of(session):

@@ -18,7 +18,7 @@ from tracker.formats.trc import read_trc
 from tracker.interchange.exports.export_files import export
 from tracker.interchange.exports.formats import FORMATS
 from tracker.interchange.exports.motion import ExportOptions, read_motion
-from tracker.session.holder import this_holder
+from tracker.session.lock import this_holder
 from tracker.session.session import load_session
 
 

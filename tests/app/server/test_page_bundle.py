@@ -2,8 +2,7 @@
 
 import pytest
 
-from app.server.page_bundle import bundle_markup, bundle_script, bundle_styles
-from app.server.static_files import static_folder
+from app.server.static_files import bundle_markup, bundle_script, bundle_styles, static_folder
 from tracker.errors import TrackerError
 
 FILES = {

@@ -6,8 +6,8 @@ import threading
 import pytest
 from serving import page_of
 
-from app.server import thumbnail_routes
-from app.server.thumbnail_routes import ThumbnailRoutes
+from app.server import thumbnails
+from app.server.thumbnails import ThumbnailRoutes
 from tracker.errors import RecordingError
 
 JPEG = b"\xff\xd8 a picture"
@@ -59,7 +59,7 @@ async def test_a_thumbnail_is_sent_as_jpeg(client):
 
 async def test_nothing_waits_for_a_thumbnail(client, monkeypatch):
     session, maker = client
-    monkeypatch.setattr(thumbnail_routes, "_MAX_WAITING", 3)
+    monkeypatch.setattr(thumbnails, "_MAX_WAITING", 3)
     maker.free.clear()
     async with asyncio.timeout(10):
         waiting = [asyncio.create_task(status(session, f"/thumbnail/0/{frame}")) for frame in range(3)]

@@ -9,7 +9,7 @@ import pytest
 from gestures import drag, pixel_of
 
 from app.server import thumbnails
-from app.session.footage_crops import FootageCrops
+from app.session.footage_pictures import FootageCrops
 from tracker.footage.camera_source import Clock
 from tracker.geometry.camera_correction import N_CORRECTIONS, ROTATION, corrected
 

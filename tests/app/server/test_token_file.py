@@ -5,9 +5,8 @@ import time
 
 import pytest
 
-from app.server import token_file
-from app.server.access import access_for
-from app.server.token_file import kept_token
+from app.server import access
+from app.server.access import access_for, kept_token
 
 
 def test_a_restart_on_loopback_has_the_same_token_and_others_a_new_one(tmp_path):
@@ -58,6 +57,6 @@ def test_without_a_writable_folder_a_token_holds_for_one_start(tmp_path, monkeyp
     def full(*_words, **_more):
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(token_file, "write_text_atomic", full)
+    monkeypatch.setattr(access, "write_text_atomic", full)
     assert kept_token(tmp_path) != kept_token(tmp_path)
     assert list(tmp_path.iterdir()) == []

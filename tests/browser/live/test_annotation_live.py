@@ -3,8 +3,7 @@
 import pytest
 from page_driver import command, dragging, shows
 
-from tracker.annotation.comments import read_comments
-from tracker.annotation.plan import read_tasks
+from tracker.annotation.plan import read_comments, read_tasks
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
 

@@ -9,7 +9,7 @@ from page_driver import command, shows
 from program import SAMPLE, started, visited
 
 from tracker.estimation.posing.default_pose import default_pose
-from tracker.evaluation.agreement.consensus import mean_pose
+from tracker.evaluation.agreement.copies import mean_pose
 from tracker.formats.model_toml import format_model
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore

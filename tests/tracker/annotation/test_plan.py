@@ -3,9 +3,16 @@
 import pytest
 from annotated_copies import new_store, pose
 
-from tracker.annotation.comments import add_comment, read_comments, resolve_comment
 from tracker.annotation.frame_choice import dealt, diverse_frames, doubted_frames
-from tracker.annotation.plan import add_tasks, count_states, decide, read_tasks
+from tracker.annotation.plan import (
+    add_comment,
+    add_tasks,
+    count_states,
+    decide,
+    read_comments,
+    read_tasks,
+    resolve_comment,
+)
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model

@@ -17,8 +17,7 @@ from tracker.batch.plan import Settings
 from tracker.batch.stretch_work import FOUND
 from tracker.batch.stretches import Division, RecordingStretch, divide
 from tracker.batch.task_files import Result
-from tracker.batch.tasks import Done
-from tracker.batch.worker import work
+from tracker.batch.worker import Done, work
 from tracker.errors import TrackerError
 from tracker.pipeline.keyframe_stretches import pose_checksum
 from tracker.session.store.annotation_store import AnnotationStore

@@ -12,7 +12,7 @@ import quadrille
 from tracker.api.work import Tracked
 from tracker.batch.manifest import Manifest
 from tracker.batch.plan import read_plan
-from tracker.batch.tasks import do_task
+from tracker.batch.worker import do_task
 from tracker.evaluation.references import read_joints
 from tracker.formats.model_toml import load_model
 from tracker.pipeline.given_pose import set_pose_at_joints
@@ -51,7 +51,7 @@ def test_a_task_that_died_before_its_result_does_not_track_again(manifest, tmp_p
 
 
 def test_recordings_and_people_of_like_names_have_files_of_their_own(tmp_path, monkeypatch):
-    monkeypatch.setattr("tracker.batch.tasks.track", lambda *_, **__: Tracked(1, {}, 1.0, 0, ""))
+    monkeypatch.setattr("tracker.batch.worker.track", lambda *_, **__: Tracked(1, {}, 1.0, 0, ""))
     people = {"x/y": ("Ann",), "x_y": ("ann",), "x/z": ("y", "w_v"), "x/z_w": ("v", "u")}
     for i, (name, own) in enumerate(people.items()):
         (tmp_path / name).parent.mkdir(exist_ok=True)

@@ -19,8 +19,7 @@ from tracker.batch import claims
 from tracker.batch.task_files import RecordingTask, Result
 from tracker.batch.worker import work
 from tracker.errors import TrackerError
-from tracker.session.holder import this_holder
-from tracker.session.lock import LOCK_FILE
+from tracker.session.lock import LOCK_FILE, this_holder
 
 
 @pytest.fixture

@@ -47,7 +47,7 @@ CALLER = '''"""Callers."""
 from tracker.compute.jit import njit
 from tracker.near import callee
 from tracker.near.callee import Pair, least
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH
 
 @njit(nogil=True, cache=True)
 def twice(pair: Pair) -> float:

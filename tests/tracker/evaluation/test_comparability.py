@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.remedies import command_line_text
-from tracker.evaluation.comparability import distance_note, length_note
+from tracker.evaluation.stored_evaluation import distance_note, length_note
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable, axes_matrix
 from tracker.geometry import rigid

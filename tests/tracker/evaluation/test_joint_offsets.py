@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from bodies import with_center
 
-from tracker.evaluation.joint_offsets import evaluate_offsets
 from tracker.evaluation.metrics import Motion, PoseDoubt, evaluate_joints, joints_of_poses
+from tracker.evaluation.stored_evaluation import evaluate_offsets
 from tracker.formats.model_toml import load_model
 
 MODEL = load_model("gavrila34", 1.7)

@@ -10,9 +10,8 @@ from app.main import main
 from tracker.body.model import PosedBody
 from tracker.errors import FormatError
 from tracker.evaluation.markers.agreement import compare_with_markers
-from tracker.evaluation.markers.joint_centres import joint_centres
 from tracker.evaluation.markers.marker_set import known_sets, read_marker_set
-from tracker.evaluation.markers.reference import read_centres, read_marker_reference
+from tracker.evaluation.markers.reference import joint_centres, read_centres, read_marker_reference
 from tracker.evaluation.references import stored_motion
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable, write_trc

@@ -11,7 +11,7 @@ from tracker.errors import RecordingError
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.foreground import FOREGROUND_MARGIN
 from tracker.evidence.images.edge_segments import MAX_LENGTH, accept_segments, link_and_sample
-from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.edges import StaticEdgeModel
 from tracker.evidence.images.working_view import WorkingView, region_around, working_scale
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import (

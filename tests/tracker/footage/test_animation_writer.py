@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from tracker.footage.animation_writer import MAX_WIDTH_PX, AnimationWriter
+from tracker.footage.video_writer import MAX_WIDTH_PX, AnimationWriter
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".webp"])

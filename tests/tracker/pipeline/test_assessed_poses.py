@@ -9,7 +9,7 @@ from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import load_model
-from tracker.pipeline.estimated_rows import assessed_by_run, assessed_keyframe, estimated_row
+from tracker.pipeline.tracked_changes import assessed_by_run, assessed_keyframe, estimated_row
 from tracker.session.store.records import PoseRecord
 
 FACING = "contours do not tell which way the person faces"

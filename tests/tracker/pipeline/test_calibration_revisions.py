@@ -10,8 +10,8 @@ import pytest
 from command_line import SAMPLE
 from stored_motions import put_poses
 
+from tracker.calibration.check.diagnosis import CameraFinding
 from tracker.calibration.check.fault_search import Fault
-from tracker.calibration.check.findings import CameraFinding
 from tracker.errors import SessionError
 from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration

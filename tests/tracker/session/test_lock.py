@@ -13,7 +13,7 @@ import pytest
 
 from tracker import system
 from tracker.errors import SessionError
-from tracker.session import holder as holder_module
+from tracker.session import lock as holder_module
 from tracker.session import lock as lock_module
 from tracker.session.lock import LOCK_FILE, SessionLock, is_held_here
 

@@ -1,12 +1,11 @@
 """Poses over time, without images: prediction, interpolation, inconsistent frames, the floor, who is who.
 
 Imports `geometry` and `body`. Callers use `velocity.predict`, `velocity.shortest_step`, `interpolation`,
-`consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`, `continuation.who_is_who` and
+`keyframe_doubts.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`, `continuation.who_is_who` and
 `keyframe_doubts`.
 """
 
 __all__ = [
-    "consistency",
     "continuation",
     "floor_from_feet",
     "history",

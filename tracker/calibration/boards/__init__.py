@@ -1,7 +1,7 @@
 """Calibrate cameras by footage of a board: corners, lenses, a graph of shared boards, and one adjustment of all.
 
 Imports `calibration.check` of its wing; knows no session. Callers use `board_description.read_board`,
-`board_footage.read_corners` and `board_calibration.calibrate_rig`.
+`footage_calibration.read_corners` and `board_calibration.calibrate_rig`.
 """
 
 __all__ = [
@@ -10,6 +10,6 @@ __all__ = [
     "camera_graph",
     "expected_error",
     "footage_calibration",
-    "lens_fit",
+    "rig_fit",
     "view_choice",
 ]

@@ -8,8 +8,15 @@ import numpy as np
 from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_problem import SeenCorners
 from tracker.calibration.boards.camera_graph import link_cameras
-from tracker.calibration.boards.lens_fit import TOLD_FOCAL, LensFit, blank_camera, fit_lens
-from tracker.calibration.boards.rig_fit import RigCalibration, adjust_rig, held_out_errors
+from tracker.calibration.boards.rig_fit import (
+    TOLD_FOCAL,
+    LensFit,
+    RigCalibration,
+    adjust_rig,
+    blank_camera,
+    fit_lens,
+    held_out_errors,
+)
 from tracker.calibration.boards.view_choice import MAX_LENS_VIEWS, choose_frames, choose_views, outlines, posed_views
 from tracker.calibration.check.held_out import HeldOut, held_out_of
 from tracker.calibration.check.solvable import check_apart, solvable

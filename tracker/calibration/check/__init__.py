@@ -8,7 +8,6 @@ reprojection errors.
 __all__ = [
     "diagnosis",
     "fault_search",
-    "findings",
     "held_out",
     "lens_priors",
     "point_problem",

@@ -1,8 +1,11 @@
 """Calibrate cameras by people, without a board: by key points or silhouettes; a chain of cameras, one adjustment.
 
 Imports the other rooms of its wing. Callers use
-`keypoint_files.calibrate_filmed_person` for footage, `keypoint_calibration.calibrate_by_person` for key points,
+`person_files.calibrate_filmed_person` for footage, `keypoint_calibration.calibrate_by_person` for key points,
 and `silhouette_calibration.calibrate_by_silhouettes` for silhouettes.
 """
 
-__all__ = ["keypoint_files", "person_calibration"]
+__all__ = [
+    "person_calibration",
+    "person_files",
+]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibration.boards.expected_error import MAX_POINTS, VolumeError, expected_error
-from tracker.calibration.boards.lens_fit import TOLD_FOCAL
+from tracker.calibration.boards.rig_fit import TOLD_FOCAL
 from tracker.calibration.check.held_out import HeldOut
 from tracker.calibration.check.lens_priors import NEWS, UNKNOWN_LENS
 from tracker.calibration.check.point_problem import PointProblem, require_spread, triangulate_all

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from tracker.evidence.images.silhouette_cleaning import MIN_AREA
+from tracker.evidence.images.background_subtraction import MIN_AREA
 from tracker.geometry.arrays import Array, Mask
 
 

@@ -5,7 +5,6 @@ Imports the rooms of its wing up to `estimation.voxel`. Callers use `from_joints
 """
 
 __all__ = [
-    "body_points",
     "contour_bundle",
     "from_contours",
     "from_joints",

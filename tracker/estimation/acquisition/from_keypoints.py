@@ -2,17 +2,19 @@
 
 Detectors are consistently off, at hips and shoulders by some centimetres. A body that is posed by other evidence, or by
 all key points together, shows by how much.
+
+The observed points of one person that are points of the body, over all frames and views.
 """
 
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.quantiles import MAD_TO_SIGMA
-from tracker.estimation.acquisition.body_points import BodyPoints
 from tracker.estimation.fitting.gauss_newton import (
     OTHER_BODY_M,
     PointTargets,
@@ -28,6 +30,32 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import TINY, Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.triangulation import sigma_px
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPoints:
+    """Observed points of one person."""
+
+    names: tuple[str, ...]
+    """Names of the body's points, (N,)."""
+    joints_world: Array
+    """Their positions in the world, (F, N, 3), metres; NaN where unknown."""
+    seen: Array
+    """Their positions in each view, (F, V, N, 2), in normalized image coordinates x / z; NaN where absent."""
+    confidence: Array
+    """(F, V, N), 0 to 1; 0 where absent."""
+
+    def known_to(self, model: BodyModel) -> "BodyPoints":
+        """Return those that are points of a body."""
+        at = [i for i, n in enumerate(self.names) if n in model.point_names]
+        names = tuple(self.names[i] for i in at)
+        return BodyPoints(names, self.joints_world[:, at], self.seen[:, :, at], self.confidence[:, :, at])
+
+    def places(self, frame: int) -> dict[str, Array]:
+        """Return the points that are known on a frame by name, (3,) each, metres."""
+        known = np.isfinite(self.joints_world[frame]).all(axis=1)
+        return {n: p for n, p, k in zip(self.names, self.joints_world[frame], known, strict=True) if k}
+
 
 _ROUNDS = 3
 """Fits to the key points, each with the offsets learnt from the one before."""

@@ -16,8 +16,13 @@ from tracker.body.dimensions import with_height_of_stature
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.threads import map_parallel
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.figure_motions import TIPS, FigureSizes, figure_by_sizes, parts_by_unknowns
-from tracker.estimation.acquisition.part_motions import points_by_sizes
+from tracker.estimation.acquisition.part_motions import (
+    TIPS,
+    FigureSizes,
+    figure_by_sizes,
+    parts_by_unknowns,
+    points_by_sizes,
+)
 from tracker.estimation.acquisition.size_fit import SizeStart
 from tracker.estimation.acquisition.size_parameters import SizeArrays, SizeParameters
 from tracker.estimation.fitting.bundle import ArrowEquations

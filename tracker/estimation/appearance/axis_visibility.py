@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.shapes import AXIS_SHARE
 

@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.compute.quantiles import MAD_TO_SIGMA
-from tracker.estimation.appearance.color_shares import VOLUME, log_density
+from tracker.estimation.appearance.part_colors import VOLUME, log_density
 from tracker.estimation.appearance.part_drawing import CellView
 from tracker.evidence.images.background_subtraction import MAX_HUE_SHIFT, MIN_SHADE, exposure_gain, has_usable_exposure
 from tracker.evidence.images.change import NOISE_SIGMAS

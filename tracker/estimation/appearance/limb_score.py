@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.estimation.appearance.axis_visibility import (
     ALONG,
     axis_sample,

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody, ahead
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.evidence.contours.occluding_contours import part_poses
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray, Image, Mask

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.estimation.appearance.part_drawing import Canvas, face_in_image, nearness_at, project_mesh
 from tracker.evidence.images.color_histogram import bin_of
 from tracker.geometry.arrays import Array, FloatArray, Image, IntArray

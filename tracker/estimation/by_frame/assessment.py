@@ -12,8 +12,7 @@ from tracker.estimation.fitting.contour_residuals import PartCosts
 from tracker.estimation.fitting.gauss_newton import covariance
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.tracking import confidence
-from tracker.estimation.tracking.confidence import PoseQuality, Status, worst
-from tracker.estimation.tracking.remarks import may_be_elsewhere
+from tracker.estimation.tracking.confidence import PoseQuality, Status, may_be_elsewhere, worst
 from tracker.estimation.tracking.tracker import NormalMatrix
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array

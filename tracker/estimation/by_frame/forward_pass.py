@@ -17,7 +17,7 @@ from tracker.estimation.tracking.person_memory import PersonMemory
 from tracker.estimation.tracking.tracker import AlternativePose, PoseEstimate, TrackingRun
 from tracker.estimation.tracking.view_regions import confirmed_regions, regions
 from tracker.evidence.contours.occluding_contours import Contour, trace_views
-from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.edges import StaticEdgeModel
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Region

@@ -4,4 +4,9 @@ Imports the rooms of its wing up to `estimation.by_frame`. Callers use `tracker.
 `settings.ContourSettings` and `paper.paper_settings`.
 """
 
-__all__ = ["fit_steps", "method", "paper", "paper_fit", "settings"]
+__all__ = [
+    "fit_steps",
+    "method",
+    "paper",
+    "settings",
+]

@@ -13,8 +13,8 @@ from tracker.estimation.by_frame.frame_estimator import FrameEstimator
 from tracker.estimation.by_frame.frame_problem import PersonFit, with_body
 from tracker.estimation.by_frame.incremental_fit import fit_by_chains
 from tracker.estimation.by_frame.settings import EstimationSettings
+from tracker.estimation.contour.fit_steps import paper_residuals, unlimited_views
 from tracker.estimation.contour.image_contours import select_contours
-from tracker.estimation.contour.paper_fit import paper_residuals, unlimited_views
 from tracker.estimation.contour.settings import ContourSettings
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import NormalEquations

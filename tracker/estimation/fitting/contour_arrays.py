@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.pieces import Pieces, StaticContours, piece_buffer
 from tracker.evidence.contours.surfaces import Surfaces

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from tracker.compute.float32 import ONE, ZERO
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, ONE, ZERO, njit
 from tracker.estimation.fitting.contour_arrays import ContourMotion, ContourTerm, Scratch, Sums, ViewArrays
 from tracker.estimation.fitting.segment_matching import match_points, pack_visible, store_static
 from tracker.estimation.fitting.twists import add_twists

@@ -21,8 +21,7 @@ import numpy as np
 
 from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
-from tracker.compute.float32 import FAR
-from tracker.compute.jit import njit
+from tracker.compute.jit import FAR, njit
 from tracker.estimation.fitting.contour_arrays import (
     ContourMotion,
     ContourTerm,

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
+from tracker.compute.jit import FAST_MATH, NO_REFCOUNT, njit
 from tracker.estimation.fitting import gauss_newton
 from tracker.estimation.fitting.clocked_residuals import ClockedResiduals
 from tracker.estimation.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations

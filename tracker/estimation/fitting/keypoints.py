@@ -11,8 +11,7 @@ import numpy as np
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.estimation.fitting.clocked_residuals import at_time
 from tracker.estimation.fitting.gauss_newton import NormalEquations, ResidualBlock
 from tracker.evidence.keypoints import ViewKeypoints

@@ -3,9 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.float32 import FAR2, ONE, ZERO
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAR2, FAST_MATH, ONE, ZERO, njit
 from tracker.estimation.fitting.contour_arrays import Scratch, ViewArrays
 from tracker.evidence.contours.pieces import JOINED, PIECE_PX, StaticContours
 from tracker.evidence.contours.static_cache import mark_covered_segments, store_pieces, trace_static

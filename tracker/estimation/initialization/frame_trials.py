@@ -1,10 +1,15 @@
-"""Try frames until the first poses of all people on one of them can be trusted."""
+"""Try frames until the first poses of all people on one of them can be trusted.
+
+Rank frames by cheap evidence: how well the silhouettes agree, and how many show each person alone.
+"""
 
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import combinations, product
 from typing import NamedTuple
+
+import numpy as np
 
 from tracker.compute.progress import PartPace
 from tracker.errors import Remedy, TrackerError
@@ -16,13 +21,15 @@ from tracker.estimation.initialization.first_pose import (
     Source,
     pose_on_frame,
 )
-from tracker.estimation.initialization.frame_ranking import ranked_frames
 from tracker.estimation.initialization.generators.person_scene import PersonScene
 from tracker.estimation.initialization.generators.start_generators import GENERATORS
+from tracker.estimation.initialization.own_figure import others_on_frame, own_figure
+from tracker.estimation.initialization.silhouette_check import is_cut_off
 from tracker.estimation.initialization.standing_heights import StandingHeights
 from tracker.estimation.initialization.start_fit import short_tracks
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
+from tracker.evidence.voxels.figure_masks import figure_masks
 from tracker.evidence.voxels.shadows import recover_from_shadows
 from tracker.evidence.voxels.visual_hull import carve_people
 from tracker.evidence.voxels.voxel_grid import VOXEL_M
@@ -284,3 +291,34 @@ class _Trial:
             raise self._errors[0]
         n_frames = self._session.n_frames
         return min(self.found, key=lambda f: (not f.is_good, len(short_tracks(f.frame, n_frames)) < 2, f.cost_px))
+
+
+def ranked_frames(
+    frames: Sequence[int], session: Session, person: int, silhouettes_on: Callable[[int], Sequence[ViewSilhouette]],
+    size_m: float,
+) -> list[int]:  # fmt: skip
+    """Return frames, first those on which silhouettes agree in most views that show each person alone.
+
+    Args:
+        frames: to rank.
+        session: with the poses of others, where figures are of them.
+        person: index of a person who must have a figure.
+        silhouettes_on: returns the silhouettes of all views by frame.
+        size_m: edge of a voxel, metres.
+    """
+
+    def agreement(frame: int) -> float:
+        silhouettes = silhouettes_on(frame)
+        try:
+            hull = carve_people(silhouettes, size_m)
+            own_figure(session, person, hull, others_on_frame(session, person, frame, {}))
+        except TrackerError:
+            return 0.0
+        coverages, figures, shown = np.nan_to_num(hull.coverages), hull.figures[: len(session.people)], list[float]()
+        for figure in figures:
+            masks = figure_masks(silhouettes, figure, [f for f in figures if f is not figure])
+            alone = np.array([m.shows_figure_alone and not is_cut_off(m.mask) for m in masks])
+            shown.append(float(coverages @ alone))
+        return min(shown)
+
+    return sorted(frames, key=agreement, reverse=True)

@@ -13,7 +13,7 @@ import numpy as np
 from tracker.body.limbs import display_name, limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.searches import Search
-from tracker.estimation.appearance.region_deficit import worst_views
+from tracker.estimation.appearance.region_model import worst_views
 from tracker.estimation.by_frame.assessment import part_costs_px
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M, Hypothesis, distance_m, distinct, limbs_elsewhere
 from tracker.estimation.runs.frame_hypotheses import FrameHypotheses

@@ -6,6 +6,8 @@ that the colours of the run find elsewhere are searched. The rounds end where no
 
 A hypothesis proposes others, or is dropped, by the cost of the best path through it. By the cost of its frame alone the
 right pose is often not among the best.
+
+Poses that a person may have on a frame, by poses that are known: limbs exchanged, facing the other way, combined.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,13 +15,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tracker.body.limbs import Limb, limbs
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
+from tracker.body.motion.velocity import nearest_equivalent
 from tracker.estimation.appearance.part_colors import PartColors
-from tracker.estimation.appearance.region_deficit import elsewhere_nats, worst_parts
-from tracker.estimation.by_frame.limb_recovery import search_limbs
-from tracker.estimation.fitting.hypothesis import BEAM_NATS, BEAM_WIDTH, CLEAR_NATS
+from tracker.estimation.appearance.region_model import elsewhere_nats, worst_parts
+from tracker.estimation.by_frame.limb_recovery import search_limbs, with_limb
+from tracker.estimation.fitting.hypothesis import BEAM_NATS, BEAM_WIDTH, CLEAR_NATS, limbs_elsewhere
+from tracker.estimation.fitting.limb_exchange import exchanged, paired_limbs, turned_round
 from tracker.estimation.runs.frame_hypotheses import FrameHypotheses, Proposal
-from tracker.estimation.runs.proposals import combined, continued
 from tracker.estimation.trajectory.hypotheses import DISTINCT_M, HypothesisSet, Paths, motion_nats
 from tracker.estimation.trajectory.motion_model import acceleration, motion_points
 from tracker.geometry.arrays import Array, IntArray
@@ -175,6 +178,32 @@ class PathSearch:
 
 def _limbs_to_search(model: BodyModel, elsewhere: Array) -> list[Limb]:
     """Return the limbs of several parts that are clearly likelier elsewhere, (n_limbs,), nats, the likeliest first; see
-    `region_deficit.elsewhere_nats`."""
+    `region_model.elsewhere_nats`."""
     of_body = limbs(model)
     return [of_body[i] for i in np.argsort(-elsewhere) if elsewhere[i] > CLEAR_NATS and len(of_body[i].parts) > 1]
+
+
+def other_sides(body: PosedBody) -> list[Proposal]:
+    """Return the poses in which limbs of both sides are exchanged, and in which the person faces the other way."""
+    pairs = [p for p in paired_limbs(limbs(body.model)) if len(p[0].parts) > 1]
+    return [*(Proposal(exchanged(body, p), "exchange") for p in pairs), Proposal(turned_round(body), "turn")]
+
+
+def continued(model: BodyModel, before: Array | None, here: Array) -> list[Proposal]:
+    """Return a pose on the next frame: where it was, and moved on as from the frame before, (n_values,) each."""
+    poses = [here]
+    if before is not None:
+        step = model.difference(here, nearest_equivalent(model, before, here, None))
+        poses.append(model.move(here, step))
+    return [Proposal(pose, "neighbour") for pose in poses]
+
+
+def combined(model: BodyModel, here: Array, others: Sequence[Array]) -> Iterator[Proposal]:
+    """Yield a pose with each limb of others that have it elsewhere, and those others, (n_values,) each."""
+    body = PosedBody(model, here)
+    for other in others:
+        apart = limbs_elsewhere(body, PosedBody(model, other))
+        for limb in (x for x in limbs(model) if x.name in apart):
+            yield Proposal(with_limb(model, here, other, limb), "combination")
+        if apart:
+            yield Proposal(other, "neighbour")

@@ -4,6 +4,9 @@ Every source only proposes poses: the passes forward and backward, alternatives,
 likelihood compares them (`frame_hypotheses`), one path goes through all frames (`path_search`), and one least-squares
 problem moves its poses (`tracker.estimation.trajectory.solve`). The hypotheses that are left say how sure each limb is
 (`path_assessment`).
+
+Colours are learnt from the poses of the run: a person who faces the wrong way in all of them wears those of the other
+side. In a run that no keyframe begins, contours and key points, which do not depend on that, are asked first.
 """
 
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -16,15 +19,14 @@ from tracker.body.model import PosedBody
 from tracker.body.motion.velocity import moving_bodies
 from tracker.compute.progress import mapped
 from tracker.estimation.appearance.region_model import LearningFrame, RegionModel, learn_regions, learning_frames
-from tracker.estimation.by_frame.frame_problem import Bodies, with_body
-from tracker.estimation.by_frame.pose_score import FrameEvidence, common_evidence
-from tracker.estimation.by_frame.settings import EstimationSettings
+from tracker.estimation.by_frame.frame_problem import Bodies, trust, with_body
+from tracker.estimation.by_frame.pose_score import FrameEvidence, common_evidence, scorer_without_prediction
+from tracker.estimation.by_frame.settings import OWN_TRUST, EstimationSettings
+from tracker.estimation.fitting.hypothesis import CLEAR_NATS
 from tracker.estimation.fitting.limb_exchange import turned_round
-from tracker.estimation.runs.facing import KNOWN, Facing, turning_nats
 from tracker.estimation.runs.frame_hypotheses import FrameHypotheses, Proposal
-from tracker.estimation.runs.path_assessment import RunPose, assessed_path
-from tracker.estimation.runs.path_search import PathSearch
-from tracker.estimation.runs.proposals import other_sides
+from tracker.estimation.runs.path_assessment import DOUBTFUL_MASS, RunPose, assessed_path
+from tracker.estimation.runs.path_search import PathSearch, other_sides
 from tracker.estimation.search.chamfer_cost import frame_cost
 from tracker.estimation.tracking.tracker import Subjects
 from tracker.estimation.trajectory.solve import PosedPath, even_blocks, solve_path
@@ -238,3 +240,39 @@ class _RunEstimate:
 
     def _times_s(self, frames: Sequence[int]) -> Array:
         return np.array(frames) / self._run.fps
+
+
+def turning_nats(views: Sequence[ViewEvidence], bodies: Bodies, person: int, settings: EstimationSettings) -> float:
+    """Return how much dearer a pose is by contours and key points if the person faces the other way, nats.
+
+    Args:
+        views: evidence of a frame.
+        bodies: all people on it.
+        person: index of the person.
+        settings: of the tracker.
+    """
+    body = bodies[person]
+    scorer = scorer_without_prediction(views, bodies, person, settings)
+    both = scorer.refined(body.model, [body.values, turned_round(body)], OWN_TRUST * trust(body.model, settings))
+    here, turned = scorer.costs_with_priors(body.model, both)
+    return float(turned - here)
+
+
+class Facing(NamedTuple):
+    """The way that a person faces, by the frames of a run."""
+
+    is_turned: bool
+    """Whether the other way is likelier."""
+    is_sure: bool
+    """Whether nearly all frames clearly say that the person faces as in the first guesses."""
+
+    @classmethod
+    def of(cls, nats: Sequence[float]) -> "Facing":
+        """Return it by some frames, each with its `turning_nats`. Frames near one another say the same: they are
+        counted, not added up."""
+        is_clear = np.array(nats) > CLEAR_NATS
+        return cls(float(np.median(nats)) < 0, float(is_clear.mean()) > 1 - DOUBTFUL_MASS)
+
+
+KNOWN = Facing(False, True)
+"""That of a person with a keyframe."""

@@ -6,9 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Tree, forward_kinematics
-from tracker.compute.float32 import HALF, ZERO
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, HALF, ZERO, njit
 from tracker.evidence.contours.occluding_contours import trace_pieces
 from tracker.evidence.contours.pieces import JOINED, PIECE_PX, Pieces, place_parts
 from tracker.evidence.contours.surfaces import Surfaces

@@ -10,7 +10,6 @@ __all__ = [
     "method",
     "person_memory",
     "pose_errors",
-    "remarks",
     "tracker",
     "view_regions",
 ]

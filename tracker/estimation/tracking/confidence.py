@@ -6,6 +6,8 @@ where the error is known (`tests/benchmarks/calibrate_status.py`).
 
 Searches have odds of their own: they begin before the pose is settled, and a needless search costs only time. At the
 end of a run `pose_errors` classifies its poses again.
+
+Remarks on a pose, for people to read. Several are joined by commas.
 """
 
 from collections.abc import Sequence
@@ -15,12 +17,12 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.limbs import Limb, limbs
+from tracker.body.limbs import Limb, limb_display_name, limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.appearance.part_colors import MIN_SAMPLES, ColorScore
 from tracker.estimation.fitting.contour_residuals import PartCosts
 from tracker.estimation.fitting.gauss_newton import Fit, covariance
-from tracker.estimation.tracking.remarks import uncertain
+from tracker.estimation.fitting.hypothesis import Hypothesis, limbs_elsewhere
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import TINY, Array, IntArray, Mask
 from tracker.geometry.cameras import px_per_m
@@ -343,3 +345,30 @@ def _end_spreads(body: PosedBody, fit: Fit, ends: IntArray) -> Array:
     model = body.model
     J = model.point_jacobian(body.kinematics, model.point_parts[ends], body.points_world[ends])
     return np.sqrt(np.trace(J @ covariance(model, fit) @ np.swapaxes(J, 1, 2), axis1=1, axis2=2))
+
+
+_UNCERTAIN = " uncertain"
+_MAY_BE_ELSEWHERE = " may be elsewhere"
+
+
+def uncertain(limb: str, reason: str = "") -> str:
+    """Return the remark that the limb of a name may be off, with the reason, such as ` without LEFT`."""
+    return f"{limb_display_name(limb)}{_UNCERTAIN}{reason}"
+
+
+def may_be_elsewhere(body: PosedBody, others: Sequence[Hypothesis]) -> str:
+    """Return the remark that other poses, with limbs elsewhere than in the pose of a body, are about as good."""
+    moved = {name for other in others for name in limbs_elsewhere(body, other.body)}
+    names = [limb_display_name(limb.name) for limb in limbs(body.model) if limb.name in moved]
+    return f"{' and '.join(names) or 'body'}{_MAY_BE_ELSEWHERE}"
+
+
+def without_uncertainty(remark: str, alternatives: bool = False) -> list[str]:
+    """Return the remarks that do not say that a limb may be off, nor that other poses are about as good.
+
+    Args:
+        remark: all, joined.
+        alternatives: whether remarks on other poses are left out too.
+    """
+    left_out = (_UNCERTAIN, _MAY_BE_ELSEWHERE) if alternatives else (_UNCERTAIN,)
+    return [r for r in remark.split(", ") if r and not any(words in r for words in left_out)]

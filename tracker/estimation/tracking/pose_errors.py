@@ -69,7 +69,7 @@ def elsewhere_odds(nats: Array, is_searched: Sequence[bool]) -> Array:
     frame, and found none within `CLEAR_NATS`, the log odds are lower by as much.
 
     Args:
-        nats: how much likelier each limb is elsewhere, (n_limbs,); see `region_deficit.elsewhere_nats`.
+        nats: how much likelier each limb is elsewhere, (n_limbs,); see `region_model.elsewhere_nats`.
         is_searched: whether a search has left each limb where it is, (n_limbs,).
     """
     odds = nats - SELDOM_NATS - np.where(is_searched, CLEAR_NATS, 0.0)

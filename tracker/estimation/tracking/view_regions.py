@@ -7,7 +7,7 @@ import numpy as np
 from tracker.body.model import PosedBody
 from tracker.estimation.appearance.region_model import REACH_M
 from tracker.evidence.contours.occluding_contours import trace_views
-from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.edges import StaticEdgeModel
 from tracker.evidence.images.working_view import region_around
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence

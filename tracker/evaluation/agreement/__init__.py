@@ -1,7 +1,11 @@
 """How far the copies of one session differ in which several annotators worked apart.
 
 Imports nothing of its wing. Callers use `copies.read_copies`, `comparison.compare` and
-`consensus.mean_pose`.
+`copies.mean_pose`.
 """
 
-__all__ = ["comparison", "consensus", "copies", "statistics"]
+__all__ = [
+    "comparison",
+    "copies",
+    "statistics",
+]

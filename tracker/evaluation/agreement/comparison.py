@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.evaluation.agreement.consensus import mean_points
-from tracker.evaluation.agreement.copies import Copies, Subject
+from tracker.evaluation.agreement.copies import Copies, Subject, mean_points
 from tracker.evaluation.agreement.statistics import Icc, Limits, icc_agreement, limits_of_agreement, mean_squares
 from tracker.geometry.arrays import Array
 

@@ -1,4 +1,7 @@
-"""Read the poses that several annotators gave the same people in the same frames."""
+"""Read the poses that several annotators gave the same people in the same frames.
+
+The consensus of annotators: the mean of their poses, and of their joints.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,12 +10,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from tracker.body.model import PosedBody
+from tracker.body.model import BodyModel, PosedBody
+from tracker.body.motion.velocity import nearest_equivalent, shortest_step
 from tracker.errors import SessionError
-from tracker.evaluation.agreement.consensus import mean_pose, pose_steps
 from tracker.formats.joint_maps import FOOT_POINTS, JOINTS
 from tracker.formats.model_toml import format_model
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import TINY, Array
 from tracker.session.session import Session
 from tracker.session.store.stored_poses import StoredPose, read_stored_poses
 
@@ -193,3 +196,31 @@ def notes_on(sessions: Sequence[Session], bodies: Mapping[Subject, tuple[PosedBo
         if any(not joints.intersection(*(m.point_names for m in models)) for models in of_person):
             out.append(f"the bodies of '{person}' have no joint in common, and their joints are not compared")
     return tuple(out)
+
+
+def mean_pose(model: BodyModel, poses: Sequence[Array]) -> Array:
+    """Return the mean of poses on the manifold of the body's joints, (n_values,).
+
+    Angles are averaged the shorter way round. The mean of ball joints is that of rotations (Karcher mean), found by
+    averaging the steps from the present mean.
+
+    Args:
+        model: the body of all.
+        poses: (n_values,) each; at least one.
+    """
+    mean = np.array(poses[0], dtype=np.float64)
+    while True:
+        step = pose_steps(model, poses, mean).mean(axis=0)
+        mean = model.retract(mean, step)
+        if float(np.abs(step).max()) < TINY:  # rad and metres; the steps shrink quadratically
+            return nearest_equivalent(model, mean, mean)
+
+
+def pose_steps(model: BodyModel, poses: Sequence[Array], start: Array) -> Array:
+    """Return the steps from one pose to others in the degrees of freedom, angles the shorter way round, (k, n_dofs)."""
+    return np.array([shortest_step(model, pose, start) for pose in poses])
+
+
+def mean_points(points: Array) -> Array:
+    """Return the mean over the annotators of points, (n, k, m, 3) to (n, m, 3), metres."""
+    return np.asarray(points.mean(axis=1))

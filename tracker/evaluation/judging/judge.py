@@ -12,7 +12,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import BodyPoints
 from tracker.estimation.tracking.pose_errors import point_covariances
 from tracker.estimation.tracking.tracker import TrackerSettings
 from tracker.evaluation.judging.verdicts import LIMBS, is_exchanged, jumps, outside, probability_beyond, with_doubt

@@ -8,9 +8,7 @@ surface points.
 
 import numpy as np
 
-from tracker.compute.float32 import ONE, TINY, ZERO
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, ONE, TINY, ZERO, njit
 from tracker.evidence.contours.surfaces import N_RINGS, N_SECTORS, Surfaces
 from tracker.geometry.arrays import Array, FloatArray
 

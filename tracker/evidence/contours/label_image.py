@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, njit
 from tracker.evidence.contours.occluding_contours import part_poses
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera

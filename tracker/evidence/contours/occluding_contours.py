@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody, ahead
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, njit
 from tracker.evidence.contours.generator import MAX_POINTS, grid_generator, revolved_generator
 from tracker.evidence.contours.pieces import (
     PIECE_PX,

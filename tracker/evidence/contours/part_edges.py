@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, njit
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.pieces import PIECE_PX
 from tracker.evidence.contours.surfaces import N_RINGS, N_SECTORS, Surfaces, surfaces_of

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, njit
 from tracker.evidence.contours.generator import MAX_POINTS
 from tracker.evidence.contours.surfaces import Surfaces
 from tracker.evidence.contours.visibility import LANES

@@ -8,8 +8,7 @@ traced, and what they occlude.
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
+from tracker.compute.jit import FAST_MATH, NO_REFCOUNT, njit
 from tracker.evidence.contours.generator import MAX_POINTS
 from tracker.evidence.contours.occluding_contours import focal_px, mark_all_occluded, trace_part
 from tracker.evidence.contours.pieces import Pieces, StaticContours, place_eye

@@ -8,9 +8,7 @@ part does not fill its quadric, its own shape is tested on the common interval.
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.float32 import FAR, ONE, TINY, ZERO
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAR, FAST_MATH, ONE, TINY, ZERO, njit
 from tracker.evidence.contours.surfaces import ALONG, N_ALONG, N_SECTION, SECTION
 from tracker.geometry.arrays import FloatArray
 from tracker.geometry.segment_distance import LANES

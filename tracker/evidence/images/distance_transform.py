@@ -5,9 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.float32 import ZERO
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, ZERO, njit
 from tracker.geometry.arrays import FloatArray
 
 

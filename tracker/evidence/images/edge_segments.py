@@ -11,9 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compute.float32 import ONE, TINY, ZERO
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAST_MATH, ONE, TINY, ZERO, njit
 from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, RowSortedPoints, cells_within, sort_points
 

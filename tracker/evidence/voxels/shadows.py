@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import TrackerError
-from tracker.evidence.images.background_subtraction import dilate
-from tracker.evidence.images.silhouette_cleaning import clean_silhouette, without_rims
+from tracker.evidence.images.background_subtraction import clean_silhouette, dilate, without_rims
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.evidence.voxels.bounding_volume import bounding_volume
 from tracker.evidence.voxels.carving import Carver, CarveSettings

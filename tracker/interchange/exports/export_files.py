@@ -17,7 +17,7 @@ from tracker.formats.file_names import identifiers
 from tracker.interchange.exports.formats import ExportFormat
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions
 from tracker.interchange.exports.provenance import SIDE_FILE, write_provenance
-from tracker.session.holder import is_alive, read_holder, this_holder
+from tracker.session.lock import is_alive, read_holder, this_holder
 
 if TYPE_CHECKING:
     from tracker.session.session import Session
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 FOLDER_PROVENANCE = "provenance.json"
 """Name of the file of provenance in a folder; a folder that has it is one of an export."""
 _HOLDER = ".holder"
-"""Name of a file in the temporary folder of an export: the program that makes it (`tracker.session.holder`)."""
+"""Name of a file in the temporary folder of an export: the program that makes it (`tracker.session.lock`)."""
 _BEFORE = ".before"
 """End of the name of a folder that is being replaced."""
 _OF_GLTF = {"axes": "y-up", "units": "m"}

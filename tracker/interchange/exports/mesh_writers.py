@@ -19,8 +19,8 @@ from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.voxels.shadows import recover_from_shadows
 from tracker.evidence.voxels.visual_hull import carve_people
 from tracker.evidence.voxels.voxel_grid import VOXEL_M
-from tracker.footage.animation_writer import MAX_WIDTH_PX
 from tracker.footage.recording import Recording
+from tracker.footage.video_writer import MAX_WIDTH_PX
 from tracker.formats.file_names import identifiers
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, Image

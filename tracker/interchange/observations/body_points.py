@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import BodyPoints
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.robust_triangulation import Views

@@ -11,7 +11,6 @@ __all__ = [
     "calibration_log",
     "edit_log",
     "edit_tree",
-    "identities",
     "own_undo",
     "records",
     "stored_poses",

@@ -15,9 +15,9 @@ from typing import Any, Self, TypeVar
 from tracker.errors import OvertakenEditError
 from tracker.session.store import edit_tree, own_undo, rows
 from tracker.session.store.annotator import annotator
-from tracker.session.store.changes import write_changes
 from tracker.session.store.connection import Connection
 from tracker.session.store.edit_log import EditLog, Written, read_log, write_log
+from tracker.session.store.edit_tree import write_changes
 from tracker.session.store.own_undo import OwnLabels, OwnMove
 from tracker.session.store.records import (
     ALL_FRAMES,

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.files import IrregularFileError, refuse_links, sync_folder
-from tracker.session.store import backups, checksums, identities, recovery, schema, verification
+from tracker.session.store import backups, checksums, records, schema, verification
 from tracker.session.store.verification import EndlessQueryError, limited
 
 T = TypeVar("T")
@@ -43,7 +43,7 @@ class Connection:
         with self._errors():
             if not read_only:
                 name = self._path.name
-                refuse_links(self._path.parent, name, *(name + ending for ending in recovery.JOURNALS), "backups")
+                refuse_links(self._path.parent, name, *(name + ending for ending in backups.JOURNALS), "backups")
                 if not self._path.exists():
                     if backups.backups_of(self._path):
                         raise self.damaged("expected the poses of the session, found no such file")
@@ -130,12 +130,12 @@ class Connection:
             sqlite3.Error: it cannot be read.
             OSError: it cannot be read.
         """
-        recovery.check_files(self._path)
+        backups.check_files(self._path)
         if not self._path.is_file():
             raise SessionError(f"annotations {self._path} not found; check the session folder")
         if self._path.stat().st_size == 0:
             raise self.damaged("expected the poses of the session, found an empty file of 0 bytes")
-        db = recovery.open_reader(self._path, _connect) if self._read_only else _connect(self._path, "rw")
+        db = backups.open_reader(self._path, _connect) if self._read_only else _connect(self._path, "rw")
         try:
             damage = verification.damage(db)
             if damage is not None:
@@ -258,7 +258,7 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
             db.execute("PRAGMA synchronous = EXTRA")
         db.execute("PRAGMA foreign_keys = ON")
         checksums.register(db)
-        identities.register(db)
+        records.register(db)
     except BaseException:
         db.close()
         raise

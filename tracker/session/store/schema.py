@@ -7,7 +7,7 @@ depends on the log of edits.
 import sqlite3
 from collections.abc import Sequence
 
-from tracker.session.store import checksums, identities
+from tracker.session.store import checksums, records
 
 VERSION = 11
 """Version of the store; older ones are upgraded, newer ones are refused."""
@@ -162,7 +162,7 @@ def upgrade(db: sqlite3.Connection) -> int:
 def _run(db: sqlite3.Connection, statements: Sequence[str]) -> None:
     for statement in statements:
         db.execute(statement)
-    db.execute(f"UPDATE edits SET uid = {identities.DERIVED} WHERE uid IS NULL")
+    db.execute(f"UPDATE edits SET uid = {records.DERIVED} WHERE uid IS NULL")
     checksums.fill_in(db)
     db.execute(f"PRAGMA user_version = {VERSION}")
 
@@ -178,7 +178,7 @@ def show_as_new(db: sqlite3.Connection) -> None:
     for table in checksums.LATER_TABLES:
         columns = checksums.COLUMNS[table].split(", ")
         db.execute(f"CREATE TEMP VIEW {table} AS SELECT {', '.join(f'NULL AS {c}' for c in columns)} WHERE 0")
-    db.execute(f"CREATE TEMP VIEW edits AS SELECT *, {identities.DERIVED} AS uid FROM main.edits")
+    db.execute(f"CREATE TEMP VIEW edits AS SELECT *, {records.DERIVED} AS uid FROM main.edits")
     if stored_version == 9:
         return
     added = ", ".join(c if " AS " in c else f"NULL AS {c}" for c in _MISSING_COLUMNS[stored_version])

@@ -13,8 +13,8 @@ from msgspec import Meta
 
 from tracker.errors import DamagedStoreError
 from tracker.session.store.connection import Connection
-from tracker.session.store.identities import derived_uid
 from tracker.session.store.own_undo import held_edits
+from tracker.session.store.records import derived_uid
 from tracker.validation import MAX_FRAMES, Time, check
 
 T = TypeVar("T")

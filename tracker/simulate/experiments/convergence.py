@@ -10,8 +10,7 @@ import numpy as np
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.by_frame.frame_problem import prior_blocks
 from tracker.estimation.by_frame.settings import TOLERANCE
-from tracker.estimation.contour.paper import paper_settings
-from tracker.estimation.contour.paper_fit import (
+from tracker.estimation.contour.fit_steps import (
     FitIteration,
     fit_by_iterations,
     fit_incrementally,
@@ -19,6 +18,7 @@ from tracker.estimation.contour.paper_fit import (
     rms_at,
     unlimited_views,
 )
+from tracker.estimation.contour.paper import paper_settings
 from tracker.estimation.contour.settings import ContourSettings
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import iterate

@@ -8,8 +8,7 @@ from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.edit_tree import now
-from tracker.session.store.identities import new_uid
-from tracker.session.store.records import Alternative, PoseChange, PoseRecord
+from tracker.session.store.records import Alternative, PoseChange, PoseRecord, new_uid
 from tracker.session.store.task_log import StateRow, TaskRow
 
 ANN, BOB = 0, 1

@@ -9,7 +9,7 @@ from gestures import drag, drag_on, wait_for
 from app.drawing.ghosts import copy_lines
 from app.state.page_view import View
 from tracker.errors import TrackerError
-from tracker.evaluation.agreement.consensus import mean_pose
+from tracker.evaluation.agreement.copies import mean_pose
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import TAKEN_FROM, PoseChange, PoseRecord
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.control.tracking.run_verdicts import stretches, verdict
+from app.control.tracking.comparing_runs import stretches, verdict
 from app.state.comparison import ComparedPose, Stretch
 
 

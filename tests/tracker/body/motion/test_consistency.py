@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tracker.body.motion.consistency import inconsistent_frames, motion_residuals_m, threshold_m
+from tracker.body.motion.keyframe_doubts import inconsistent_frames, motion_residuals_m, threshold_m
 from tracker.formats.model_toml import load_model
 
 FPS = 30.0

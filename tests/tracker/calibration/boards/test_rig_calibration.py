@@ -20,8 +20,7 @@ from tracker.calibration.boards.board_calibration import MIN_LENS_VIEWS, calibra
 from tracker.calibration.boards.board_problem import SeenCorners
 from tracker.calibration.boards.camera_graph import link_cameras
 from tracker.calibration.boards.expected_error import expected_error
-from tracker.calibration.boards.lens_fit import blank_camera, fit_lens
-from tracker.calibration.boards.rig_fit import held_out_errors
+from tracker.calibration.boards.rig_fit import blank_camera, fit_lens, held_out_errors
 from tracker.calibration.boards.view_choice import choose_frames, choose_views, outlines, posed_views
 from tracker.calibration.check.reprojection import column_ends
 from tracker.errors import CalibrationError

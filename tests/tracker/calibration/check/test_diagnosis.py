@@ -6,9 +6,8 @@ from known_faults import fit_fault
 from rig_scenes import FPS, NAMES, nothing_seen, person_of, turned, viewed
 
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.diagnosis import Diagnosis, diagnose, glance
+from tracker.calibration.check.diagnosis import SEEN_PX, Diagnosis, diagnose, findings, glance, misfit, sentence
 from tracker.calibration.check.fault_search import Fault, FaultSearch, FoundFault, Step, as_tracked, prior_sigmas
-from tracker.calibration.check.findings import SEEN_PX, findings, misfit, sentence
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.formats.model_toml import load_model
 from tracker.geometry.camera_correction import DRIFT, KINDS, N_CORRECTIONS, ROTATION, TIME, with_step

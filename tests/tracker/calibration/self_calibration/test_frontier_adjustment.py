@@ -7,8 +7,7 @@ import pytest
 from filmed_people import aligned, blanks, rig
 from person_outlines import outlined
 
-from tracker.calibration.self_calibration.frontier_adjustment import adjust_frontier
-from tracker.calibration.self_calibration.frontier_equations import FrontierEquations
+from tracker.calibration.self_calibration.frontier_adjustment import FrontierEquations, adjust_frontier
 from tracker.calibration.self_calibration.joint_adjustment import Gauge, UnknownLenses
 from tracker.calibration.self_calibration.person_calibration import volume_error
 from tracker.errors import CalibrationError

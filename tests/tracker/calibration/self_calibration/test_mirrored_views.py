@@ -8,7 +8,7 @@ from detected_people import acted, detected
 from filmed_people import SIZE, dancing, observed, rig
 
 from tracker.calibration.check.reprojection import Observations
-from tracker.calibration.self_calibration.mirrored_views import require_unmirrored
+from tracker.calibration.self_calibration.keypoint_calibration import require_unmirrored
 from tracker.errors import CalibrationError
 
 SIGMA_PX = 3.0

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from mask_files import SIZE, person_masks, write_masks
 
-from tracker.calibration.self_calibration import keypoint_files
-from tracker.calibration.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
+from tracker.calibration.self_calibration import person_files
+from tracker.calibration.self_calibration.person_files import FilmedPerson, calibrate_filmed_person
 from tracker.calibration.self_calibration.person_silhouettes import Flaw
 from tracker.errors import CalibrationError
 
@@ -17,7 +17,7 @@ NAMES = ("cam0", "cam1", "cam2")
 def found(monkeypatch):
     """Silhouettes that a calibration begins with, by frame and camera."""
     out = []
-    monkeypatch.setattr(keypoint_files, "calibrate_by_silhouettes", lambda rows, *_: out.extend(rows))
+    monkeypatch.setattr(person_files, "calibrate_by_silhouettes", lambda rows, *_: out.extend(rows))
     return out
 
 

@@ -10,7 +10,7 @@ from person_outlines import outlined
 
 from tracker.calibration.self_calibration.frontier_points import frontier_points, plane_angles
 from tracker.calibration.self_calibration.person_silhouettes import Flaw, measure_silhouette
-from tracker.calibration.self_calibration.upright_start import cameras_over_floor, on_floor
+from tracker.calibration.self_calibration.silhouette_chain import cameras_over_floor, on_floor
 from tracker.geometry import rigid
 
 CAMERAS = rig(4)

@@ -6,8 +6,7 @@ from rigs import cameras, ring
 from staging import posed
 
 from tracker.body.model import PosedBody
-from tracker.estimation.acquisition.body_points import BodyPoints
-from tracker.estimation.acquisition.from_keypoints import fit_to_keypoints, learn_seen_body
+from tracker.estimation.acquisition.from_keypoints import BodyPoints, fit_to_keypoints, learn_seen_body
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 

@@ -9,8 +9,7 @@ from staging import cameras_around, own_evidence, posed, shaken
 from tracker.body.dimensions import STATED_HEIGHT_SIGMA, PartDimensions, dimensions_of, stature_m, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.frame_choice import choose_frames
-from tracker.estimation.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
+from tracker.estimation.acquisition.from_contours import AcquisitionSettings, acquire_from_contours, choose_frames
 from tracker.estimation.acquisition.size_fit import Round, SightedPerson, SizeFitSettings, fit_sizes_to_contours
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.acquisition.size_report import (

@@ -9,8 +9,14 @@ from staging import camera_at, edge_map, in_posture, own_evidence, view_evidence
 from tracker.body.dimensions import dimensions_of
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.back_projection import back_project_contours, explained_points, polar_plane
-from tracker.estimation.acquisition.chamfer_search import ChamferSearchSettings, chamfer_distance_m, search_shapes
+from tracker.estimation.acquisition.chamfer_search import (
+    ChamferSearchSettings,
+    back_project_contours,
+    chamfer_distance_m,
+    explained_points,
+    polar_plane,
+    search_shapes,
+)
 from tracker.estimation.acquisition.size_fit import SightedPerson
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.acquisition.two_views import MAX_OFF_RAD, TwoViewSettings, acquire_from_two_views, choose_views

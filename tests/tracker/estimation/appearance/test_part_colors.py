@@ -6,7 +6,7 @@ from scipy.ndimage import gaussian_filter
 from staging import SUIT, at, camera_at, cameras_around, dressed, own_evidence, posed, shaken, solid
 
 from tracker.body.model import PosedBody
-from tracker.estimation.appearance import color_shares
+from tracker.estimation.appearance import part_colors
 from tracker.estimation.appearance.part_colors import Colors
 from tracker.evidence.images.color_histogram import BINS
 
@@ -230,6 +230,6 @@ def test_pixels_are_counted_by_their_colour():
 
 def test_colours_of_many_parts_are_smoothed_each_by_itself():
     counts = np.random.default_rng(4).random((3, BINS**3))
-    for one, smooth in zip(counts, color_shares.smoothed(counts), strict=True):
+    for one, smooth in zip(counts, part_colors.smoothed(counts), strict=True):
         cube = gaussian_filter(one.reshape(BINS, BINS, BINS), 0.7, mode="nearest")
         np.testing.assert_allclose(smooth, cube.ravel(), rtol=1e-12)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tracker.body.limbs import limbs
-from tracker.estimation.appearance.region_deficit import elsewhere_nats, worst_parts, worst_views
+from tracker.estimation.appearance.region_model import elsewhere_nats, worst_parts, worst_views
 
 
 def evidence(model, n=40, usual=50.0, spread=5.0):

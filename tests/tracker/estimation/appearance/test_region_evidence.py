@@ -8,9 +8,8 @@ from staging import SUIT
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.estimation.appearance.part_drawing import CELL_PX, cells_of, draw_bodies
-from tracker.estimation.appearance.region_deficit import elsewhere_nats, worst_parts
 from tracker.estimation.appearance.region_limb_scorer import RegionLimbScorer
-from tracker.estimation.appearance.region_model import SAMPLE_M, isotonic
+from tracker.estimation.appearance.region_model import SAMPLE_M, elsewhere_nats, isotonic, worst_parts
 from tracker.evidence.contours.label_image import part_labels
 from tracker.evidence.images.color_histogram import BINS
 

@@ -5,10 +5,10 @@ from staging import SUIT, cameras_around, dressed, posed
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.estimation.appearance.part_colors import Colors
-from tracker.estimation.by_frame.covariance_search import _normal_samples, _samples, search_along_covariance
 from tracker.estimation.by_frame.frame_problem import FrameProblem, PersonPrior, prior_blocks
 from tracker.estimation.by_frame.pose_score import PoseScorer
 from tracker.estimation.by_frame.settings import OWN_TRUST, RecoverSettings
+from tracker.estimation.by_frame.start_pose import _normal_samples, _samples, search_along_covariance
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import solve

@@ -8,9 +8,14 @@ from staging import cameras_around, in_posture, own_evidence
 
 from tracker.body.model import PosedBody
 from tracker.estimation.by_frame.incremental_fit import fit_by_chains, fit_chains
-from tracker.estimation.contour.fit_steps import FitPlan, contour_steps, residual_segments
+from tracker.estimation.contour.fit_steps import (
+    FitPlan,
+    contour_steps,
+    paper_residuals,
+    residual_segments,
+    unlimited_views,
+)
 from tracker.estimation.contour.paper import paper_settings
-from tracker.estimation.contour.paper_fit import paper_residuals, unlimited_views
 from tracker.formats.model_toml import load_model
 
 BODY = load_model("gavrila22_cones")

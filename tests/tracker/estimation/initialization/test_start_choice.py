@@ -8,7 +8,7 @@ import pytest
 
 from tracker.body.model import PosedBody
 from tracker.estimation.fitting.hypothesis import BEAM_NATS, CLEAR_NATS, Hypothesis
-from tracker.estimation.initialization.start_choice import ComparedStarts, compare_starts
+from tracker.estimation.initialization.first_pose import ComparedStarts, compare_starts
 from tracker.estimation.initialization.start_fit import StartTrack
 from tracker.formats.model_toml import load_model
 

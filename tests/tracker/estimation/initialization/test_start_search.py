@@ -9,8 +9,8 @@ from staging import SUIT, cameras_around, dressed, posed
 from tracker.body.model import PosedBody
 from tracker.estimation.by_frame.frame_problem import FrameProblem, PersonPrior
 from tracker.estimation.chamfer.settings import TrackSettings
-from tracker.estimation.initialization import start_search
-from tracker.estimation.initialization.start_search import search_around
+from tracker.estimation.initialization import start_fit
+from tracker.estimation.initialization.start_fit import search_around
 from tracker.formats.model_toml import load_model
 
 MODEL = load_model("gavrila34")
@@ -25,7 +25,7 @@ def off_m(body, truth):
 def test_a_trunk_that_turned_the_wrong_way_is_found_again(monkeypatch, seed):
     truth = PosedBody(MODEL, posed(MODEL, seed))
     views = dressed([truth], cameras_around(4), SUIT)
-    monkeypatch.setattr(start_search, "read_views", lambda *_: views)
+    monkeypatch.setattr(start_fit, "read_views", lambda *_: views)
     step = np.zeros(MODEL.n_dofs)
     turns = np.array([n.startswith(("torso", "waist", "spine", "left_hip", "right_hip")) for n in MODEL.dof_names])
     turns &= ~MODEL.dof_is_length
@@ -46,9 +46,9 @@ def test_the_search_ends_where_nothing_moves(monkeypatch, steps_m, n_rounds):
         draws.append(n_draws)
         return PosedBody(MODEL, bodies[person].values + next(steps) * np.eye(len(MODEL.value_names))[0]), ()
 
-    monkeypatch.setattr(start_search, "read_views", lambda *_: ())
-    monkeypatch.setattr(start_search, "FrameProblem", lambda *_: None)
-    monkeypatch.setattr(start_search, "search_start", searched)
+    monkeypatch.setattr(start_fit, "read_views", lambda *_: ())
+    monkeypatch.setattr(start_fit, "FrameProblem", lambda *_: None)
+    monkeypatch.setattr(start_fit, "search_start", searched)
     result = search_around(SimpleNamespace(), (PosedBody(MODEL, MODEL.neutral()),), 0, TrackSettings())
     assert len(draws) == n_rounds
     assert min(draws) > 0

@@ -6,7 +6,7 @@ from filmed_run import FilmedRun, estimated, moving
 
 from tracker.body.model import PosedBody
 from tracker.estimation.fitting.limb_exchange import turned_round
-from tracker.estimation.runs.facing import Facing
+from tracker.estimation.runs.run_estimate import Facing
 
 N = 4
 NEAR_M = 0.05

@@ -9,7 +9,7 @@ from tracker.body.dimensions import mirror_part
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.estimation.fitting.limb_exchange import turned_round
-from tracker.estimation.runs.proposals import combined, continued, other_sides
+from tracker.estimation.runs.path_search import combined, continued, other_sides
 
 
 def posture(model):

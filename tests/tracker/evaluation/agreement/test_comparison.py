@@ -7,8 +7,7 @@ from stored_motions import random_poses
 
 from tracker.errors import SessionError
 from tracker.evaluation.agreement.comparison import compare
-from tracker.evaluation.agreement.consensus import mean_points, mean_pose, pose_steps
-from tracker.evaluation.agreement.copies import Copies, Subject, annotator_names
+from tracker.evaluation.agreement.copies import Copies, Subject, annotator_names, mean_points, mean_pose, pose_steps
 from tracker.formats.joint_maps import LIMB_JOINTS
 
 N, BIAS_M, NOISE_M = 30, 0.008, 0.002

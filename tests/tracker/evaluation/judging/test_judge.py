@@ -8,7 +8,7 @@ from stored_motions import random_poses
 
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.estimation.acquisition.body_points import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import BodyPoints
 from tracker.evaluation.judging.judge import judge_person
 from tracker.evaluation.judging.verdicts import LIMBS
 from tracker.formats.model_toml import load_model

@@ -1,7 +1,10 @@
 import numpy as np
 
-from tracker.evidence.images.background_model import background_of_clip, background_of_recording
-from tracker.evidence.images.background_subtraction import subtract_background
+from tracker.evidence.images.background_subtraction import (
+    background_of_clip,
+    background_of_recording,
+    subtract_background,
+)
 
 
 def frames(n, noise=0.0, seed=0):

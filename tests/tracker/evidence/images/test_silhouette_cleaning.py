@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.evidence.images.silhouette_cleaning import clean_silhouette
+from tracker.evidence.images.background_subtraction import clean_silhouette
 
 
 def person(size=(480, 640)):

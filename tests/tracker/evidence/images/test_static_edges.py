@@ -3,7 +3,7 @@ import pytest
 from staging import view_evidence
 
 from tracker.evidence.images.edge_segments import EdgeSegments
-from tracker.evidence.images.static_edges import StaticEdgeModel
+from tracker.evidence.images.edges import StaticEdgeModel
 from tracker.evidence.view_evidence import with_all_segments
 from tracker.geometry.cameras import Camera
 

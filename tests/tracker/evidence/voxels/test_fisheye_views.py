@@ -11,7 +11,7 @@ from solids import ellipsoid, silhouettes_of
 from staging import camera_at
 
 from tracker.body.model import PosedBody
-from tracker.estimation.initialization.generators.silhouette_axis import major_axis
+from tracker.estimation.initialization.generators.body_axis import major_axis
 from tracker.evidence.contours.body_silhouette import body_silhouette
 from tracker.evidence.voxels.bounding_volume import bounding_volume
 from tracker.evidence.voxels.carving import Carver, CarveSettings

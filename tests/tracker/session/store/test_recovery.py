@@ -13,7 +13,7 @@ from damage import written_store
 
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.session.lock import LOCK_FILE, SessionLock
-from tracker.session.store import backups, recovery
+from tracker.session.store import backups
 from tracker.session.store.annotation_store import AnnotationStore
 
 
@@ -68,7 +68,7 @@ def test_a_copy_is_rolled_back_where_the_folder_may_not_be_written(path, why, mo
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     if why == "held":
         SessionLock(path.parent).acquire()
-        monkeypatch.setattr(recovery, "is_held_here", lambda _: False)  # as if another program held it
+        monkeypatch.setattr(backups, "is_held_here", lambda _: False)  # as if another program held it
     before = unwritable(path.parent, monkeypatch)
     assert labels(path) == labels(path.with_name("whole.sqlite"))
     assert [(p.name, p.read_bytes()) for p in sorted(path.parent.iterdir())] == before
@@ -85,7 +85,7 @@ def test_a_copy_that_another_program_changes_meanwhile_is_made_again(path, monke
             os.utime(path)
         return real(source, to)
 
-    monkeypatch.setattr(recovery.shutil, "copyfile", copied)
+    monkeypatch.setattr(backups.shutil, "copyfile", copied)
     assert labels(path) == labels(path.with_name("whole.sqlite"))
     assert len(n) == 4  # store and journal, twice
 
@@ -104,7 +104,7 @@ def test_a_journal_that_leads_to_another_file_is_refused(path, read_only, tmp_pa
     """SQLite deletes the file that such a journal names."""
     named = os.fsencode(tmp_path / "mine.txt")
     (tmp_path / "mine.txt").write_text("mine")
-    tail = len(named).to_bytes(4, "big") + (sum(named) & 0xFFFFFFFF).to_bytes(4, "big") + recovery._MAGIC
+    tail = len(named).to_bytes(4, "big") + (sum(named) & 0xFFFFFFFF).to_bytes(4, "big") + backups._MAGIC
     with journal(path).open("ab") as file:
         file.write((2**30 // 4096 + 1).to_bytes(4, "big") + named + tail)
     with pytest.raises(DamagedStoreError, match="leads to another file; delete the journal"):

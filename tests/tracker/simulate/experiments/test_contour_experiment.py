@@ -18,9 +18,8 @@ from tracker.simulate.experiments.contour_experiment import (
     make_scene,
     run_contour_experiment,
 )
-from tracker.simulate.experiments.contour_report import write_contour_report
+from tracker.simulate.experiments.contour_report import Line, line_chart, write_contour_report
 from tracker.simulate.experiments.contour_run import RunResult, contour_rms_px, observable_angles, track_scene
-from tracker.simulate.experiments.line_chart import Line, line_chart
 from tracker.simulate.experiments.smooth_motion import smooth_motion
 from tracker.simulate.experiments.staged_views import StagedObserver
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from tracker.errors import Remedy, TrackerError
-from tracker.estimation.initialization.generators.silhouette_axis import MajorAxis, major_axis
+from tracker.estimation.initialization.generators.body_axis import MajorAxis, major_axis
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.evidence.voxels.figure_masks import FigureMask
 from tracker.evidence.voxels.voxel_grid import Voxels

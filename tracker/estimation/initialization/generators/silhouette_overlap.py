@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.compute.float32 import FAR
-from tracker.compute.jit import njit
-from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.jit import FAR, FAST_MATH, njit
 from tracker.compute.threads import N_HELPERS, kernel_pool
 from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.geometry.arrays import Array, FloatArray, IntArray, Mask

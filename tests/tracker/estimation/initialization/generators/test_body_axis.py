@@ -7,8 +7,7 @@ import pytest
 from figures import UP, cameras_about_a_figure, figure, silhouettes_of_figure
 
 from tracker.errors import TrackerError
-from tracker.estimation.initialization.generators.body_axis import find_body_axes
-from tracker.estimation.initialization.generators.silhouette_axis import major_axis
+from tracker.estimation.initialization.generators.body_axis import find_body_axes, major_axis
 from tracker.estimation.initialization.generators.standing_body import ROUNDED, typical_person
 from tracker.geometry import rigid
 

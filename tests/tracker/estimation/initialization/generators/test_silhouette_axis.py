@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from staging import camera_at
 
-from tracker.estimation.initialization.generators.silhouette_axis import major_axis
+from tracker.estimation.initialization.generators.body_axis import major_axis
 
 CAMERA = camera_at("c", (4.0, 0.0, 0.0))
 

@@ -1,23 +1,32 @@
-"""From footage and files of key points, or of masks, to calibrated cameras."""
+"""From footage and files of key points, or of masks, to calibrated cameras.
+
+Silhouettes of a person in footage: from masks of other programs, or from the changes against the still room.
+"""
 
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from tracker.calibration.boards.footage_calibration import footage_paths
-from tracker.calibration.boards.lens_fit import blank_camera
+from tracker.calibration.boards.rig_fit import blank_camera
 from tracker.calibration.check.solvable import solvable
 from tracker.calibration.self_calibration.identification import Statures
 from tracker.calibration.self_calibration.keypoint_calibration import LEAST_FPS, calibrate_by_person
 from tracker.calibration.self_calibration.person_calibration import PersonCalibration
+from tracker.calibration.self_calibration.person_silhouettes import NOTHING, Flaw, PersonSilhouette, measure_silhouette
 from tracker.calibration.self_calibration.silhouette_calibration import calibrate_by_silhouettes
-from tracker.calibration.self_calibration.silhouette_files import silhouettes_in_footage, silhouettes_in_masks
 from tracker.compute.progress import Report, part_of
 from tracker.errors import CalibrationError
+from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.image_file import parts_of_mask
+from tracker.footage.recording import Recording
 from tracker.footage.video import open_footage
 from tracker.formats.calibrations.reading import read_cameras
+from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lengths import check_heights
 from tracker.interchange.observations.importing import plan_import
@@ -160,3 +169,59 @@ def _require_files(without: Collection[str], files: Path) -> None:
             f"expected key points or masks of each camera, found none of {', '.join(sorted(without))} in {files}; add "
             "them, or leave out that footage"
         )
+
+
+def silhouettes_in_masks(
+    plan: MaskPlan, session: Session, cameras: Sequence[Camera], report: Report
+) -> list[list[PersonSilhouette]]:
+    """Measure the silhouettes of masks, by frame and camera.
+
+    Args:
+        plan: an import of masks.
+        session: its cameras and frames.
+        cameras: with their lenses, in the order of the session's.
+        report: receives the progress.
+
+    Raises:
+        TrackerError: a mask is damaged.
+    """
+    out = [[NOTHING] * len(cameras) for _ in range(session.n_frames)]
+    for v, (source, camera) in enumerate(zip(session.cameras, cameras, strict=True)):
+        pictures = plan.pictures[camera.name]
+        for i, picture in enumerate(pictures):
+            report("reading masks", (v + i / len(pictures)) / len(cameras))
+            k = int(picture) - source.offset
+            if picture < 0 or not 0 <= k < session.n_frames:
+                continue
+            labels = np.unique(plan.masks[camera.name].read(i, source.camera.size).labels)
+            if not plan.rules.is_matte and np.count_nonzero(labels) > 1:
+                out[k][v] = PersonSilhouette(flaw=Flaw.SEVERAL)
+                continue
+            out[k][v] = _measured(parts_of_mask(plan.mask(camera.name, i, source.camera.size))[0] > 0, camera, 1.0)
+    return out
+
+
+def silhouettes_in_footage(session: Session, cameras: Sequence[Camera], report: Report) -> list[list[PersonSilhouette]]:
+    """Find and measure silhouettes by subtracting the backgrounds that still cameras show, by frame and camera.
+
+    Raises:
+        RecordingError: footage cannot be read.
+    """
+    out = []
+    with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
+        for k in range(session.n_frames):
+            report("finding silhouettes", k / session.n_frames)
+            views = finder.silhouettes(k)
+            found = zip(views, cameras, strict=True)
+            out.append([_measured(v.mask, c, v.camera.size[0] / c.size[0]) for v, c in found])
+    return out
+
+
+def _measured(mask: Mask, camera: Camera, scale: float) -> PersonSilhouette:
+    """Measure a silhouette in a mask that is smaller than the picture of a camera by a scale."""
+
+    def original(points_px: Array) -> Array:
+        return np.asarray((points_px + 0.5) / scale - 0.5)
+
+    found = measure_silhouette(mask, lambda px: camera.undistort_points(original(px)))
+    return found._replace(hull_px=original(found.hull_px), upright_px=original(found.upright_px))
