@@ -140,6 +140,8 @@ class _RunEstimate:
                         frames.append(self._proposed(evidence[k], k, i, proposals[k, i]))
                         yield done + t
                 done += n if turn == 0 else 0
+                if turn and frames == searches[i].frames:  # nobody else has moved: the search would repeat itself
+                    continue
                 searches[i] = PathSearch(frames, self._times_s(used))
                 for _ in searches[i].rounds():
                     yield done

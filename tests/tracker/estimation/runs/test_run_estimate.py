@@ -13,6 +13,7 @@ from tracker.body.model import PosedBody
 from tracker.compute.progress import mapped, result_of
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.runs.frame_hypotheses import FrameHypotheses, Proposal
+from tracker.estimation.runs.path_search import PathSearch
 from tracker.estimation.runs.run_estimate import estimate_run
 from tracker.estimation.trajectory import solve
 from tracker.evidence.keypoints import ViewKeypoints
@@ -157,15 +158,21 @@ def test_locked_degrees_of_freedom_stay_in_every_proposal(film, gavrila, monkeyp
 
 
 def test_people_are_estimated_in_turn(gavrila, monkeypatch):
-    """Hypotheses are scored again on the frame alone where the other person's arm has moved since."""
-    among, again = FrameHypotheses.among, []
+    """Hypotheses are scored again on the frame alone where the other person's arm has moved since, and a person is
+    searched again if there is one."""
+    among, again, searches = FrameHypotheses.among, [], []
 
     def spied(frame, bodies):
         out = among(frame, bodies)
         again.append((frame.person, out is not frame))
         return out
 
+    def search(frames, times_s):
+        searches.append(frames[0].person)
+        return PathSearch(frames, times_s)
+
     monkeypatch.setattr(FrameHypotheses, "among", spied)
+    monkeypatch.setattr("tracker.estimation.runs.run_estimate.PathSearch", search)
     true = moving(gavrila, 5)
     beside = true[::-1].copy()
     true[:, 1] -= 0.5
@@ -176,6 +183,7 @@ def test_people_are_estimated_in_turn(gavrila, monkeypatch):
     assert [film.errors_m(found[i], i).max() < NEAR_M for i in range(2)] == [True, True]
     assert [[k for k in found[i] if found[i][k].entry] for i in range(2)] == [[2], [1]]
     assert again == [(person, person == 0 and k == 1) for person in range(2) for k in range(5)]
+    assert searches == [0, 1, 0]
 
 
 def test_blocks_give_nearly_what_one_block_gives(gavrila, monkeypatch):
