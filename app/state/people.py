@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from app.state.progress import WorkState
+from tracker.body.limbs import Search
 from tracker.body.model import BodyModel
 from tracker.body.motion.keyframe_doubts import RaisedView
-from tracker.body.searches import Search
 from tracker.estimation.posing.placed_depth import UnseenDepth
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation

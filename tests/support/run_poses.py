@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tracker.body.limbs import limbs
-from tracker.body.searches import Search
+from tracker.body.limbs import Search, limbs
 from tracker.estimation.runs.path_assessment import RunPose
 from tracker.estimation.runs.run_estimate import Progress
 

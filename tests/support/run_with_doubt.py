@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tracker.body.limbs import limbs
-from tracker.body.searches import Search
+from tracker.body.limbs import Search, limbs
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session

@@ -8,9 +8,8 @@ import numpy as np
 
 from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
-from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
+from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses, fit_to_contours
 from tracker.estimation.initialization.frame_trials import Show, Trying, find_first_poses, find_first_poses_anywhere
-from tracker.estimation.initialization.known_start import fit_to_contours
 from tracker.evidence.observer import Observer
 from tracker.evidence.voxels.voxel_grid import VOXEL_M
 from tracker.formats.model_toml import format_model

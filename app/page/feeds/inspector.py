@@ -25,8 +25,7 @@ from app.state.progress import FindState
 from app.state.run_choices import RunChoices
 from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
-from tracker.body.limbs import limb_display_name, limbs
-from tracker.body.searches import Search, SearchKind
+from tracker.body.limbs import Search, SearchKind, limb_display_name, limbs
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.posing.grab import minor_points
 from tracker.evaluation.judging.judge import Doubt

@@ -13,7 +13,7 @@ from app.messages.parsing import MessageError, parse
 from app.page.commands import dispatch
 from app.page.feeds.inspector import InspectorFeed
 from tracker.body.dimensions import dimensions_of
-from tracker.body.searches import Search
+from tracker.body.limbs import Search
 from tracker.errors import TrackerError
 from tracker.session.store.records import PoseChange, PoseRecord
 

@@ -12,7 +12,7 @@ from mutation import mutate_tree
 from app.storage import rescue
 from app.storage.rescue_file import Model, Rescue, UnsavedEdit, read_rescue, write_rescue
 from app.storage.shared_storage import RetryQueue
-from tracker.body.searches import Search
+from tracker.body.limbs import Search
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, load_model
 from tracker.session.store.annotation_store import AnnotationStore

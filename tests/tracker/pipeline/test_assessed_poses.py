@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from run_poses import MOVED, run_pose
 
-from tracker.body.limbs import limb_display_name, limbs
+from tracker.body.limbs import Search, limb_display_name, limbs
 from tracker.body.model import PosedBody
-from tracker.body.searches import Search
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import load_model
 from tracker.pipeline.tracked_changes import assessed_by_run, assessed_keyframe, estimated_row

@@ -14,7 +14,7 @@ from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.fitting.hypothesis import Hypothesis
-from tracker.estimation.initialization import first_pose, frame_trials, known_start, own_figure
+from tracker.estimation.initialization import first_pose, frame_trials, own_figure
 from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
 from tracker.estimation.initialization.frame_trials import TakenError, find_first_poses, find_first_poses_anywhere
 from tracker.estimation.initialization.generators.start_generators import GENERATORS, from_voxels
@@ -411,9 +411,9 @@ def off_frame(session, status):
 
 @pytest.mark.parametrize(("status", "is_moved"), [("good", True), ("doubtful", False), ("lost", False)])
 def test_a_known_start_follows_the_contours_that_agree(session, monkeypatch, status, is_moved):
-    monkeypatch.setattr(known_start, "StartFitter", off_frame(session, status))
+    monkeypatch.setattr(first_pose, "StartFitter", off_frame(session, status))
     known = known_people(session)
-    found = known_start.fit_to_contours(session, OBSERVER, known).poses[0]
+    found = first_pose.fit_to_contours(session, OBSERVER, known).poses[0]
     assert found.status == ("good" if is_moved else "doubtful")
     assert np.allclose(found.start.pose - known.poses[0].start.pose, 0.01 * is_moved)
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.body.limbs import Search
 from tracker.body.model import PosedBody
-from tracker.body.searches import Search
 from tracker.estimation.by_frame.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
 from tracker.estimation.fitting.contour_residuals import PartCosts
 from tracker.estimation.fitting.gauss_newton import covariance

@@ -9,9 +9,8 @@ cheapest refined pose wins.
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 
-from tracker.body.limbs import Limb, limb_display_name
+from tracker.body.limbs import Limb, Search, limb_display_name
 from tracker.body.model import PosedBody
-from tracker.body.searches import Search
 from tracker.compute.threads import map_parallel
 from tracker.estimation.appearance.part_colors import Colors
 from tracker.estimation.by_frame.assessment import PersonEstimate, assess, estimate_fixed, finalize

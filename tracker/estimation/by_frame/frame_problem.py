@@ -11,10 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.limbs import Limb
+from tracker.body.limbs import Limb, Search
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.velocity import PredictSettings, shortest_step
-from tracker.body.searches import Search
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.by_frame.settings import (
     MAX_ITERATIONS,

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.body.limbs import Search
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.searches import Search
 from tracker.estimation.appearance.part_colors import Colors
 from tracker.estimation.by_frame.assessment import PersonEstimate, estimate_at
 from tracker.estimation.by_frame.frame_problem import Bodies, FrameProblem, PersonPrior, with_body

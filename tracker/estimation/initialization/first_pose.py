@@ -1,10 +1,8 @@
 """Find the first pose of a person on one frame of a session with nobody's help.
 
-Generators propose start poses, one for each way of
-facing. Each is fitted to the contours. The best are searched around and tracked over a few frames in both directions.
-The most likely track is kept. It is doubtful where another start is as likely, or where it loses the person.
-
-Compare hypotheses of a start on a frame: fit all, search around some, and track the best.
+Generators propose start poses, one for each way of facing. Each is fitted to the contours. The best are searched around
+and tracked over a few frames in both directions. The most likely track is kept. It is doubtful where another start is
+as likely, or where it loses the person. First poses that other evidence shows are fitted and tracked alike.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -272,3 +270,27 @@ def compare_starts(
         runs += [fitter.track(fitter.search(h)) for h in returned]
         tracked = filling(fitter.compared(runs))
     return ComparedStarts(searched, tracked, is_lost if tracked[0].poses is best.poses else tracked[0].is_lost)
+
+
+def fit_to_contours(
+    session: Session, observer: Observer, found: FirstPoses, step: Callable[[], None] = lambda: None
+) -> FirstPoses:
+    """Fit first poses to the contours of their frame, one person after the other.
+
+    A person whose fit is not good, or who is lost on a short track from there, keeps the pose: contours in clutter lead
+    it away.
+
+    Args:
+        session: the session; nothing is stored.
+        observer: of its recording.
+        found: the first poses.
+        step: called after each frame that is fitted. An exception that it raises ends the work.
+    """
+    poses = dict(found.poses)
+    for person, first in found.poses.items():
+        others = others_on_frame(session, person, found.frame, {i: p.start.body for i, p in poses.items()})
+        fitter = StartFitter(observer, found.frame, short_tracks(found.frame, session.n_frames), tuple(others), step)
+        track = fitter.track(first.start)
+        if track.status == "good" and not track.is_lost:
+            poses[person] = first._replace(start=track.start, status=track.status, cost_px=track.cost_px)
+    return FirstPoses(found.frame, poses)

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.limbs import display_name, limbs
+from tracker.body.limbs import Search, display_name, limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.searches import Search
 from tracker.estimation.appearance.region_model import worst_views
 from tracker.estimation.by_frame.assessment import part_costs_px
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M, Hypothesis, distance_m, distinct, limbs_elsewhere

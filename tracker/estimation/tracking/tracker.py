@@ -7,8 +7,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.body.limbs import Search
 from tracker.body.model import BodyModel
-from tracker.body.searches import Search
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.tracking.confidence import PoseQuality, Status
 from tracker.evidence.observer import Observer

@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 
 from msgspec import Meta
 
-from tracker.body.searches import Search
+from tracker.body.limbs import Search
 from tracker.geometry.arrays import Array
 from tracker.validation import Time
 

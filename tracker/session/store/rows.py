@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from tracker.body.searches import Search
+from tracker.body.limbs import Search
 from tracker.errors import DamagedStoreError
 from tracker.geometry.arrays import Array
 from tracker.session.store.records import (

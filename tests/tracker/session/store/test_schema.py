@@ -6,7 +6,7 @@ import pytest
 from damage import altered, old_store
 
 from tracker.annotation.plan import decide, read_tasks
-from tracker.body.searches import Search
+from tracker.body.limbs import Search
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.session.store import checksums, schema
 from tracker.session.store.annotation_store import AnnotationStore
