@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from tracker.body.model import BodyModel
-from tracker.body.motion.velocity import PredictSettings, predict
+from tracker.body.motion.pose_steps import PredictSettings, predict
 from tracker.geometry.arrays import Array
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from doc_tables import Conditions, benchmark_parser, measured, read_words, show, table, work_folder
 from true_starts import Clip, read_simulated, start_of, track_from
 
-from tracker.body.motion.velocity import PredictSettings
+from tracker.body.motion.pose_steps import PredictSettings
 from tracker.estimation.chamfer.paper import PAPER_BODY, paper_settings
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.contour_residuals import MatchSettings

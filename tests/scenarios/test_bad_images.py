@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tracking_runs import track
 
-from tracker.body.motion.velocity import predict
+from tracker.body.motion.pose_steps import predict
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.confidence import Status
 from tracker.evidence.observer import Observer

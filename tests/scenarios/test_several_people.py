@@ -8,7 +8,7 @@ from staging import at, cameras_around, filmed, own_evidence, posed, solid
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.velocity import PredictSettings
+from tracker.body.motion.pose_steps import PredictSettings
 from tracker.estimation.by_frame.frame_estimator import FrameEstimator
 from tracker.estimation.by_frame.frame_problem import FrameProblem
 from tracker.estimation.by_frame.limb_recovery import search_limbs

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import BENT_RAD
 from tracker.body.model import BodyModel
-from tracker.body.motion.velocity import shortest_step
+from tracker.body.motion.pose_steps import shortest_step
 from tracker.errors import FormatError, Remedy
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.trc import MarkerTable

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.motion.history import HISTORY_FRAMES
-from tracker.body.motion.velocity import NEAR, moving_bodies
+from tracker.body.motion.pose_steps import NEAR, moving_bodies
 from tracker.compute.progress import mapped
 from tracker.estimation.runs.frame_hypotheses import Proposal
 from tracker.estimation.runs.path_assessment import RunPose

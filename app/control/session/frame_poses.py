@@ -6,7 +6,7 @@ from app.state.people import ShownPose
 from app.state.state import ShownFrame
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
-from tracker.body.motion.velocity import velocity
+from tracker.body.motion.pose_steps import velocity
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane, up_rotation

@@ -6,7 +6,7 @@ import pytest
 from app.drawing.predicted_pose import prediction
 from app.drawing.trails import Trails
 from tracker.body.model import BodyModel
-from tracker.body.motion.velocity import PredictSettings
+from tracker.body.motion.pose_steps import PredictSettings
 from tracker.formats.model_toml import load_model
 
 

@@ -1,6 +1,6 @@
 """Poses over time, without images: prediction, interpolation, inconsistent frames, the floor, who is who.
 
-Imports `geometry` and `body`. Callers use `velocity.predict`, `velocity.shortest_step`, `interpolation`,
+Imports `geometry` and `body`. Callers use `pose_steps.predict`, `pose_steps.shortest_step`, `interpolation`,
 `keyframe_doubts.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`, `continuation.who_is_who` and
 `keyframe_doubts`.
 """
@@ -12,5 +12,5 @@ __all__ = [
     "interpolation",
     "keyframe_doubts",
     "pose_path",
-    "velocity",
+    "pose_steps",
 ]

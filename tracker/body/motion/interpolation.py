@@ -10,7 +10,7 @@ import warnings
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.body.motion.velocity import middle_angle_sum, nearest_equivalent, shortest_step
+from tracker.body.motion.pose_steps import middle_angle_sum, nearest_equivalent, shortest_step
 from tracker.body.parts import Joint
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array

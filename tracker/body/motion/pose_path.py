@@ -7,7 +7,7 @@ from math import floor
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.body.motion.velocity import shortest_step
+from tracker.body.motion.pose_steps import shortest_step
 from tracker.geometry.arrays import Array
 
 

@@ -19,7 +19,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody, parts_of
-from tracker.body.motion.velocity import moving_bodies
+from tracker.body.motion.pose_steps import moving_bodies
 from tracker.compute.progress import Report, stages, unreported
 from tracker.compute.sampling import spread_indices
 from tracker.errors import TrackerError

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.velocity import PredictSettings, shortest_step
+from tracker.body.motion.pose_steps import PredictSettings, shortest_step
 from tracker.compute.threads import map_parallel
 from tracker.estimation.by_frame.assessment import PersonEstimate
 from tracker.estimation.by_frame.frame_estimator import FrameEstimator

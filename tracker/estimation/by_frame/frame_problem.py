@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import Limb, Search
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.velocity import PredictSettings, shortest_step
+from tracker.body.motion.pose_steps import PredictSettings, shortest_step
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.by_frame.settings import (
     MAX_ITERATIONS,

@@ -15,7 +15,7 @@ import numpy as np
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb, Search, SearchKind
 from tracker.body.model import BodyModel
-from tracker.body.motion.velocity import nearest_equivalent
+from tracker.body.motion.pose_steps import nearest_equivalent
 from tracker.compute.jit import njit
 from tracker.compute.sampling import even_points
 from tracker.compute.threads import N_HELPERS, kernel_pool

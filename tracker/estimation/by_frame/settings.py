@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tracker.body.motion.velocity import PredictSettings
+from tracker.body.motion.pose_steps import PredictSettings
 from tracker.estimation.fitting.contour_residuals import MatchSettings
 from tracker.estimation.fitting.gauss_newton import CLOSE_ENOUGH
 from tracker.estimation.fitting.hypothesis import BEAM_WIDTH

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from tracker.body.motion.history import HISTORY_FRAMES
-from tracker.body.motion.velocity import PredictSettings
+from tracker.body.motion.pose_steps import PredictSettings
 from tracker.estimation.chamfer.constants import PAPER_BODY
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.search.best_first import SearchSettings

@@ -5,7 +5,7 @@ The paper leaves some choices open; docs/log/trackers.md lists them with what is
 
 import numpy as np
 
-from tracker.body.motion.velocity import PredictSettings
+from tracker.body.motion.pose_steps import PredictSettings
 from tracker.estimation.contour.settings import ContourSettings, ImageContours, with_sliding
 from tracker.evidence.view_evidence import EdgeSettings
 

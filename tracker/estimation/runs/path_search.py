@@ -16,7 +16,7 @@ import numpy as np
 
 from tracker.body.limbs import Limb, limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.velocity import nearest_equivalent
+from tracker.body.motion.pose_steps import nearest_equivalent
 from tracker.estimation.appearance.part_colors import PartColors
 from tracker.estimation.appearance.region_model import elsewhere_nats, worst_parts
 from tracker.estimation.by_frame.limb_recovery import search_limbs, with_limb

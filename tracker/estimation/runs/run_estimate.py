@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.velocity import moving_bodies
+from tracker.body.motion.pose_steps import moving_bodies
 from tracker.compute.progress import mapped
 from tracker.estimation.appearance.region_model import LearningFrame, RegionModel, learn_regions, learning_frames
 from tracker.estimation.by_frame.frame_problem import Bodies, trust, with_body

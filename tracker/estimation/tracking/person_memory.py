@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tracker.body.limbs import Limb, limbs, movable
 from tracker.body.model import BodyModel
 from tracker.body.motion.history import HISTORY_FRAMES
-from tracker.body.motion.velocity import PredictSettings, predict
+from tracker.body.motion.pose_steps import PredictSettings, predict
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.fitting.gauss_newton import with_locked_dofs
 from tracker.estimation.tracking.confidence import PoseQuality, Status

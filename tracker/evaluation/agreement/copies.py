@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.body.motion.velocity import nearest_equivalent, shortest_step
+from tracker.body.motion.pose_steps import nearest_equivalent, shortest_step
 from tracker.errors import SessionError
 from tracker.formats.joint_maps import FOOT_POINTS, JOINTS
 from tracker.formats.model_toml import format_model

@@ -10,7 +10,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.interpolation import interpolate_pose
-from tracker.body.motion.velocity import velocity
+from tracker.body.motion.pose_steps import velocity
 from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import load_model

@@ -6,7 +6,7 @@ from bodies import BALLS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.body.motion.velocity import PredictSettings, predict
+from tracker.body.motion.pose_steps import PredictSettings, predict
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model, parse_model
 from tracker.geometry import rigid

@@ -5,7 +5,7 @@ import pytest
 from bodies import MODELS
 
 from tracker.body.motion.interpolation import interpolate_pose
-from tracker.body.motion.velocity import PredictSettings, nearest_equivalent, predict, shortest_step
+from tracker.body.motion.pose_steps import PredictSettings, nearest_equivalent, predict, shortest_step
 from tracker.formats.model_toml import load_model
 
 BODY = load_model("gavrila38")

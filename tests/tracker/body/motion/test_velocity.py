@@ -3,7 +3,7 @@ import pytest
 from staging import posed
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.velocity import velocity
+from tracker.body.motion.pose_steps import velocity
 
 
 @pytest.mark.parametrize("around", [(-2, -1, 0, 1, 2), (-1, 0, 1), (-1, 0), (0, 1), (-2, 0, 1)])

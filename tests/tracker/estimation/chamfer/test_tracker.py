@@ -6,7 +6,7 @@ from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_eviden
 from tracking_runs import track, with_reference
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.velocity import PredictSettings
+from tracker.body.motion.pose_steps import PredictSettings
 from tracker.estimation.chamfer.settings import TrackSettings, pose_cost, search_frame
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.search import chamfer_cost

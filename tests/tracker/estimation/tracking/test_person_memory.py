@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.body.motion.velocity import PredictSettings
+from tracker.body.motion.pose_steps import PredictSettings
 from tracker.estimation.tracking.confidence import LimbFeatures, PoseQuality
 from tracker.estimation.tracking.person_memory import PersonMemory
 

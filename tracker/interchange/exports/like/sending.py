@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.velocity import velocity
+from tracker.body.motion.pose_steps import velocity
 from tracker.errors import FormatError, Remedy, SessionError
 from tracker.formats.bvh_reading import patch_bvh
 from tracker.formats.keypoints.picture_table import PictureTable
