@@ -136,7 +136,7 @@ def _observations(session: "Session", name: str) -> dict[str, Any]:
 
 def _masks(session: "Session", name: str) -> dict[str, Any]:
     """Summarize imported masks; those that cannot be read are listed with the reason."""
-    from tracker.interchange.observations.stored_masks import load_masks
+    from tracker.interchange.observations.stored_masks import load_masks, mask_users
 
     try:
         found = load_masks(session, name)
@@ -146,7 +146,7 @@ def _masks(session: "Session", name: str) -> dict[str, Any]:
         "name": name,
         "format": found.format,
         "pictures": dict(found.cameras),
-        "used_by": list(found.users),
+        "used_by": list(mask_users(session, name)),
         "files": len(found.sources),
     }
 

@@ -35,19 +35,6 @@ class BvhFrame(NamedTuple):
     """Units of the file per metre."""
 
 
-class _Node(NamedTuple):
-    """A joint of the file: of the body model, or a landmark."""
-
-    name: str
-    part: int
-    """The part that turns with it; -1 for a landmark."""
-    offset: Array
-    """From its parent, (3,), file units."""
-    children: list["_Node"]
-    end: Array | None
-    """Offset of the End Site of a joint without children, (3,)."""
-
-
 def write_bvh(
     path: str | Path,
     model: BodyModel,
@@ -68,70 +55,59 @@ def write_bvh(
     """
     assert len(poses), "BVH needs a pose"
     names = identifiers(model.point_names)
-    root = _hierarchy(model, names, frame)
-    nodes = _in_order(root)
+    hierarchy, parts = _hierarchy(model, names, frame)
     Ts = np.empty((len(poses), len(model.parts), 4, 4))
     for i, values in enumerate(poses):
         Ts[i] = model.kinematics(values).Ts_world_part
         tick()
     columns = [frame.per_metre * (Ts[:, 0, :3, 3] @ frame.T_file_world[:3, :3].T + frame.T_file_world[:3, 3])]
     R_file = frame.T_file_world[:3, :3] @ Ts[:, :, :3, :3] @ frame.R_file_body.T
-    for node in nodes:
-        if node.part < 0:
+    for part in parts:
+        if part < 0:
             columns.append(np.zeros((len(poses), 3)))
             continue
-        parent = model.parents[node.part]
-        R = R_file[:, node.part] if parent < 0 else np.swapaxes(R_file[:, parent], -1, -2) @ R_file[:, node.part]
+        parent = model.parents[part]
+        R = R_file[:, part] if parent < 0 else np.swapaxes(R_file[:, parent], -1, -2) @ R_file[:, part]
         columns.append(np.degrees(continuous_euler_angles(R, ORDER)))
-    lines = ["HIERARCHY", *_lines(root, 0)]
-    lines += ["MOTION", f"Frames: {len(poses)}", f"Frame Time: {1 / fps:.9f}"]
+    lines = ["HIERARCHY", *hierarchy, "MOTION", f"Frames: {len(poses)}", f"Frame Time: {1 / fps:.9f}"]
     lines += [" ".join(f"{x:.6f}" for x in row) for row in np.hstack(columns).tolist()]
     write_text_atomic(Path(path), "\n".join(lines) + "\n")
 
 
-def _hierarchy(model: BodyModel, names: Sequence[str], frame: BvhFrame) -> _Node:
-    """Build the tree of a body's joints and landmarks."""
-    to_file = frame.per_metre * frame.R_file_body
-    nodes: list[_Node] = []
-    of_part: list[list[int]] = [[] for _ in model.parts]
-    for i in range(len(model.joints), len(model.point_names)):
-        of_part[int(model.point_parts[i])].append(i)
-    for i, joint in enumerate(model.joints):
-        has_child = i in model.parents
-        end = None
-        if not has_child and len(of_part[i]) == 1:
-            end = to_file @ model.points_part[of_part[i].pop()]
-        elif not has_child and not of_part[i]:  # readers draw a bone to the end of a chain
-            end = to_file @ (2 * model.centers_part[i])
-        offset = np.zeros(3) if joint.parent == "" else to_file @ (np.array(joint.position) * model.height_m)
-        node = _Node(names[i], i, offset, [], end)
-        nodes.append(node)
-        if model.parents[i] >= 0:
-            nodes[model.parents[i]].children.append(node)
-    for part, points in enumerate(of_part):
-        landmarks = [_Node(names[i], -1, to_file @ model.points_part[i], [], np.zeros(3)) for i in points]
-        nodes[part].children.extend(landmarks)
-    return nodes[0]
+def _hierarchy(model: BodyModel, names: Sequence[str], frame: BvhFrame) -> tuple[list[str], list[int]]:
+    """Return the lines of a body's joints and landmarks, and the part that each turns in this order; -1 for none."""
+    to_file, parts = frame.per_metre * frame.R_file_body, list[int]()
+
+    def of_part(part: int, depth: int) -> list[str]:
+        parts.append(part)
+        joint, inner = model.joints[part], list[str]()
+        for child, parent in enumerate(model.parents):
+            if parent == part:
+                inner += of_part(child, depth + 1)
+        landmarks = [i for i in range(len(model.joints), len(names)) if model.point_parts[i] == part]
+        if not inner and len(landmarks) < 2:  # readers draw a bone to the end of a chain
+            end = model.points_part[landmarks[0]] if landmarks else 2 * model.centers_part[part]
+            inner = _block("End Site", depth + 1, to_file @ end)
+            landmarks = []
+        for i in landmarks:
+            parts.append(-1)
+            end_site = _block("End Site", depth + 2, np.zeros(3))
+            inner += _block(
+                f"JOINT {names[i]}", depth + 1, to_file @ model.points_part[i], [_channels(depth + 1), *end_site]
+            )
+        offset = to_file @ (np.array(joint.position) * model.height_m) if depth else np.zeros(3)
+        return _block(f"{'JOINT' if depth else 'ROOT'} {names[part]}", depth, offset, [_channels(depth), *inner])
+
+    return of_part(0, 0), parts
 
 
-def _in_order(node: _Node) -> list[_Node]:
-    """Return a joint and all below it in the order of the file."""
-    return [node, *(below for child in node.children for below in _in_order(child))]
-
-
-def _lines(node: _Node, depth: int) -> list[str]:
-    """Format a joint and all below it."""
-    tab = "\t" * depth
+def _channels(depth: int) -> str:
     rotations = " ".join(f"{axis}rotation" for axis in ORDER)
     channels = f"3 {rotations}" if depth else f"6 Xposition Yposition Zposition {rotations}"
-    lines = [f"{tab}{'JOINT' if depth else 'ROOT'} {node.name}", f"{tab}{{", f"{tab}\tOFFSET {_vector(node.offset)}"]
-    lines.append(f"{tab}\tCHANNELS {channels}")
-    for child in node.children:
-        lines += _lines(child, depth + 1)
-    if node.end is not None:
-        lines += [f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\tOFFSET {_vector(node.end)}", f"{tab}\t}}"]
-    return [*lines, f"{tab}}}"]
+    return "\t" * (depth + 1) + f"CHANNELS {channels}"
 
 
-def _vector(v: Array) -> str:
-    return " ".join(f"{x:.7f}" for x in v)
+def _block(head: str, depth: int, offset: Array, inner: Sequence[str] = ()) -> list[str]:
+    """Return the lines of a joint or of the end of a chain."""
+    tab, place = "\t" * depth, " ".join(f"{x:.7f}" for x in offset)
+    return [f"{tab}{head}", f"{tab}{{", f"{tab}\tOFFSET {place}", *inner, f"{tab}}}"]

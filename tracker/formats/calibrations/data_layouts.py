@@ -167,7 +167,6 @@ def read_openpose(document: Document) -> dict[str, Section]:
     return {"": section_of(group, document.stem, document)}
 
 
-_CAMERA_KEYS = {"name", "size", "matrix", "rotation", "translation", "distortions"}
 _CALISCOPE_NUMBERS = ("cam_id", "port")
 """Keys of the number of a camera, after which Caliscope names its videos: `cam_0`, once `port_0`."""
 
@@ -198,7 +197,7 @@ def is_freemocap(document: Document) -> bool:
 
 def is_anipose(document: Document) -> bool:
     """Return whether there are sections of cameras at the top."""
-    return document.syntax == "toml" and any(_CAMERA_KEYS & group.keys() for group in document.groups.values())
+    return document.syntax == "toml" and any(_ANIPOSE_KEYS & group.keys() for group in document.groups.values())
 
 
 def read_top_sections(document: Document) -> dict[str, Section]:
@@ -211,7 +210,7 @@ def read_top_sections(document: Document) -> dict[str, Section]:
         if not isinstance(value, dict) and not is_understood(key, value) and is_unknown(key, value):
             raise refuse(document, None, "known keys of a lens or a convention", quoted(key), "remove it")
     groups = document.groups.items()
-    return _sections({k: g for k, g in groups if k.lower() != "metadata" and _CAMERA_KEYS & g.keys()}, document)
+    return _sections({k: g for k, g in groups if k.lower() != "metadata" and _ANIPOSE_KEYS & g.keys()}, document)
 
 
 def _sections(groups: Mapping[str, Mapping[str, Any]], document: Document) -> dict[str, Section]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 from tracker.errors import CalibrationError
@@ -38,30 +38,32 @@ def name_binary(path: Path) -> None:
         raise named(path, row.program, row.instead)
 
 
+def _by_marks(path: Path, kind: Literal["cameras", "layout"], data: Any) -> CalibrationError | None:
+    """Return the error of data of a program that is known and not read; None if they are of none."""
+    marks = marks_of(data)
+    found = (named(path, row.program, row.instead) for row in unread(kind) if row.has_marks(marks))
+    return next(found, None)
+
+
 def refuse_program(path: Path, data: Any) -> None:
     """Refuse data of programs that have words of cameras, and whose cameras cannot be read.
 
     Raises:
         CalibrationError: they are of one.
     """
-    marks = marks_of(data) if isinstance(data, dict) else set()
-    for row in unread("cameras"):
-        if row.has_marks(marks):
-            raise named(path, row.program, row.instead)
+    if isinstance(data, dict) and (error := _by_marks(path, "cameras", data)):
+        raise error
 
 
 def foreign(path: Path, data: Any) -> CalibrationError:
     """Name the program that wrote data of no known layout."""
-    marks = marks_of(data)
-    for row in unread("layout"):
-        if row.has_marks(marks):
-            return named(path, row.program, row.instead)
-    if isinstance(data, ElementTree.Element):
-        return named(path, f"XML with <{data.tag[:40]}>", "export it in one of these layouts")
+    if error := _by_marks(path, "layout", data):
+        return error
     if isinstance(data, str):
         found = "another kind of file" if data.strip() else "an empty file"
         return named(path, found, "export the calibration again")
-    return named(path, "no camera", "export it in one of these layouts")
+    found = f"XML with <{data.tag[:40]}>" if isinstance(data, ElementTree.Element) else "no camera"
+    return named(path, found, "export it in one of these layouts")
 
 
 _TOML_LINE = re.compile(r"\[{1,2}[^\[\]{}\n]+\]{1,2}\s*(#.*)?|[\w.\"'-]+\s*=.*")

@@ -27,8 +27,6 @@ class PictureTable:
     the file has none."""
     size: tuple[int, int] | None = None
     """Width and height of the pictures, px; None if unknown, 1, 1 where x and y are shares of them."""
-    rate: float | None = None
-    """Pictures per second; None if unknown."""
     notes: tuple[str, ...] = ()
     """Sentences on what is odd about the file."""
     tracks: NDArray[np.str_] | None = None

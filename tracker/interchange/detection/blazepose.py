@@ -51,32 +51,29 @@ class BlazePose:
     def find(self, picture: Image, square: PictureSquare) -> Sequence[PictureSquare]:
         """See `Detector.find`."""
         n = self._finder.size
-        to_pixels = square.to_pixels(n)
-        crop = cv2.warpAffine(picture, to_pixels, (n, n))
-        raw, logits = self._finder(crop / np.float32(127.5) - 1)
+        crop = square.crop(picture, n, n)
+        raw, logits = self._finder(crop.image / np.float32(127.5) - 1)
         keep = logits[:, 0] > 0
         raw, anchors, probability = raw[keep] / n, self._anchors[keep], expit(logits[keep, 0])
         corners = raw[:, :2] + anchors - raw[:, 2:4] / 2
-        back, out = _inverse(to_pixels), []
+        out = []
         for group in _groups(np.column_stack([corners, raw[:, 2:4]]), probability):
             weights = probability[group] / probability[group].sum()
             hips, rim = (weights @ (raw[group, at : at + 2] + anchors[group]) * n - 0.5 for at in (4, 6))
-            out.append(_square_around(_mapped(back, hips), _mapped(back, rim)))
+            out.append(_square_around(crop.in_picture(hips), crop.in_picture(rim)))
         return out
 
     def look(self, picture: Image, square: PictureSquare) -> DetectedPerson | None:
         """See `Detector.look`."""
         n = self._landmarks.size
-        to_pixels = square.to_pixels(n)
-        crop = cv2.warpAffine(picture, to_pixels, (n, n), borderMode=cv2.BORDER_REPLICATE)
-        marks, presence, logits, heat, _ = self._landmarks(crop / np.float32(255))
+        crop = square.crop(picture, n, n, borderMode=cv2.BORDER_REPLICATE)
+        marks, presence, logits, heat, _ = self._landmarks(crop.image / np.float32(255))
         if (present := float(presence.item())) < 1 - present:
             return None
         marks = marks.reshape(-1, 5)[: -len(_BEYOND)]
-        back = _inverse(to_pixels)
-        points = _mapped(back, _refined(marks[:, :2] / n, heat) * n - 0.5)
+        points = crop.in_picture(_refined(marks[:, :2] / n, heat) * n - 0.5)
         seen = expit(marks[:, 3]) * expit(marks[:, 4])
-        return DetectedPerson(points, seen.astype(np.float64), present, _mask(logits[..., 0], back))
+        return DetectedPerson(points, seen.astype(np.float64), present, _mask(logits[..., 0], crop.to_picture))
 
 
 class _Network:
@@ -124,14 +121,6 @@ def _square_around(hips_px: Array, rim_px: Array) -> PictureSquare:
     """Return the square of a person whose circle, around the hips, passes the rim above the head."""
     up = rim_px - hips_px
     return PictureSquare(hips_px, 2 * _CARD.around * float(np.hypot(*up)), float(np.arctan2(up[0], -up[1])))
-
-
-def _inverse(to_pixels: Array) -> Array:
-    return np.asarray(cv2.invertAffineTransform(to_pixels), dtype=np.float64)
-
-
-def _mapped(to_picture: Array, points: Array) -> Array:
-    return points @ to_picture[:, :2].T + to_picture[:, 2]
 
 
 def _refined(places: Array, heat: Array) -> Array:

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +26,18 @@ ADULT = _Adult(2.4, 0.88)
 1966). The square is 1.25 times (BlazePose's model card) the circle through the soles."""
 
 
+class SquareImage(NamedTuple):
+    """An image of a square of a picture."""
+
+    image: NDArray[np.uint8]
+    to_picture: Array
+    """Maps its pixels to those of the picture, (2, 3)."""
+
+    def in_picture(self, points_px: Array) -> Array:
+        """Return the pixels of the picture at pixels of the image, (..., 2)."""
+        return points_px @ self.to_picture[:, :2].T + self.to_picture[:, 2]
+
+
 class PictureSquare(NamedTuple):
     """A square of a picture, turned so that a person in it stands upright."""
 
@@ -40,6 +53,14 @@ class PictureSquare(NamedTuple):
         cosine, sine = np.cos(self.turn_rad), np.sin(self.turn_rad)
         A = size / self.side_px * np.array([[cosine, sine], [-sine, cosine]])
         return np.column_stack([A, (size - 1) / 2 - A @ self.center_px])
+
+    def crop(self, picture: Image, width: int, height: int, **border: Any) -> SquareImage:
+        """Return an image of a size that shows the square whole; `border` says how `cv2.warpAffine` goes beyond."""
+        side = max(width, height)
+        to_pixels = self.to_pixels(side)
+        to_pixels[:, 2] += (width - side) / 2, (height - side) / 2
+        image = cv2.warpAffine(picture, to_pixels, (width, height), **border)
+        return SquareImage(np.asarray(image, np.uint8), np.asarray(cv2.invertAffineTransform(to_pixels), np.float64))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,16 +6,15 @@ The role of a file follows from its outputs, as MMDeploy names them: `simcc_x` a
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import TrackerError
 from tracker.formats.joint_maps import joint_map_of_size
 from tracker.geometry.arrays import Array, Image
-from tracker.interchange.detection.detector import DetectedPerson, PictureSquare
+from tracker.interchange.detection.detector import DetectedPerson, PictureSquare, SquareImage
 
 _COLORS = np.array([[123.675, 116.28, 103.53], [58.395, 57.12, 57.375]])
 """Mean and standard deviation of red, green and blue in ImageNet, by which RTMPose's input is normalized; beside a
@@ -48,11 +47,11 @@ class OnnxPose:
             people = self._people(picture, square)
             return [_square_around(p.points_px.min(axis=0), p.points_px.max(axis=0), square.turn_rad) for p in people]
         network = self._by_role["finder"]
-        crop, back = _crop(picture, square, network.size)
-        boxes, labels = network({"dets", "labels"}, crop[..., ::-1])
+        crop = network.crop(picture, square)
+        boxes, labels = network({"dets", "labels"}, crop.image[..., ::-1])
         found = boxes[(labels == 0) & (boxes[:, 4] > 1 - boxes[:, 4])]
-        corners = found[np.argsort(-found[:, 4]), :4].reshape(-1, 2, 2) @ back[:, :2].T + back[:, 2]
-        return [_square_around(c.min(axis=0), c.max(axis=0), square.turn_rad) for c in corners]
+        corners = found[np.argsort(-found[:, 4]), :4].reshape(-1, 2, 2)
+        return [_square_around(c.min(axis=0), c.max(axis=0), square.turn_rad) for c in crop.in_picture(corners)]
 
     def look(self, picture: Image, square: PictureSquare) -> DetectedPerson | None:
         """See `Detector.look`."""
@@ -62,23 +61,23 @@ class OnnxPose:
             nearest = int(np.argmin(apart)) if apart else -1
             return people[nearest] if apart and apart[nearest] < square.side_px / 4 else None
         network = self._by_role["landmarks"]
-        crop, back = _crop(picture, square, network.size)
-        x, y = network({"simcc_x", "simcc_y"}, (crop - _COLORS[0]) / _COLORS[1])
+        crop = network.crop(picture, square)
+        x, y = network({"simcc_x", "simcc_y"}, (crop.image - _COLORS[0]) / _COLORS[1])
         height, width = network.size
         columns, rows = x.argmax(axis=1) * width / x.shape[1], y.argmax(axis=1) * height / y.shape[1]
         confidence = np.clip(np.minimum(x.max(axis=1), y.max(axis=1)), 0, 1).astype(np.float64)
-        points = np.column_stack([columns, rows]) @ back[:, :2].T + back[:, 2]
+        points = crop.in_picture(np.column_stack([columns, rows]))
         presence = float(np.median(confidence))
         return DetectedPerson(points, confidence, presence) if presence > 1 - presence else None
 
     def _people(self, picture: Image, square: PictureSquare) -> list[DetectedPerson]:
         network = self._by_role["people"]
-        crop, back = _crop(picture, square, network.size)
-        boxes, points = network({"dets", "keypoints"}, crop[..., ::-1])
+        crop = network.crop(picture, square)
+        boxes, points = network({"dets", "keypoints"}, crop.image[..., ::-1])
         order = [i for i in np.argsort(-boxes[:, 4]) if boxes[i, 4] > 1 - boxes[i, 4]]
         return [
             DetectedPerson(
-                points[i, :, :2] @ back[:, :2].T + back[:, 2],
+                crop.in_picture(points[i, :, :2]),
                 np.clip(points[i, :, 2], 0, 1).astype(np.float64), float(boxes[i, 4]),
             )
             for i in order
@@ -114,24 +113,15 @@ class _Network:
         points = {"landmarks": ("simcc_x", 1), "people": ("keypoints", 2)}.get(self.role)
         self.n_points = int(outputs[points[0]][points[1]]) if points else 0
 
+    def crop(self, picture: Image, square: PictureSquare) -> SquareImage:
+        """Return an image of the input's size that shows a square."""
+        height, width = self.size
+        return square.crop(picture, width, height, borderValue=_COLORS[0].tolist())
+
     def __call__(self, names: set[str], image: NDArray[Any]) -> list[NDArray[Any]]:
         """Return outputs in the order of their names, without the axis of the batch."""
         batch = np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32)
         return [np.asarray(found)[0] for found in self._session.run(sorted(names), {self._input.name: batch})]
-
-
-class _Crop(NamedTuple):
-    image: NDArray[np.uint8]
-    back: Array
-
-
-def _crop(picture: Image, square: PictureSquare, size: tuple[int, int]) -> _Crop:
-    """Return an image of a size, height and width, that shows a square, and the map back to the picture, (2, 3)."""
-    height, width = size
-    to_pixels = square.to_pixels(max(height, width))
-    to_pixels[:, 2] += (width - max(height, width)) / 2, (height - max(height, width)) / 2
-    image = cv2.warpAffine(picture, to_pixels, (width, height), borderValue=_COLORS[0].tolist())
-    return _Crop(np.asarray(image, np.uint8), np.asarray(cv2.invertAffineTransform(to_pixels), np.float64))
 
 
 def _square_around(low_px: Array, high_px: Array, turn_rad: float) -> PictureSquare:

@@ -9,9 +9,16 @@ from tracker.footage.image_file import UNKNOWN
 from tracker.formats.keypoints.detections import MAX_PEOPLE
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.geometry.arrays import IntArray
-from tracker.interchange.observations.mask_files import MaskFiles, MaskRules, MaskSurvey, survey
 from tracker.interchange.observations.placing import place_pictures, short_list
-from tracker.interchange.observations.plans import ImportRequest, MaskPlan, ViewPreview
+from tracker.interchange.observations.plans import (
+    ImportRequest,
+    MaskFiles,
+    MaskPlan,
+    MaskRules,
+    MaskSurvey,
+    ViewPreview,
+    survey,
+)
 from tracker.interchange.observations.readers import MASK_FORMATS
 from tracker.interchange.observations.sources import Found, match_cameras, no_camera, source_files
 from tracker.session.matching import check_names

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.errors import FormatError, Remedy, SessionError
-from tracker.footage.frame_rates import same_clock
 from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_size, read_joint_map
 from tracker.formats.joint_tables.layouts import by_subject
 from tracker.formats.keypoints.picture_table import PictureTable
@@ -53,12 +52,6 @@ def place_pictures(
     lowest = min((int(t.numbers[0]) for t in tables.values() if len(t.numbers)), default=0)
     problems: list[FormatError] = []
     notes: list[str] = []
-    for name, table in tables.items():
-        if table.rate is not None and not same_clock(table.rate, session.fps):
-            wanted = f"pictures at the {session.fps:g} per second of the session"
-            found = f"{table.rate:g} per second in the file"
-            here = f"camera '{name}'"
-            problems.append(FormatError.mismatch(here, wanted, found, Remedy("export_at_rate", fps=f"{session.fps:g}")))
     if first_frame is not None:
         frames = {name: table.numbers - lowest + first_frame for name, table in tables.items()}
         notes.append(f"picture {lowest} of the files was placed at frame {first_frame}, as chosen")

@@ -23,7 +23,7 @@ from tracker.formats.keypoints.picture_table import PicturePerson, PictureTable,
 from tracker.formats.observation_layout import ObservationLayout, Sample, unread
 from tracker.formats.text_files import TABLE_BYTES, TextKind, read_json
 from tracker.formats.trc import MarkerTable, patch_trc, read_trc
-from tracker.interchange.observations.mask_files import MaskFiles
+from tracker.interchange.observations.plans import MaskFiles
 from tracker.interchange.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
 from tracker.validation import quoted
 

@@ -88,10 +88,10 @@ def write_description(path: Path, where: str, content: Description) -> None:
     write_text_atomic(path, tomli_w.dumps(data))
 
 
-def list_observations(session: Session) -> list[str]:
-    """Return the names of the observations of a session, in order."""
-    folder = session.folder / FOLDER
-    return sorted(p.parent.name for p in folder.glob(f"*/{_FILE}") if not p.parent.name.startswith("."))
+def list_observations(session: Session, description: str = DESCRIPTION) -> list[str]:
+    """Return the names of the observations of a session, in order: of those that a file of some name describes."""
+    found = (session.folder / FOLDER).glob(f"*/{description}")
+    return sorted(p.parent.name for p in found if not p.parent.name.startswith("."))
 
 
 def files_folder(session: Session, name: str) -> Path:
@@ -121,7 +121,9 @@ def save_observations(
     """
     with appearing_folder(session, observations.name, replaces) as temporary:
         for source in observations.sources:
-            _copy(files[source.path], temporary / _FILES / source.path, source.sha256)
+            target = temporary / _FILES / source.path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(read_unchanged(files[source.path], source))
         with (temporary / _POINTS).open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **_arrays(observations))
         write_description(temporary / _FILE, f"observations {observations.name}", _content(observations))
@@ -219,16 +221,12 @@ def _content(observations: ObservationSet) -> _Content:
 
 
 def _arrays(observations: ObservationSet) -> dict[str, Array]:
-    found: dict[str, Array] = {_rows_of(i): rows for i, rows in enumerate(observations.row_frames)}
-    if observations.points is not None:
-        found |= {"points_px": observations.points.points_px, "confidence": observations.points.confidence}
-        if observations.points.colors is not None:
-            found["colors"] = observations.points.colors
-    if observations.joints is not None:
-        found["joints_world"] = observations.joints.joints_world
-        if observations.joints.covariances is not None:
-            found["covariances"] = observations.joints.covariances
-    return found
+    found: dict[str, Array | None] = {_rows_of(i): rows for i, rows in enumerate(observations.row_frames)}
+    if (points := observations.points) is not None:
+        found |= {"points_px": points.points_px, "confidence": points.confidence, "colors": points.colors}
+    if (joints := observations.joints) is not None:
+        found |= {"joints_world": joints.joints_world, "covariances": joints.covariances}
+    return {name: values for name, values in found.items() if values is not None}
 
 
 def _from_arrays(
@@ -284,14 +282,13 @@ def _read_arrays(path: Path) -> dict[str, Array]:
     return arrays
 
 
-def _copy(source: Path, target: Path, sha256: str) -> None:
-    """Copy a file.
+def read_unchanged(path: Path, source: SourceFile) -> bytes:
+    """Read a file that is imported.
 
     Raises:
         SessionError: it is another one than was read.
     """
-    data = source.read_bytes()
-    if checksum(data) != sha256:
-        raise SessionError(f"{source} has changed since it was read; import it again")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(data)
+    data = path.read_bytes()
+    if checksum(data) != source.sha256:
+        raise SessionError(f"{path} has changed since it was read; import it again")
+    return data

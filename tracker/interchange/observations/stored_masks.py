@@ -9,7 +9,7 @@ The folder appears complete or not at all. session.toml names the masks that its
 
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,9 +17,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.errors import SessionError, TrackerError
+from tracker.errors import TrackerError
 from tracker.interchange.observations import stored
-from tracker.interchange.observations.observed import SourceFile, checksum
 from tracker.session.session import Session, save_camera_files
 from tracker.validation import FileStem
 
@@ -29,24 +28,11 @@ if TYPE_CHECKING:  # it decodes videos
 MASKS_FILE, _MASKS = "masks.toml", "masks"
 
 
-class _Content(stored.Description, forbid_unknown_fields=True, kw_only=True):
-    cameras: dict[FileStem, int]
-
-
-@dataclass(frozen=True)
-class StoredMasks:
+class StoredMasks(stored.Description, forbid_unknown_fields=True, kw_only=True):
     """Masks that were imported."""
 
-    name: str
-    format: str
-    """Name of the format of the files, one of `tracker.interchange.observations.readers.FORMATS`."""
-    cameras: Mapping[str, int]
+    cameras: dict[FileStem, int]
     """Number of masks by camera."""
-    notes: tuple[str, ...]
-    sources: tuple[SourceFile, ...]
-    """The files that were imported."""
-    users: tuple[str, ...]
-    """Cameras of the session that use them."""
 
 
 def masks_folder(session: Session, name: str) -> Path:
@@ -68,14 +54,13 @@ def describe_masks(session: Session, name: str, format_name: str, options: Mappi
     """
     folder = masks_folder(session, name)
     cameras = {name: len(list((folder / name).glob("*.png"))) for name in session.camera_names}
-    content = _Content(name=name, format=format_name, cameras=cameras, notes=(), options=dict(options), sources=())
+    content = StoredMasks(name=name, format=format_name, cameras=cameras, options=dict(options))
     stored.write_description(folder.parent / MASKS_FILE, f"masks {name}", content)
 
 
 def list_masks(session: Session) -> list[str]:
     """Return the names of the masks that were imported into a session, in order."""
-    found = (session.folder / stored.FOLDER).glob(f"*/{MASKS_FILE}")
-    return sorted(p.parent.name for p in found if not p.parent.name.startswith("."))
+    return stored.list_observations(session, MASKS_FILE)
 
 
 def load_masks(session: Session, name: str) -> StoredMasks:
@@ -85,10 +70,13 @@ def load_masks(session: Session, name: str) -> StoredMasks:
         SessionError: the file is missing, damaged or newer.
     """
     path = session.folder / stored.FOLDER / name / MASKS_FILE
-    row = stored.read_description(path, f"masks {path}", _Content)
+    return stored.read_description(path, f"masks {path}", StoredMasks)
+
+
+def mask_users(session: Session, name: str) -> tuple[str, ...]:
+    """Return the cameras of a session that use the masks of a name."""
     folder = masks_folder(session, name)
-    users = tuple(c.camera.name for c in session.cameras if c.masks is not None and c.masks.parent == folder)
-    return StoredMasks(row.name, row.format, row.cameras, row.notes, row.sources, users)
+    return tuple(c.camera.name for c in session.cameras if c.masks is not None and c.masks.parent == folder)
 
 
 def store_masks(session: Session, plan: "MaskPlan") -> Session:
@@ -105,12 +93,11 @@ def store_masks(session: Session, plan: "MaskPlan") -> Session:
         raise plan.problems[0]
     with stored.appearing_folder(session, plan.name) as temporary:
         for source in plan.sources:
-            if checksum(plan.files[source.path].read_bytes()) != source.sha256:
-                raise SessionError(f"{plan.files[source.path]} has changed since it was read; import it again")
+            stored.read_unchanged(plan.files[source.path], source)
         sizes = {c.camera.name: c.camera.size for c in session.cameras}
         for camera in plan.masks:
             _write_masks(plan, camera, sizes[camera], temporary / _MASKS / camera)
-        content = _Content(
+        content = StoredMasks(
             name=plan.name,
             format=plan.format,
             cameras={name: int((own >= 0).sum()) for name, own in plan.pictures.items()},

@@ -218,17 +218,20 @@ def _others(read: ReadPoints, given: Reading, best: Sequence[Reading]) -> list[F
     return found
 
 
+_ELSEWHERE = (
+    "lie across the vertical or stand on their heads",
+    "bend knees and elbows the wrong way, as in a mirror",
+    "are elsewhere",
+)
+"""Reasons against axes, in the order of `ReadPoints.posture_and_place`."""
+
+
 def _other_axes(read: ReadPoints, given: Reading, best: Sequence[Reading]) -> FormatError:
     first = best[0]
-    before, after = (read.terms(replace(r, joint_map=first.joint_map, scale=first.scale)) for r in (given, first))
-    reasons = {
-        "lie across the vertical or stand on their heads": after.upright - before.upright,
-        "bend knees and elbows the wrong way, as in a mirror": after.bend - before.bend,
-        "are elsewhere": after.place - before.place,
-    }
-    reason = max(reasons, key=lambda r: reasons[r])
-    text = f"expected people as the recording shows them, found that they {reason}; they fit with the axes "
-    return FormatError(text + _listed(best, "axes"), Remedy("read_with_axes", axes=first.axes))
+    other = replace(given, joint_map=first.joint_map, scale=first.scale)
+    gains = np.subtract(read.posture_and_place(first), read.posture_and_place(other))
+    text = f"expected people as the recording shows them, found that they {_ELSEWHERE[gains.argmax()]}; they fit "
+    return FormatError(f"{text}with the axes {_listed(best, 'axes')}", Remedy("read_with_axes", axes=first.axes))
 
 
 def _listed(best: Sequence[Reading], part: str) -> str:

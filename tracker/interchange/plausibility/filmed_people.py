@@ -50,22 +50,19 @@ class FilmedMotion:
             places: of one person, (F, 3) each, metres.
             most: largest lag of the pictures, in steps; those of lag 0 are in the middle.
         """
-        ends = [(places[a], places[b]) for s in ("left", "right") for a, b in _named(s) if places.keys() >= {a, b}]
-        lags = np.arange(-most * self.step, most * self.step + 1)
-        if not ends:
+        limbs, lags = _limbs(places, _BONES), np.arange(-most * self.step, most * self.step + 1)
+        if not limbs:
             return np.empty((len(lags), 0, 0))
-        points = np.stack([[a, (a + b) / 2, b] for a, b in ends])
-        errors = [self._of_view(v, np.moveaxis(points, 2, 0), lags) for v in range(len(self.cameras))]
+        points = np.moveaxis(np.stack(limbs), 2, 0)
+        errors = [self._of_view(v, points, lags) for v in range(len(self.cameras))]
         return np.concatenate(errors, axis=-1)
 
     def _of_view(self, view: int, points: Array, lags: IntArray) -> Array:
         """Return the errors of a view, (n_lags, F - n_steps, n_bones), from points, (F, n_bones, 3, 3), metres."""
         camera, flow = self.cameras[view], self.flows[view]
-        flat = points.reshape(-1, 3)
-        px = camera.project(flat).reshape(*points.shape[:3], 2)
-        metres = (camera.depths(flat) / camera.K[0, 0]).reshape(px.shape[:3])[:-1]
-        with np.errstate(invalid="ignore"):
-            inside = np.all((px > -0.5) & (px < np.array(camera.size) - 0.5), axis=-1)[:-1] & (metres > 0)
+        px, depths, is_shown = _projected(camera, points)
+        metres = (depths / camera.K[0, 0])[:-1]
+        inside = is_shown[:-1] & (metres > 0)
         u, v = np.moveaxis(np.where(inside[..., None], px[:-1], 0.0).round().astype(np.int64) // self.cell_px, -1, 0)
         moved, apart_m = np.diff(px, axis=0), np.full((len(lags), *inside.shape, 2), np.nan)
         for row, lag in enumerate(lags):
@@ -112,10 +109,6 @@ class MotionFinder:
 def _grey(frame: Image, camera: Camera) -> Image:
     grey = cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY)
     return np.asarray(cv2.resize(grey, camera.size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-def _named(side: str) -> list[tuple[str, str]]:
-    return [(f"{side}_{a}", f"{side}_{b}") for a, b in _BONES]
 
 
 _BELOW = (("elbow", "wrist"), ("knee", "ankle"))
@@ -187,17 +180,14 @@ class FilmedPeople:
             least_px: least distance, px.
         """
         camera, distances = self.cameras[view], self.distances_px[view]
-        flat = points.reshape(-1, 3)
-        px, depths = (x.reshape(*points.shape[:2], -1) for x in (camera.project(flat), camera.depths(flat)))
+        px, depths, inside = _projected(camera, points)
         shown = np.arange(len(points)) + lag
         is_row = (shown >= 0) & (shown < len(distances))
         shown = np.where(is_row, shown, 0)
-        with np.errstate(invalid="ignore"):
-            inside = ((px > -0.5) & (px < np.array(distances.shape[:0:-1]) - 0.5)).all(axis=-1)
-            inside &= (depths[..., 0] > NEAR_PLANE_M) & (is_row & self.shows_people[shown, view])[:, None]
+        inside = inside & (depths > NEAR_PLANE_M) & (is_row & self.shows_people[shown, view])[:, None]
         u, v = np.moveaxis(np.round(np.where(inside[..., None], px, 0.0)).astype(np.int64), -1, 0)
         away_px = np.maximum(distances[shown[:, None], v, u], least_px)
-        return np.where(inside, away_px * depths[..., 0] / camera.K[0, 0], np.nan)
+        return np.where(inside, away_px * depths / camera.K[0, 0], np.nan)
 
 
 def film_people(session: Session, frames: IntArray) -> FilmedPeople:
@@ -246,7 +236,19 @@ def _distances(mask: Mask) -> NDArray[np.uint8]:
 
 def _limb_points(places: Places) -> Array:
     """Return the joints of forearms and calves and their middles, (F, n, 3); without these all points."""
-    pairs = [(f"{side}_{a}", f"{side}_{b}") for side in ("left", "right") for a, b in _BELOW]
-    ends: Sequence[tuple[Array, Array]] = [(places[a], places[b]) for a, b in pairs if places.keys() >= {a, b}]
-    points = [p for a, b in ends for p in (a, (a + b) / 2, b)] or [*places.values()]
-    return np.stack(points, axis=1)
+    limbs = _limbs(places, _BELOW)
+    return np.stack([point for limb in limbs for point in limb] or [*places.values()], axis=1)
+
+
+def _limbs(places: Places, joints: Sequence[tuple[str, str]]) -> list[tuple[Array, Array, Array]]:
+    """Return one end, the middle and the other end, (F, 3) each, of the parts between joints of both sides."""
+    ends = [(f"{side}_{a}", f"{side}_{b}") for side in ("left", "right") for a, b in joints]
+    return [(places[a], (places[a] + places[b]) / 2, places[b]) for a, b in ends if places.keys() >= {a, b}]
+
+
+def _projected(camera: Camera, points: Array) -> tuple[Array, Array, Mask]:
+    """Return the pixels, (..., 2), and the depths of points, (..., 3), metres, and which pixels are of the picture."""
+    flat = points.reshape(-1, 3)
+    px, depths = camera.project(flat).reshape(*points.shape[:-1], 2), camera.depths(flat).reshape(points.shape[:-1])
+    with np.errstate(invalid="ignore"):
+        return px, depths, np.all((px > -0.5) & (px < np.array(camera.size) - 0.5), axis=-1)

@@ -117,22 +117,6 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
-    """Log likelihood ratios of a reading, nats; larger ones are better."""
-
-    bones: float
-    stature: float
-    upright: float
-    bend: float
-    place: float
-
-    @property
-    def total(self) -> float:
-        """Their sum."""
-        return self.bones + self.stature + self.upright + self.bend + self.place
-
-
-@dataclass(frozen=True, eq=False)
 class ReadPoints:
     """Points of people on some frames of a session, as a file has them."""
 
@@ -175,21 +159,17 @@ class ReadPoints:
         """Return the bones of each person under a reading."""
         return [bones(places) for places in self.places(reading)]
 
-    def terms(self, reading: Reading) -> Terms:
-        """Return the log likelihood ratios of a reading."""
+    def posture_and_place(self, reading: Reading) -> tuple[float, float, float]:
+        """Return log likelihood ratios of a reading, nats: by upright people, by bent joints, and by their place."""
         n, people = self.n_postures, self.places(reading)
-        found = [bones(places) for places in people]
-        return Terms(
-            n * sum(b.nats for b in found),
-            sum(stature_nats(b.stature, m) for b, m in zip(found, self.statures_m, strict=True)),
-            n * sum(upright_nats(places, self.up) for places in people),
-            n * sum(bend_nats(places) for places in people),
-            self._place_nats(reading),
-        )
+        upright, bend = sum(upright_nats(p, self.up) for p in people), sum(bend_nats(p) for p in people)
+        return n * upright, n * bend, self._place_nats(reading)
 
     def misplaced(self, reading: Reading) -> float:
         """Return how far the people of a reading are from those of the recording, 0 to 1; NaN if unknown."""
-        costs = self._costs(reading)
+        if self.known_people is None:
+            return np.nan
+        costs = np.concatenate([self.known_people.costs(places) for places in self.places(reading)])
         known = costs[np.isfinite(costs)]
         return float(known.mean()) if len(known) else np.nan
 
@@ -276,12 +256,6 @@ class ReadPoints:
             return 0.0
         sigma_m = PRIORS.error * float(np.mean(self.statures_m))
         return -0.5 * (INLIER_M / sigma_m) ** 2 * PRIORS.parts * self.known_people.n_views * self.n_postures
-
-    def _costs(self, reading: Reading) -> Array:
-        """Return how far each person is from those of the recording, (n_people * F,), 0 to 1; NaN if unknown."""
-        if self.known_people is None:
-            return np.empty(0)
-        return np.concatenate([self.known_people.costs(p) for p in self.places(reading)])
 
 
 def read_beside(

@@ -11,7 +11,7 @@ from tracker.errors import TrackerError
 from tracker.footage.image_file import ANYONE, UNKNOWN
 from tracker.footage.recording import read_mask
 from tracker.interchange.detection.detect import DetectionPlan, detect_people
-from tracker.interchange.observations.stored_masks import list_masks, load_masks, masks_folder
+from tracker.interchange.observations.stored_masks import list_masks, load_masks, mask_users, masks_folder
 
 N = 6
 
@@ -36,7 +36,7 @@ def test_people_of_several_views_are_somebody_and_no_camera_uses_that_by_itself(
     run(session, FakeDetector(points))
     found = load_masks(session, "net_masks")
     assert found.cameras == dict.fromkeys(session.camera_names, N)
-    assert (found.users, list_masks(session)) == ((), ["net_masks"])
+    assert (mask_users(session, "net_masks"), list_masks(session)) == ((), ["net_masks"])
     for view, mask in enumerate(masks(session, 3)):
         assert np.array_equal(mask == ANYONE, box_of(points[3, view, 0, :, :2], mask.shape) > 0)
         assert not (mask == UNKNOWN).any()

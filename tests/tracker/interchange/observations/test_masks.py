@@ -15,7 +15,7 @@ from tracker.footage.image_file import UNKNOWN
 from tracker.footage.recording import read_mask
 from tracker.interchange.observations.importing import plan_import, store_import
 from tracker.interchange.observations.plans import ImportRequest
-from tracker.interchange.observations.stored_masks import list_masks, load_masks, masks_folder
+from tracker.interchange.observations.stored_masks import list_masks, load_masks, mask_users, masks_folder
 from tracker.session.relink import Places, leave_masks, relink
 from tracker.session.session import load_session
 
@@ -54,7 +54,7 @@ def test_masks_of_each_kind_are_stored_and_used(session, tmp_path, mode):
     assert np.array_equal(read(found), np.where(MASKS > 0, 255, 0))
     assert list_masks(found) == ["net"]
     described = load_masks(found, "net")
-    assert (described.format, described.users) == ("masks", session.camera_names)
+    assert (described.format, mask_users(found, "net")) == ("masks", session.camera_names)
     assert dict(described.cameras) == dict.fromkeys(session.camera_names, N)
     assert (len(described.sources), described.sources[0].path) == (4 * N, "cam0/cam0_000000.png")
     assert not [p for p in (session.folder / "observations").iterdir() if p.name.startswith(".")]
@@ -304,12 +304,12 @@ def test_masks_replace_others_and_are_left_and_used_again(session, tmp_path):
     plan = plan_import(first, ImportRequest("other", (folder,), ("ann", "bob")))
     assert f"camera 'cam0': these masks take the place of those in {masks_folder(first, 'net') / 'cam0'}" in plan.notes
     second = store_import(first, plan)
-    assert (load_masks(second, "net").users, load_masks(second, "other").users) == ((), ("cam0", "cam1"))
+    assert (mask_users(second, "net"), mask_users(second, "other")) == ((), ("cam0", "cam1"))
     bare = leave_masks(second)
     assert all(c.masks is None for c in load_session(session.folder).cameras)
     again, found = relink(bare, Places(masks=masks_folder(session, "net")))
     assert [(f.camera, f.old) for f in found] == [("cam0", None), ("cam1", None)]
-    assert load_masks(again, "net").users == ("cam0", "cam1")
+    assert mask_users(again, "net") == ("cam0", "cam1")
 
 
 def test_a_name_is_given_once(session, tmp_path):
