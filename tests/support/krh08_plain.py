@@ -1,8 +1,9 @@
-"""The derivatives of KRH08 Eq. 55 and 61 over all visible contour points, in numpy, to check the kernels with."""
+"""Rulings of cones of KRH08, and its Eq. 55 and 61 over all visible contour points, in numpy, to check kernels with."""
 
 from typing import NamedTuple
 
 import numpy as np
+from contour_oracle import bilinear
 
 from tracker.body.model import PosedBody
 from tracker.estimation.fitting.twists import SINGULAR
@@ -39,7 +40,7 @@ def linearize(model, pose, views, sliding):
         x, J_I = view.camera.project_with_jacobian(points)
         inside = np.all((x >= 0) & (x < np.array(view.camera.size) - 1), axis=1)
         points, of, J_I = points[inside], of[inside], J_I[inside]
-        d, slope = _bilinear(view.distance, x[inside])
+        d, slope = bilinear(view.distance, x[inside])
         spatial = np.einsum("ni,nij->nj", slope, J_I)
         row = np.hstack([np.cross(points, spatial), spatial])  # slope . J_I A
         if sliding:
@@ -52,17 +53,6 @@ def linearize(model, pose, views, sliding):
     moves = model.moves[:, np.concatenate(parts)].T
     jacobian = np.where(moves, np.concatenate(rows) @ twists.T, 0.0)
     return Linearization(np.concatenate(distances), jacobian, np.concatenate(lengths))
-
-
-def _bilinear(image, x):
-    """Return distances (N,) and their gradients (N, 2) at points (N, 2) within an image, px (Eq. 59, corrected)."""
-    u, v = np.floor(x).astype(np.int64).T
-    r1, r2 = (x - np.floor(x)).T
-    C = image.astype(np.float64)
-    C00, C10, C01, C11 = C[v, u], C[v, u + 1], C[v + 1, u], C[v + 1, u + 1]
-    along_u = (1 - r2) * (C10 - C00) + r2 * (C11 - C01)
-    along_v = (1 - r1) * (C01 - C00) + r1 * (C11 - C10)
-    return C00 + r1 * (C10 - C00) + r2 * ((1 - r1) * (C01 - C00) + r1 * (C11 - C10)), np.stack([along_u, along_v], 1)
 
 
 def _sliding_rows(body, parts, points, eye, spatial):
@@ -99,3 +89,32 @@ def _sliding_rows(body, parts, points, eye, spatial):
         weight = inverse * np.sum((point_by_theta @ R.T) * spatial[at], axis=1)
         out[at] = weight[:, None] * np.hstack([np.cross(n, eye), -n])
     return out
+
+
+def surface_point(cone, theta, z):
+    """X(theta, z) of Eq. 12 in the cone's own frame, (3,)."""
+    a, b, half = cone.half_axes
+    w = 1 + cone.taper / half * z
+    return np.array([a * np.cos(theta) * w, b * np.sin(theta) * w, z])
+
+
+def normal_of(cone, theta):
+    """alpha' x beta, the direction of Eq. 9, which does not vanish for a cylinder, (3,)."""
+    a, b, half = cone.half_axes
+    return np.array([b * np.cos(theta), a * np.sin(theta), -a * b * cone.taper / half])
+
+
+def grazing_angles(cone, eye):
+    """Solve F cos(theta) + G sin(theta) + H = 0 (Eq. 11, 13) for an eye in the cone's own frame.
+
+    Returns:
+        Two angles, or none where the eye is inside the cone or its extension. They come from atan2 and acos, which lose
+        no root.
+    """
+    a, b, half = cone.half_axes
+    F, G, H = -eye[0] * b, -eye[1] * a, a * b * (1 + cone.taper / half * eye[2])
+    radius = np.hypot(F, G)
+    if radius <= abs(H):
+        return ()
+    middle, half_angle = np.arctan2(G, F), np.arccos(-H / radius)
+    return middle - half_angle, middle + half_angle

@@ -17,6 +17,20 @@ def carve_plainly(carver, grid, rule):
     return (n_inside >= rule.min_views) & (n_outside <= rule.missing)
 
 
+def project_plainly(silhouettes, points):
+    """Which points (n, 3) all silhouettes hold, by projection, and which lie at the border of one."""
+    inside, at_border = np.ones(len(points), bool), np.zeros(len(points), bool)
+    for view in silhouettes:
+        u, v = np.round(view.camera.project(points)).astype(int).T
+        rows, columns = (
+            np.clip(np.add(x, [[-1], [0], [1]]), 0, n - 1) for x, n in zip((v, u), view.mask.shape, strict=True)
+        )
+        around = view.mask[rows[:, None], columns]  # (3, 3, n)
+        at_border |= np.any(around, axis=(0, 1)) & ~np.all(around, axis=(0, 1))
+        inside &= around[1, 1] > 0
+    return inside, at_border
+
+
 def _carved_alone(silhouette, grid):
     with patch.object(carving, "_BLOCK", 1):
         return carving.Carver([silhouette]).carve(grid, carving.CarveSettings(min_views=1)).occupied

@@ -1,16 +1,10 @@
 import numpy as np
-import pytest
 
 from app.drawing.curves import GROUPS, Plot, plots_of, samples
-from tracker.formats.model_toml import load_model, parse_model
+from tracker.formats.model_toml import parse_model
 from tracker.session.store.records import FramePose
 
 CAMERAS = ("front", "left")
-
-
-@pytest.fixture(scope="module")
-def gavrila():
-    return load_model("gavrila22")
 
 
 def by_title(model, group):

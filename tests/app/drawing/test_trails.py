@@ -7,13 +7,6 @@ from app.drawing.predicted_pose import prediction
 from app.drawing.trails import Trails
 from tracker.body.model import BodyModel
 from tracker.body.motion.pose_steps import PredictSettings
-from tracker.formats.model_toml import load_model
-
-
-@pytest.fixture(scope="module")
-def gavrila():
-    return load_model("gavrila22")
-
 
 NAMES = frozenset(("left_wrist", "head"))
 

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from plain_voxels import carve_plainly
+from plain_voxels import carve_plainly, project_plainly
 from solids import cameras_around, cylinder, ellipsoid, silhouettes_of
 
 from tracker.errors import TrackerError
@@ -67,14 +67,7 @@ def test_voxels_are_where_the_silhouettes_are():
     views = silhouettes_of([ellipsoid((0.05, 0, 0), AXES, TURNED)], cameras_around(4, LENS))
     voxels = carved(views, 0.015)
     points = voxels.grid.centers(np.argwhere(np.ones_like(voxels.occupied)))
-    margin = np.zeros(len(points), bool)
-    expected = np.ones(len(points), bool)
-    for view in views:
-        u, v = np.round(view.camera.project(points)).astype(int).T
-        inside = view.mask[np.clip(v, 0, 239), np.clip(u, 0, 319)]
-        around = [view.mask[np.clip(v + b, 0, 239), np.clip(u + a, 0, 319)] for a in (-1, 0, 1) for b in (-1, 0, 1)]
-        margin |= np.any(around, axis=0) & ~np.all(around, axis=0)
-        expected &= inside
+    expected, margin = project_plainly(views, points)
     assert np.array_equal(voxels.occupied.ravel()[~margin], expected[~margin])
     assert margin.mean() < 0.2
 

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from fisheye import with_fisheye
-from plain_voxels import carve_plainly
+from plain_voxels import carve_plainly, project_plainly
 from solids import ellipsoid, silhouettes_of
 from staging import camera_at
 
@@ -57,12 +57,7 @@ def test_voxels_are_where_the_silhouettes_are():
     voxels = carver.carve(grid)
     assert np.array_equal(voxels.occupied, carve_plainly(carver, grid, CarveSettings()))
     points = grid.centers(np.argwhere(np.ones_like(voxels.occupied)))
-    margin, expected = np.zeros(len(points), bool), np.ones(len(points), bool)
-    for view in seen:
-        u, v = np.round(view.camera.project(points)).astype(int).T
-        around = [view.mask[np.clip(v + b, 0, 299), np.clip(u + a, 0, 399)] for a in (-1, 0, 1) for b in (-1, 0, 1)]
-        margin |= np.any(around, axis=0) & ~np.all(around, axis=0)
-        expected &= view.mask[np.clip(v, 0, 299), np.clip(u, 0, 399)]
+    expected, margin = project_plainly(seen, points)
     assert expected.sum() > 500
     assert np.array_equal(voxels.occupied.ravel()[~margin], expected[~margin])
 
