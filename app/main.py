@@ -40,8 +40,8 @@ from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
 from app.runtime.malloc_trim import give_back_freed_memory
 from app.runtime.plain_output import PlainOutput, printable
-from tracker.compute.distribution import program_version
 from tracker.compute.extensions import pass_over_unread_packages
+from tracker.compute.installed_package import program_version
 from tracker.errors import TrackerError
 
 pass_over_unread_packages()  # as this module is imported, so that processes that it starts do, too

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from tracker.compute.distribution import install_command
+from tracker.compute.installed_package import install_command
 from tracker.errors import Remedy, TrackerError
 
 

@@ -159,7 +159,7 @@ def own_module(name: str) -> list[str]:
     return [sys.executable, "-P", "-c", run]
 
 
-def start_apart(command: Sequence[str], **more: Any) -> "subprocess.Popen[bytes]":
+def start_detached(command: Sequence[str], **more: Any) -> "subprocess.Popen[bytes]":
     """Start a program that Ctrl+C in this one's terminal does not reach; `end_apart` ends it."""
     if sys.platform == "win32":
         return subprocess.Popen(command, creationflags=subprocess.CREATE_NEW_PROCESS_GROUP, **more)
@@ -181,7 +181,7 @@ def end_apart(process: "subprocess.Popen[bytes]") -> None:
     process.wait()
 
 
-def start_beside(work: Callable[..., None], *arguments: Any) -> Any:
+def start_child(work: Callable[..., None], *arguments: Any) -> Any:
     """Start work in a process that ends with this one: a copy where the system has them, else a new interpreter."""
     context: Any = multiprocessing.get_context("fork" if FORKS else "spawn")
     process = context.Process(target=work, args=arguments, daemon=True)
@@ -189,7 +189,7 @@ def start_beside(work: Callable[..., None], *arguments: Any) -> Any:
     return process
 
 
-def give_way() -> None:
+def lower_priority() -> None:
     """Lower the priority of this process below all that somebody waits for."""
     if sys.platform == "win32":
         psutil.Process().nice(psutil.IDLE_PRIORITY_CLASS)

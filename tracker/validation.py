@@ -74,7 +74,7 @@ Time: TypeAlias = Annotated[
 The year is from 1 to 9998, so that later times can follow."""
 
 
-def same_form(name: str) -> str:
+def nfc_name(name: str) -> str:
     """Return a name in the one Unicode form in which names are compared (NFC).
 
     A Mac stores a letter and its accent apart, so that a file's name differs from the same name typed.

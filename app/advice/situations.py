@@ -60,7 +60,7 @@ def _failed(state: State, _: StoredWork) -> Iterator[Advice]:
 
 
 def _no_depth(state: State, stored: StoredWork) -> Iterator[Advice]:
-    note = state.unseen_depth
+    note = state.undetermined_depth
     if note is None:
         return
     view, (point, *others) = stored.cameras[note.unseen.camera], note.unseen.points

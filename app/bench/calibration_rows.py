@@ -9,11 +9,11 @@ from scipy.sparse import csr_matrix
 from app.bench.rows import Row, Yardstick, in_yardsticks
 from tracker.calibration.check.lens_priors import CALIBRATED, prior_sigmas
 from tracker.calibration.check.point_problem import PointProblem, triangulate_all
-from tracker.calibration.check.reprojection import Observations, Prior, Rig
+from tracker.calibration.check.rig_adjustment import Observations, Prior, Rig
 from tracker.estimation.fitting.bundle import solve_bundle
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_columns import POSE, camera_difference, moved_camera, n_columns
+from tracker.geometry.camera_derivatives import POSE, camera_difference, moved_camera, n_camera_parameters
 from tracker.geometry.cameras import Camera
 
 _N_CAMERAS, _N_POINTS, _NOISE_PX, _SIGMA_PX = 4, 1200, 0.5, 5.0
@@ -49,7 +49,7 @@ def _problem() -> tuple[PointProblem, Rig]:
     seen = Observations(np.repeat(np.arange(_N_CAMERAS), _N_POINTS), np.tile(np.arange(_N_POINTS), _N_CAMERAS), px)
     moved = []
     for camera in cameras:
-        step = np.zeros(n_columns(camera))
+        step = np.zeros(n_camera_parameters(camera))
         step[POSE] = random.normal(size=6) * ([np.radians(0.5)] * 3 + [0.02] * 3)
         moved.append(moved_camera(camera, step))
     prior = Prior(tuple(moved), tuple(prior_sigmas(c, CALIBRATED, lens=False) for c in moved))

@@ -23,7 +23,7 @@ from tracker.errors import SessionError
 from tracker.estimation.posing.default_pose import default_pose
 from tracker.estimation.posing.drag import drag
 from tracker.estimation.posing.grab import grab
-from tracker.estimation.search.chamfer_cost import ChamferCost, measure_nothing
+from tracker.estimation.search.chamfer_cost import ChamferCost, compile_measure_kernels
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.contours.part_edges import points_occluded
 from tracker.evidence.observer import open_observer
@@ -32,7 +32,7 @@ from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
 from tracker.session.lock import SessionLock
 from tracker.session.session import Session, load_session
-from tracker.system import give_way, start_beside
+from tracker.system import lower_priority, start_child
 
 if TYPE_CHECKING:
     from tracker.estimation.chamfer.settings import TrackSettings
@@ -83,9 +83,9 @@ def _call_kernels(background: bool, reached: Callable[[str], None]) -> None:
     importing the program takes as long as a tenth of its work.
     """
     session = load_session(bundled("tango"))
-    beside = start_beside(_compile_evidence, session, background) if background else None
+    beside = start_child(_compile_evidence, session, background) if background else None
     if beside is not None:
-        give_way()
+        lower_priority()
     try:
         bodies = _compile_posing(session)
         cameras = [c.camera for c in session.cameras]
@@ -121,8 +121,8 @@ def _compile_evidence(session: Session, background: bool) -> None:
         views = observer.evidence(_FRAME)
     record_stage("evidence")
     if background:
-        give_way()
-    measure_nothing(views, tuple(p.model for p in session.people))
+        lower_priority()
+    compile_measure_kernels(views, tuple(p.model for p in session.people))
 
 
 def _call_tracking(session: Session) -> None:
@@ -144,9 +144,9 @@ def _call_others(session: Session) -> None:
     They label parts in an image, carve and label voxels, compare bodies with silhouettes, film simulated people, learn
     what is usual in a run, and check its cameras.
     """
-    from tracker.estimation.acquisition.part_motions import N_MOTIONS
+    from tracker.estimation.acquisition.part_derivatives import N_MOTIONS
     from tracker.estimation.acquisition.piece_sums import sums_of_views
-    from tracker.estimation.by_frame.part_evidence import learn_run
+    from tracker.estimation.by_frame.part_evidence import learn_usual_evidence
     from tracker.estimation.fitting.contour_residuals import ContourResiduals
     from tracker.estimation.initialization.generators.silhouette_overlap import SilhouetteOverlap
     from tracker.estimation.voxel.body_pose import state_of
@@ -176,7 +176,7 @@ def _call_others(session: Session) -> None:
     overlap.added(body.kinematics.Ts_world_part[None], np.arange(len(model.parts)), overlap.nothing())
     with open_observer(sources) as observer:
         frames = [(k, (body,)) for k in range(_FRAME, _FRAME + _FRAMES)]
-        learn_run(observer, frames)
+        learn_usual_evidence(observer, frames)
         (view, *_) = observer.evidence(_FRAME)
     _, pieces = ContourResiduals([view], [body]).piece_sums(body.kinematics)
     sums_of_views([(view.camera, pieces)], model, body.kinematics, N_MOTIONS)

@@ -10,7 +10,7 @@ from app.bench.sample_frames import BenchFrame, pose_at
 from tracker.body.model import PosedBody
 from tracker.body.motion.pose_path import PosePath
 from tracker.calibration.check.diagnosis import Diagnosis, diagnose
-from tracker.calibration.check.viewed_frames import ViewedFrame
+from tracker.calibration.check.judged_frames import JudgedFrame
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.tracking.view_regions import regions
 from tracker.evidence.observer import open_observer
@@ -55,9 +55,9 @@ def _true_poses(frame: BenchFrame) -> dict[int, Array]:
     return poses
 
 
-def _seen(frame: BenchFrame, poses: Mapping[int, Array], correction: Array) -> list[ViewedFrame]:
+def _seen(frame: BenchFrame, poses: Mapping[int, Array], correction: Array) -> list[JudgedFrame]:
     """Read frames on which people have their true poses, with a correction of the first camera."""
-    session, out = frame.session, list[ViewedFrame]()
+    session, out = frame.session, list[JudgedFrame]()
     with open_observer(session.cameras) as observer:
         for k in np.linspace(2, session.n_frames - 3, _N_FRAMES).round().astype(int).tolist():
             body = PosedBody(frame.model, poses[k])
@@ -65,5 +65,5 @@ def _seen(frame: BenchFrame, poses: Mapping[int, Array], correction: Array) -> l
             views = (replace(first, camera=corrected(first.camera, correction)), *others)
             path = PosePath.around(frame.model, poses, k, session.fps)
             time_s = (k - session.n_frames / 2) / session.fps
-            out.append(ViewedFrame(k, views, (body,), (path,), time_s, (0.0,) * len(views)))
+            out.append(JudgedFrame(k, views, (body,), (path,), time_s, (0.0,) * len(views)))
     return out

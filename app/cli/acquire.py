@@ -151,7 +151,7 @@ def acquire(
                 advance(share)
 
             found = acquire_body(
-                session, Observer(session.cameras, recording).in_time(), person, frames, settings, report
+                session, Observer(session.cameras, recording).at_nearest_times(), person, frames, settings, report
             )
         changes = size_changes(found)
         if store:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, TypeVar, get_args, get_origin, get_type_h
 import tyro
 
 from tracker.errors import TrackerError
-from tracker.validation import same_form
+from tracker.validation import nfc_name
 
 T = TypeVar("T")
 
@@ -91,11 +91,11 @@ def parse_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> 
             out[name] = kind(value)
         except ValueError:
             raise TrackerError(f"expected {option} as NAME=VALUE, found '{word}'") from None
-        if same_form(name) in given:
+        if nfc_name(name) in given:
             raise TrackerError(
-                f"expected {option} once for '{name}', found {given[same_form(name)]} and {word}; leave one out"
+                f"expected {option} once for '{name}', found {given[nfc_name(name)]} and {word}; leave one out"
             )
-        given[same_form(name)] = word
+        given[nfc_name(name)] = word
     return out
 
 

@@ -77,7 +77,7 @@ def audit(at: Target, frames: range, replaces: bool, progress: Reporter) -> dict
         people = tuple(i for i in people if store.frames(session.people[i].name)) or people
         plan = AuditPlan(frames, people, TrackSettings(), replaces)
         with progress.share("comparing poses") as advance:
-            audit = PoseAudit(session, store, Observer(session.cameras, recording).in_time(), plan)
+            audit = PoseAudit(session, store, Observer(session.cameras, recording).at_nearest_times(), plan)
             rows = result_of(mapped(audit.steps(), advance))
         if rows:
             store.commit(f"audit frames {rows[0].frame}:{rows[-1].frame + 1}", rows, by_program=True)

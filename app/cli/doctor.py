@@ -16,7 +16,7 @@ from typing import Any
 from platformdirs import user_cache_path, user_state_path
 
 from app.runtime.json_output import format_json
-from tracker.compute.distribution import DISTRIBUTION, install_command, program_version
+from tracker.compute.installed_package import DISTRIBUTION, install_command, program_version
 from tracker.system import HAS_BROWSER, free_bytes, n_cores
 
 WORKER_BYTES = 5 << 29

@@ -174,7 +174,7 @@ def _format(found: dict[str, Any]) -> str:
 
 def _lost(found: dict[str, Any]) -> str:
     """List the lost frames as ranges, with the joint that is off most in them."""
-    from tracker.session.clocks import listed_frames
+    from tracker.session.row_placement import listed_frames
 
     lost = set(found["lost_frame_numbers"])
     measured = [e for e in found["per_frame"] if e.frame in lost and e.worst_mm is not None]

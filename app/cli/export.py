@@ -231,7 +231,7 @@ def _refuse_without_like(arguments: ExportArguments) -> None:
 
 def _send_back(arguments: ExportArguments) -> None:
     """Write the files of observations, with the points of mended poses replaced."""
-    from tracker.interchange.exports.like.sending import export_like
+    from tracker.interchange.exports.like.patched_files import export_patched
     from tracker.interchange.observations.stored import load_observations
     from tracker.session.session import load_session
 
@@ -243,7 +243,7 @@ def _send_back(arguments: ExportArguments) -> None:
         raise TrackerError(f"expected one session with --like, found {len(arguments.sessions)}; send each back alone")
     session = load_session(arguments.sessions[0])
     observations = load_observations(session, arguments.like or "")
-    done = export_like(
+    done = export_patched(
         session, observations, arguments.out, arguments.poses or "edited", not arguments.plain_joints,
         arguments.exchange_sides,
     )  # fmt: skip

@@ -189,7 +189,7 @@ def init_from_footage(
     Raises:
         TrackerError: everybody has a pose, or no frame shows the people well enough; nothing is stored then.
     """
-    from tracker.pipeline.chain import open_stored_session, unplaced
+    from tracker.pipeline.automatic_run import open_stored_session, unplaced
     from tracker.pipeline.find_people import find_people
 
     def report(stage: str, share: float, text: str = "", /) -> None:

@@ -47,7 +47,7 @@ def command(
     from app.runtime.kernel_compiler import KernelCompiler
     from app.runtime.restart import restart
     from app.server.address import Serving
-    from app.server.doorway import Doorway
+    from app.server.startup_server import StartupServer
     from app.session.annotator import set_annotator
     from app.session.samples import DEFAULT_SAMPLE, sample_copy
     from tracker.session.folder import session_folder
@@ -62,7 +62,7 @@ def command(
     folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
     folder = session_folder(folder)
     serving = Serving(host, port, allow_host, browser, token, share)
-    with SessionLock(folder), Doorway(serving) as doorway, closing(KernelCompiler()) as compiler:
+    with SessionLock(folder), StartupServer(serving) as doorway, closing(KernelCompiler()) as compiler:
         # These imports take seconds: the doorway answers meanwhile, and kernels are compiled. Objects made here stay.
         gc.disable()
         from app.cli.target import load_target

@@ -29,7 +29,7 @@ def load_target(folder: Path, person: str | None, several: bool) -> Target:
         SessionError: there is no such person, or a name is needed.
     """
     from tracker.session.session import load_session
-    from tracker.validation import same_form
+    from tracker.validation import nfc_name
 
     session = load_session(folder)
     names = [p.name for p in session.people]
@@ -37,10 +37,10 @@ def load_target(folder: Path, person: str | None, several: bool) -> Target:
         if several or len(names) == 1:
             return Target(session, tuple(range(len(names))))
         raise SessionError(f"the session has several people: say --person, one of {', '.join(names)}")
-    compared = [same_form(name) for name in names]
-    if same_form(person) not in compared:
+    compared = [nfc_name(name) for name in names]
+    if nfc_name(person) not in compared:
         raise SessionError(f"expected --person to be one of {', '.join(names)}, found '{person}'")
-    return Target(session, (compared.index(same_form(person)),))
+    return Target(session, (compared.index(nfc_name(person)),))
 
 
 def parse_frames(text: str | None, session: "Session") -> range:

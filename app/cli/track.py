@@ -17,7 +17,7 @@ from tracker.pipeline.methods import METHODS, all_options
 
 if TYPE_CHECKING:
     from tracker.estimation.tracking.tracker import TrackerSettings
-    from tracker.pipeline.chain import ChainPlan
+    from tracker.pipeline.automatic_run import ChainPlan
     from tracker.pipeline.stored_run import TrackPlan
     from tracker.session.session import Session
 
@@ -109,7 +109,7 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     it and keeps the poses found so far; run it again to resume.
     """
     from app.cli.track_report import format_stretches, format_summary
-    from tracker.pipeline.chain import ChainPlan
+    from tracker.pipeline.automatic_run import ChainPlan
     from tracker.pipeline.find_people import FindSettings
     from tracker.pipeline.stored_run import TrackPlan
     from tracker.session.matching import check_names
@@ -186,7 +186,7 @@ def _detected(name: str | None, session: "Session", frames: range, reporter: Rep
 
 def _track_keypoints(at: Target, frames: Sequence[int], arguments: TrackArguments) -> dict[str, Any]:
     """Store poses by key points alone; return `people` with the number of poses of each."""
-    from tracker.pipeline.chain import open_stored_session, unplaced
+    from tracker.pipeline.automatic_run import open_stored_session, unplaced
     from tracker.pipeline.keypoint_evidence import find_by_keypoints
 
     assert arguments.of is not None
@@ -279,7 +279,7 @@ def track(session: "Session", plan: "ChainPlan", progress: Reporter) -> dict[str
         SessionError: a person has no pose at or before the first frame.
     """
     from app.cli.track_report import ChainProgress, summarize
-    from tracker.pipeline.chain import open_stored_session, run_chain
+    from tracker.pipeline.automatic_run import find_and_track, open_stored_session
 
     is_stopped = False
     with open_stored_session(session) as opened, ChainProgress(progress) as sink:
@@ -289,7 +289,7 @@ def track(session: "Session", plan: "ChainPlan", progress: Reporter) -> dict[str
             if plan.find is None and not plan.acquire:
                 opened.track(plan.track, sink)
             else:
-                run_chain(plan, opened, sink)
+                find_and_track(plan, opened, sink)
         except KeyboardInterrupt:
             is_stopped = opened.run is None or not opened.run.finished
     if opened.run is None or opened.plan is None:
@@ -315,7 +315,7 @@ def track_between(session: "Session", plan: "TrackPlan", progress: Reporter) -> 
         TrackerError: nobody has two keyframes with other frames between them.
     """
     from app.cli.track_report import ChainProgress, summarize
-    from tracker.pipeline.chain import open_stored_session
+    from tracker.pipeline.automatic_run import open_stored_session
     from tracker.pipeline.keyframe_stretches import frames_of
 
     if not plan.settings.whole_run:

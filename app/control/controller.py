@@ -30,11 +30,11 @@ from app.control.session.footage_scan import FootageScan
 from app.control.session.history import History
 from app.control.session.kernel_warmup import KernelWarmup
 from app.control.session.other_copy import OtherCopies
+from app.control.session.peer_changes import FollowingHost, PeerChanges
 from app.control.session.proposing import Proposing
 from app.control.session.save_retry import SaveRetry
 from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
-from app.control.session.taking_over import FollowingHost, TakingOver
 from app.control.tracking.calibrating import Calibrating
 from app.control.tracking.clocks import Clocks
 from app.control.tracking.comparing_runs import ComparingRuns
@@ -163,7 +163,7 @@ class Controller:
         )
         """Finds frames and keyframes that disagree with those around them."""
         self.tracking.after_run = self.comparing_runs.compare_run
-        self._taking_over = TakingOver(session_state, self.search.forget_paused)
+        self._taking_over = PeerChanges(session_state, self.search.forget_paused)
         self._following: FollowingHost | None = None
         if host is not None:
             self._following = FollowingHost(session_state, host.session_state, activities.finish_gestures)

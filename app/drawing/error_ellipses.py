@@ -23,7 +23,7 @@ def error_ellipses(session: Session, state: State, view: View) -> list[Path]:
     """Draw the error ellipses of the selected person in the views that a page shows; none where no errors are known."""
     state = state.drawn
     person, shown = state.person, state.people[state.person]
-    if "errors" not in view.layers or shown.errors is None or person in state.undrawn:
+    if "errors" not in view.layers or shown.errors is None or person in state.people_not_drawn:
         return []
     info, out = session.people[person], []
     body = bodies_in(session, state)[person]

@@ -23,7 +23,7 @@ def ghost_lines(session: Session, state: State, view: View) -> list[Path]:
     if reason is None or "alternatives" not in view.layers or "contours" not in state.compiled:
         return out
     person, model = reason.person, state.models[reason.person]
-    if person in state.undrawn:
+    if person in state.people_not_drawn:
         return out
     times = picture_times(session, state.frame, view.cameras)
     for other in reason.alternatives or ():
@@ -40,7 +40,7 @@ def copy_lines(session: Session, state: State, view: View) -> list[Path]:
     times = picture_times(session, state.frame, view.cameras)
     for person, poses in enumerate(copy.poses):
         body = poses.get(state.frame)
-        if body is not None and person not in state.undrawn:
+        if body is not None and person not in state.people_not_drawn:
             out += _outlined(session, times, body, person, "other_copy", np.arange(len(body.model.parts)))
     return out
 

@@ -88,7 +88,7 @@ def _handles(
 ) -> dict[int, list[Handle]]:
     """Return the handles of all visible people in views of one time, by index of the view."""
     points, views = [b.points_world for b in bodies], [session.cameras[index].camera.pinhole for index in cameras]
-    undrawn = state.undrawn
+    people_not_drawn = state.people_not_drawn
     if "contours" in state.compiled:
         occluded = part_edges.points_occluded_by_body(bodies, views, np.concatenate(points))
     else:  # the kernels are being compiled: every joint can be grabbed
@@ -102,7 +102,7 @@ def _handles(
             px, held = camera.project(points[person]), state.held_points(person)
             is_in_front = np.all(np.isfinite(px), axis=1)
             for i, (name, (u, v)) in enumerate(zip(body.model.point_names, px.tolist(), strict=True)):
-                if person not in undrawn and is_in_front[i]:
+                if person not in people_not_drawn and is_in_front[i]:
                     is_visible, by, is_held = not hidden[first + i], occluders[first + i], name in held
                     out[index].append(Handle(index, person, name, u, v, is_visible, by, is_held, side_of(name)))
             first += len(px)

@@ -122,10 +122,10 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     if state.drag is not None and "epipolar" in view.layers:
         out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
     # A person who is sought and has no pose yet is drawn by candidates alone.
-    undrawn, hidden = state.undrawn, state.visibility.hidden
+    people_not_drawn, hidden = state.people_not_drawn, state.visibility.hidden
     return [
         p for p in out
-        if p.kind not in _PERSON_KINDS or p.person not in (hidden if p.kind == "candidate" else undrawn)
+        if p.kind not in _PERSON_KINDS or p.person not in (hidden if p.kind == "candidate" else people_not_drawn)
     ]  # fmt: skip
 
 

@@ -34,14 +34,14 @@ def part_hulls(session: Session, state: State, view: View) -> list[PartOutline]:
     drag = state.drag
     if "joints" not in view.layers or not state.is_stored_drawn or (drag is not None and not drag.by_surface):
         return []
-    out, undrawn, found = [], state.undrawn, dict[int, list[picking.PartHull]]()
+    out, people_not_drawn, found = [], state.people_not_drawn, dict[int, list[picking.PartHull]]()
     for time, group in at_one_time(picture_times(session, state.frame, view.cameras)):
         cameras = [session.cameras[index].camera.pinhole for index in group]
         hulls = picking.part_hulls(ahead(bodies_in(session, state), time), cameras)
         found |= dict(zip(group, hulls, strict=True))
     for index in sorted(found):
         for one in found[index]:
-            if one.body in undrawn:
+            if one.body in people_not_drawn:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
                 out.append(PartOutline(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))

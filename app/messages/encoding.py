@@ -114,7 +114,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         compared_run=view.compared_run,
         preview=None if view.preview is None else made_of(wire.PreviewedCandidate, view.preview),
         compared=None if compared is None else made_of(wire.Compared, compared),
-        view_across=None if state.unseen_depth is None else state.unseen_depth.unseen.camera,
+        view_across=None if state.undetermined_depth is None else state.undetermined_depth.unseen.camera,
         track=made_of(wire.Track, state.track),
         range=made_of(wire.RangeWork, state.ranges),
         floor=_floor(state.floor.picking),
@@ -277,7 +277,7 @@ def epipolar(session: Session, state: State, points: Sequence[tuple[int, float, 
     """Describe the line of sight of a pixel, by the corrected cameras while they are previewed."""
     mended = state.calibration.shown_on(state.frame)
     cameras = [c.camera for c in session.cameras] if mended is None else mended.cameras
-    bodies = [b for i, b in enumerate(bodies_in(session, state)) if i not in state.undrawn]
+    bodies = [b for i, b in enumerate(bodies_in(session, state)) if i not in state.people_not_drawn]
     found = epipolar_check(cameras, [(c, np.array([u, v])) for c, u, v in points], bodies)
     return wire.EpipolarMessage(found.lines, found.distance)
 

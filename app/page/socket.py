@@ -29,7 +29,7 @@ from app.page.inbox import FloodError, Inbox
 from app.participants.participants import Participants, Visit
 from app.participants.presence_feed import PresenceFeed
 from app.remedies import page_text
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.page_view import View
 from app.state.role import Role
 from app.state.state import State
@@ -335,8 +335,8 @@ class PageConnection:
         """Send the lines of the pixel that the page asks about, if they changed."""
         made_from: tuple[object, ...] = (self._epipolar,)
         if self._epipolar:
-            shown = tuple(Identity(p.values) for p in state.people)
-            preview = Identity(state.calibration.shown_on(state.frame))
+            shown = tuple(ObjectIdentity(p.values) for p in state.people)
+            preview = ObjectIdentity(state.calibration.shown_on(state.frame))
             made_from += (state.frame, shown, state.calibration.n_changes, preview)
         if made_from != self._sent_epipolar:
             self._sent_epipolar = made_from

@@ -16,7 +16,7 @@ from app.control.controller import Controller
 from app.state.role import Role
 from app.state.state import State
 from tracker.errors import TrackerError
-from tracker.session.store.annotator import checked_annotator, one_form
+from tracker.session.store.annotator import checked_annotator, normalized_annotator
 from tracker.validation import quoted
 
 _MAX_PEOPLE = 12
@@ -252,7 +252,7 @@ def joined_name(text: str) -> str:
     Raises:
         TrackerError: it is too long, has no letter or digit, or has characters that nobody can see or tell apart.
     """
-    name = one_form(text)
+    name = normalized_annotator(text)
     if not name:
         return ""
     if len(name) > MAX_CHARACTERS:

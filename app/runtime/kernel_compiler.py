@@ -3,9 +3,9 @@
 import subprocess
 from collections.abc import Sequence
 
-from tracker.compute.interpretation import interpret_modules
 from tracker.compute.kernel_cache import STAGES, compiled_stages, is_compiled
-from tracker.system import end_apart, own_module, start_apart
+from tracker.compute.uncompiled_kernels import interpret_modules
+from tracker.system import end_apart, own_module, start_detached
 
 COMMAND = (*own_module("app.bench.compile_kernels"), "--background")
 _POSING = "posing"
@@ -23,7 +23,7 @@ class KernelCompiler:
         self._process: subprocess.Popen[bytes] | None = None
         if not is_compiled():
             # Ctrl+C in a terminal reaches all that it started; only this program may end the process.
-            self._process = start_apart(command)
+            self._process = start_detached(command)
             if _POSING not in compiled_stages():
                 interpret_modules("tracker.body.kinematics")
 

@@ -9,7 +9,7 @@ import viser
 from app.control.controller import Controller
 from app.scene3d.meshes import PeopleMeshes
 from app.state.floor_picking import FloorState
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.state import State
 from tracker.body.model import BodyModel
 from tracker.estimation.posing.character import drive_character
@@ -55,7 +55,7 @@ class CharacterLayer:
             self._meshes = PeopleMeshes(self._server, "/characters", cast)
 
     def _pose(self, state: State) -> None:
-        wanted = (*map(Identity, state.poses), state.models, state.floor, state.view_3d, state.undrawn)
+        wanted = (*map(ObjectIdentity, state.poses), state.models, state.floor, state.view_3d, state.people_not_drawn)
         if self._meshes is None or wanted == self._drawn:
             return
         self._drawn = wanted
@@ -63,7 +63,7 @@ class CharacterLayer:
         poses = driven(state.models, state.poses, self._characters, state.floor, cameras)
         self._meshes.pose(poses)
         absent = frozenset(i for i, pose in enumerate(poses) if pose is None)
-        self._meshes.set_appearance(replace(state.view_3d, bodies=True), state.undrawn | absent, frozenset())
+        self._meshes.set_appearance(replace(state.view_3d, bodies=True), state.people_not_drawn | absent, frozenset())
 
 
 def driven(

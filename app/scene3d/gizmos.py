@@ -89,7 +89,7 @@ class Gizmos:
         joint = joint_of(model, state.point)
         Ts = model.kinematics(values).Ts_world_part
         is_busy = state.track.running or state.search.running or not state.is_stored_drawn
-        shown = not is_busy and state.person not in state.undrawn
+        shown = not is_busy and state.person not in state.people_not_drawn
         with self._server.atomic():
             for which, part in (("root", 0), ("joint", joint)):
                 handle = self._handles[which]

@@ -16,7 +16,7 @@ from app.scene3d.meshes import PeopleMeshes
 from app.scene3d.throttle import Throttle
 from app.scene3d.voxel_layer import VoxelLayer
 from app.state.floor_picking import FloorState
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.state import State
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
@@ -70,7 +70,7 @@ class SceneView:
             self._show_bodies(state)
             self._show_appearance(state)
             self._show_floor(state.floor)
-            poses = tuple(map(Identity, state.poses))
+            poses = tuple(map(ObjectIdentity, state.poses))
             if poses != self._drawn_poses:
                 self._drawn_poses = poses
                 self._people.pose(state.poses)
@@ -114,7 +114,7 @@ class SceneView:
 
     def _show_appearance(self, state: State) -> None:
         others = frozenset(range(len(state.people))) - {state.person}
-        appearance = (state.view_3d, state.undrawn, others if state.visibility.solo else frozenset())
+        appearance = (state.view_3d, state.people_not_drawn, others if state.visibility.solo else frozenset())
         if appearance == self._appearance:
             return
         self._appearance = appearance

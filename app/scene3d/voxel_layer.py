@@ -10,7 +10,7 @@ from app.control.controller import Controller
 from app.drawing.overlay_colors import rgb
 from app.remedies import page_text
 from app.runtime.jobs import LatestWinsWorker
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.state import State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
@@ -56,7 +56,7 @@ class VoxelLayer:
                 self._drawn = ()
                 self._draw(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), "")
             return
-        wanted = (state.frame, state.calibration.n_changes, *map(Identity, state.poses), state.models)
+        wanted = (state.frame, state.calibration.n_changes, *map(ObjectIdentity, state.poses), state.models)
         if wanted == self._drawn:
             return
         self._drawn = wanted

@@ -151,7 +151,7 @@ class ExportRoutes:
         Raises:
             TrackerError: there are no such observations, or their points cannot be replaced.
         """
-        from tracker.interchange.exports.like.sending import export_like
+        from tracker.interchange.exports.like.patched_files import export_patched
         from tracker.interchange.observations.stored import load_observations
         from tracker.session.session import load_session
 
@@ -161,7 +161,7 @@ class ExportRoutes:
         observations = load_observations(session, name)
         is_one = len(observations.sources) == 1
         # A single file keeps its name below an existing folder.
-        done = export_like(session, observations, folder if is_one else folder / name, poses)
+        done = export_patched(session, observations, folder if is_one else folder / name, poses)
         return done.paths[0] if is_one else _archive([folder / name], folder / f"{name}.zip")
 
     def _tick(self, request: web.Request) -> Callable[[], None]:

@@ -116,11 +116,11 @@ class ServedPage:
     def _serve_session(self) -> None:
         from app.runtime.kernel_compiler import KernelCompiler
         from app.server.address import Serving
-        from app.server.doorway import Doorway
+        from app.server.startup_server import StartupServer
         from app.server.workbench import open_session
 
         serving = Serving(port=self._port, browser=False)
-        with SessionLock(self._folder), Doorway(serving) as doorway, closing(KernelCompiler()) as compiler:
+        with SessionLock(self._folder), StartupServer(serving) as doorway, closing(KernelCompiler()) as compiler:
             session = load_session(self._folder)
             require_files(session)
 

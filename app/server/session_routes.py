@@ -88,7 +88,7 @@ class SessionRoutes:
         NewSessionRoutes(self._refusal).add_to(app)
 
     async def _started(self, request: web.Request) -> web.Response:
-        """Answer a page that waits for the program, as `Doorway` does before: no step is left."""
+        """Answer a page that waits for the program, as `StartupServer` does before: no step is left."""
         is_told = self._refusal is None and request[ROLE] == "host"
         folder = str(self._folder) if is_told else ""
         return web.json_response({"steps": [], "at": 0, "folder": folder})

@@ -21,7 +21,7 @@ from app.drawing.joint_handles import circles_around, head_surfaces
 from app.remedies import page_text
 from app.server.page_requests import require_page
 from app.session.footage_pictures import FootageCrops
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody, ahead
 from tracker.errors import TrackerError
@@ -50,7 +50,7 @@ class _Wanted(NamedTuple):
     colors: tuple[str, ...]
     is_blurred: bool
     """Whether heads are."""
-    cameras: Identity
+    cameras: ObjectIdentity
     """Of the session: corrected ones make another thumbnail."""
 
 
@@ -91,7 +91,7 @@ class Thumbnails:
                 frame, list(stored).index(person), limb, tuple(b.model for b in bodies),
                 tuple(b.values.tobytes() for b in bodies),
                 tuple(None if b.velocity is None else b.velocity.tobytes() for b in bodies),
-                colors, is_blurred, Identity(self._controller.session.cameras),
+                colors, is_blurred, ObjectIdentity(self._controller.session.cameras),
             )
         )  # fmt: skip
 

@@ -20,13 +20,13 @@ from app.scene3d.gizmos import Gizmos
 from app.scene3d.scene import SceneView
 from app.server.access import is_loopback
 from app.server.copy_routes import CopyRoutes
-from app.server.doorway import Doorway
 from app.server.export_routes import ExportRoutes
 from app.server.key_routes import KeyRoutes
 from app.server.observation_routes import ObservationRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever
 from app.server.session_routes import SessionRoutes, refusal
+from app.server.startup_server import StartupServer
 from app.server.static_files import static_folder
 from app.server.thumbnails import ThumbnailRoutes, Thumbnails
 from app.session import proxies
@@ -76,7 +76,7 @@ _BEGINNING = FirstView()
 
 def open_session(
     session: Session,
-    doorway: Doorway,
+    doorway: StartupServer,
     compiler: KernelCompiler,
     say: Callable[[str], None],
     first: FirstView = _BEGINNING,

@@ -15,10 +15,10 @@ from tracker.formats.calibrations.writing import write_layout
 from tracker.geometry.cameras import Camera
 
 if TYPE_CHECKING:
-    from tracker.calibration.boards.expected_error import VolumeError
+    from tracker.calibration.boards.expected_error import VolumeAccuracy
     from tracker.calibration.boards.footage_calibration import FilmedCalibration
     from tracker.calibration.check.held_out import HeldOut
-    from tracker.calibration.check.reprojection import RigFit
+    from tracker.calibration.check.rig_adjustment import RigFit
 
 
 def check_out(out: Path, overwrite: bool = False) -> None:
@@ -97,7 +97,8 @@ def error_words(record: dict[str, Any]) -> str:
 
 
 def shared_record(
-    rows: Sequence[dict[str, Any]], fit: "RigFit", held_out: "HeldOut", volume: "VolumeError", points_world: np.ndarray
+    rows: Sequence[dict[str, Any]], fit: "RigFit", held_out: "HeldOut", volume: "VolumeAccuracy",
+    points_world: np.ndarray,
 ) -> dict[str, Any]:  # fmt: skip
     """Return the entries that calibrations by boards and by people share.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.drawing import curves
 from tracker.body.model import BodyModel
-from tracker.compute.distribution import program_version
+from tracker.compute.installed_package import program_version
 from tracker.evidence.images.working_view import WorkingView
 from tracker.geometry.cameras import Camera
 from tracker.interchange.exports.motion import ExportedMotion, PersonMotion

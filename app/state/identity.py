@@ -6,14 +6,14 @@ from operator import is_
 
 
 @dataclass(frozen=True, eq=False)
-class Identity:
+class ObjectIdentity:
     """Equal to another only if both hold the same object, which stays alive so that no other can take its id."""
 
     value: object
 
     def __eq__(self, other: object) -> bool:
         """Compare by identity."""
-        return isinstance(other, Identity) and self.value is other.value
+        return isinstance(other, ObjectIdentity) and self.value is other.value
 
     def __hash__(self) -> int:
         """Hash by identity."""

@@ -10,7 +10,7 @@ from app.state.progress import WorkState
 from tracker.body.limbs import Search
 from tracker.body.model import BodyModel
 from tracker.body.motion.keyframe_doubts import RaisedView
-from tracker.estimation.posing.placed_depth import UnseenDepth
+from tracker.estimation.posing.placed_depth import UndeterminedDepth
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 
@@ -103,7 +103,7 @@ class DepthNote:
     """Index of the person."""
     values: Array
     """The pose, (n_values,)."""
-    unseen: UnseenDepth
+    unseen: UndeterminedDepth
 
 
 class KeyframeDoubt(NamedTuple):

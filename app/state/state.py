@@ -100,7 +100,7 @@ class EditPart:
     held: frozenset[HeldPoint] = frozenset()
     """Points that stay in place during drags, on all frames; until the program ends or they are released."""
     depth_note: DepthNote | None = None
-    """The last placement whose depth no view has shown; see `unseen_depth`."""
+    """The last placement whose depth no view has shown; see `undetermined_depth`."""
     locked: tuple[frozenset[int], ...] = ()
     """Indices of the locked degrees of freedom of each person."""
     draft: SizeDraft | None = None
@@ -247,7 +247,7 @@ class State(ShownFrame, Costs, ViewPart, EditPart, SearchPart, RunPart, ReviewPa
         return last if self.people[last.person].values is last.values else None
 
     @property
-    def unseen_depth(self) -> DepthNote | None:
+    def undetermined_depth(self) -> DepthNote | None:
         """The last placement whose depth no view has shown, if its pose is shown unchanged; None otherwise."""
         last = self.depth_note
         if last is None or last.frame != self.frame or self.is_dragging:
@@ -274,7 +274,7 @@ class State(ShownFrame, Costs, ViewPart, EditPart, SearchPart, RunPart, ReviewPa
         return self
 
     @property
-    def undrawn(self) -> frozenset[int]:
+    def people_not_drawn(self) -> frozenset[int]:
         """Indices of the people whom no view draws: hidden ones, and those who are sought and have no pose yet."""
         unplaced = (i for i in self.finding.sought if self.people[i].source is None)
         return self.visibility.hidden.union(unplaced)

@@ -23,7 +23,7 @@ from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.calibration_revisions import follow_history, outdated_frames, outdated_sizes
-from tracker.pipeline.seen_points import with_drag_ends, without_moved
+from tracker.pipeline.marked_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
 from tracker.session.store.annotation_store import AnnotationStore
@@ -349,7 +349,7 @@ class Saver:
         """
         self.shared.changed(self.moves, self._queue.retry(patient))
 
-    def require_turn(self, people: Iterable[int], frames: Iterable[int]) -> None:
+    def require_editable(self, people: Iterable[int], frames: Iterable[int]) -> None:
         """Check that nobody else works on poses of people, given by index, on frames.
 
         Raises:

@@ -11,10 +11,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from app.remedies import page_text
+from app.storage.edit_claims import EditClaims
 from app.storage.frame_index import FrameIndex
 from app.storage.rescue_file import UnsavedEdit
 from app.storage.revisions import ModelRevisions
-from app.storage.turns import Turns
 from tracker.errors import OvertakenEditError, SessionError, TrackerError
 from tracker.session.session import Session
 from tracker.session.store.annotation_store import AnnotationStore
@@ -39,7 +39,7 @@ class SharedStorage:
         """The bodies that poses were made with."""
         self.index = FrameIndex(store, [p.name for p in session.people])
         """The frames that have poses."""
-        self.turns = Turns()
+        self.turns = EditClaims()
         """Those who work on it."""
         self.has_several = store.setting(_TOGETHER, False) is True
         """Whether several people have worked on the session at a time: each undoes only their own edits since."""

@@ -42,7 +42,7 @@ def fitted_once(model, targets_world, near=None, centers=False):
 @pytest.fixture
 def film_once(monkeypatch):
     """Look at the sample's footage for what imported points are compared with, but at the same frames only once."""
-    film = examine.film_people
+    film = examine.segment_filmed_people
 
     def filmed(session, frames):
         asked = session.name, frames.tobytes()

@@ -20,7 +20,7 @@ from between_keyframes import LOST_MM, errors
 from doc_tables import Conditions, benchmark_parser, read_words, show, table
 from joint_errors import references_of
 
-from tracker.annotation.expected_error import contradicted_keyframes, joint_units
+from tracker.annotation.expected_error import contradicted_keyframes, correctable_joints
 from tracker.annotation.next_click import Proposals, propose
 from tracker.api.work import ProgressSink
 from tracker.body.limbs import limb_display_name, limbs
@@ -29,7 +29,7 @@ from tracker.estimation.posing.grab import Constraints
 from tracker.estimation.posing.pinned_fit import fit_frame
 from tracker.evaluation.references import read_joints
 from tracker.geometry.triangulation import PointObservation
-from tracker.pipeline.chain import open_stored_session
+from tracker.pipeline.automatic_run import open_stored_session
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
@@ -154,7 +154,7 @@ class Annotator:
 
 def unit_of(model, unit: str) -> tuple[list[str], np.ndarray]:
     """Return the joints of a limb or of the trunk, and the degrees of freedom that move them."""
-    known = joint_units(model)
+    known = correctable_joints(model)
     names = [n for n, u in zip(known.joints, known.unit_of, strict=True) if known.units[u] == unit]
     limb = next((x for x in limbs(model) if limb_display_name(x.name) == unit), None)
     return names, ~np.any([x.dofs for x in limbs(model)], axis=0) if limb is None else limb.dofs
@@ -200,7 +200,7 @@ def spread(at: Annotator, n: int) -> None:
     frames = np.linspace(0, at.session.n_frames, n + 2).round().astype(int)[1:-1]
     for person, who in enumerate(at.session.people):
         for frame in frames:
-            for unit in joint_units(who.model).units:
+            for unit in correctable_joints(who.model).units:
                 at.correct(Action(int(frame), person, unit, (0, 1)))
     at.track(range(at.session.n_frames), tuple(range(len(at.session.people))))
     at.measure()

@@ -16,7 +16,7 @@ from doc_tables import Conditions, benchmark_parser, read_words, show, table, wo
 from joint_errors import area_cell
 
 from tracker.api.work import ProgressSink
-from tracker.estimation.acquisition.from_keypoints import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import PersonObservations
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.pose_errors import OFF_M
 from tracker.evaluation.judging.judge import Judgement, judge, judge_person
@@ -58,7 +58,7 @@ class Truth(NamedTuple):
 
     joints: MarkerTable
 
-    def off(self, points: BodyPoints, frame: int, limb: str) -> bool | None:
+    def off(self, points: PersonObservations, frame: int, limb: str) -> bool | None:
         """Return whether a limb of some joints is off; None where that is not known."""
         row = np.flatnonzero(self.joints.frames == frame)
         known = [n for n in LIMBS[limb] if n in points.names and n in self.joints.names]
@@ -137,7 +137,7 @@ def cells(found: list[Judgement], truth: Truth) -> list[str]:
     return [f"{is_off.sum()} of {len(off)}", area_cell(score, is_off, 3), wrong, *percent]
 
 
-def injected(points: BodyPoints, random: np.random.Generator) -> BodyPoints:
+def injected(points: PersonObservations, random: np.random.Generator) -> PersonObservations:
     """Return joints with errors: legs exchanged, limbs that drift, joints that jump."""
     joints, at = points.joints_world.copy(), {n: i for i, n in enumerate(points.names)}
     for _ in range(INJECTED):
@@ -158,7 +158,7 @@ def injected(points: BodyPoints, random: np.random.Generator) -> BodyPoints:
     return replace(points, joints_world=joints)
 
 
-def _true(points: BodyPoints, truth: MarkerTable) -> np.ndarray:
+def _true(points: PersonObservations, truth: MarkerTable) -> np.ndarray:
     out = np.full_like(points.joints_world, np.nan)
     for i, name in enumerate(points.names):
         if name in truth.names:

@@ -24,7 +24,7 @@ from doc_tables import Conditions, benchmark_parser, read_words, show, table
 from filmed_people import aligned, blanks, dancing, observed, rig
 
 from tracker.calibration.check.point_problem import triangulate_all
-from tracker.calibration.check.reprojection import Observations
+from tracker.calibration.check.rig_adjustment import Observations
 from tracker.calibration.self_calibration.keypoint_calibration import calibrate_by_person
 from tracker.calibration.self_calibration.person_calibration import PersonCalibration
 from tracker.calibration.self_calibration.person_files import footage_session, plan_of_files

@@ -21,7 +21,7 @@ from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.method import Method, Option, PaperMode
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain
+from tracker.pipeline.automatic_run import ChainPlan, StoredSession, find_and_track
 from tracker.pipeline.methods import METHODS, all_options
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import load_session
@@ -60,7 +60,7 @@ def test_the_chain_drives_it(sonar, tmp_path):
         values = session.people[0].model.neutral()
         put_poses(store, session.people[0], {2: values})
         plan = TrackPlan(range(5), (0,), SonarSettings())
-        run_chain(ChainPlan(plan), StoredSession(session, store, Observer(session.cameras, recording)), sink)
+        find_and_track(ChainPlan(plan), StoredSession(session, store, Observer(session.cameras, recording)), sink)
         assert [row.frame for row in store.frames("person")] == [0, 1, 2, 3, 4]
         record = store.pose("person", 4)
         assert record.settings["method"] == "sonar"

@@ -26,7 +26,7 @@ from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
 from tracker.geometry.ground_plane import up_rotation
 from tracker.session import lock
-from tracker.session.clocks import place_rows
+from tracker.session.row_placement import place_rows
 from tracker.session.session import load_session, save_floor
 
 pytestmark = pytest.mark.slow

@@ -10,7 +10,7 @@ from tracker.estimation.initialization.generators.person_scene import PersonScen
 from tracker.estimation.initialization.generators.voxel_start import locate_parts, possible_heads
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.evidence.voxels.figure_masks import figure_masks, paint
-from tracker.evidence.voxels.paths import neighbor_graph
+from tracker.evidence.voxels.geodesic_distance import neighbor_graph
 from tracker.evidence.voxels.voxel_grid import VoxelGrid, Voxels
 from tracker.geometry.ground_plane import GroundPlane
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tracker.estimation.acquisition.part_motions import shape_derivatives
-from tracker.geometry.camera_columns import project_with_columns
+from tracker.estimation.acquisition.part_derivatives import shape_derivatives
 from tracker.geometry.camera_correction import POSITION, ROTATION, TIME
+from tracker.geometry.camera_derivatives import project_with_columns
 from tracker.geometry.rigid import skew, so3_exp
 
 

@@ -7,7 +7,7 @@ from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker.body.model import PosedBody
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.viewed_frames import ViewedFrame
+from tracker.calibration.check.judged_frames import JudgedFrame
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.formats.model_toml import load_model
 from tracker.geometry.camera_correction import N_CORRECTIONS, corrected, later_s
@@ -48,7 +48,7 @@ def viewed(off, frames=range(6), model=None, person=None, cameras=CAMERAS):
             views.append(replace(view, camera=camera))
         start = shaken(model, pose, random, 0.02, 0.01)
         out.append(
-            ViewedFrame(
+            JudgedFrame(
                 k,
                 tuple(views),
                 (PosedBody(model, start),),

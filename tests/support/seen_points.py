@@ -3,8 +3,8 @@
 import numpy as np
 import rigs
 
-from tracker.calibration.check.reprojection import Observations
-from tracker.geometry.camera_columns import POSE, moved_camera, n_columns
+from tracker.calibration.check.rig_adjustment import Observations
+from tracker.geometry.camera_derivatives import POSE, moved_camera, n_camera_parameters
 
 DISTORTION = (-0.2, 0.05, 0.001, -0.001, 0.01)
 
@@ -33,7 +33,7 @@ def moved_rig(cameras, seed=0, degrees=0.5, metres=0.02):
     random = np.random.default_rng(seed)
     out = []
     for camera in cameras:
-        step = np.zeros(n_columns(camera))
+        step = np.zeros(n_camera_parameters(camera))
         step[POSE] = random.normal(size=6) * ([np.radians(degrees)] * 3 + [metres] * 3)
         out.append(moved_camera(camera, step))
     return out

@@ -45,7 +45,9 @@ def test_a_program_apart_ends_with_all_that_it_has_started():
     starts_another = (
         f"import subprocess as s, sys; print(s.Popen([sys.executable, '-c', '{wait}']).pid, flush=True); {wait}"
     )
-    process = system.start_apart([sys.executable, "-c", starts_another], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    process = system.start_detached(
+        [sys.executable, "-c", starts_another], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
     child = int(process.stdout.readline())
     system.end_apart(process)
     assert process.poll() is not None

@@ -123,7 +123,7 @@ def expected_errors(
         contradicted: see `contradicted_keyframes`.
     """
     alike = {k: p for k, p in sorted(poses.items()) if p.body.model.point_names == model.point_names}
-    joints, names, unit_of, limb_of = joint_units(model)
+    joints, names, unit_of, limb_of = correctable_joints(model)
     columns = [model.point_names.index(n) for n in joints]
     assessed = [p.record.errors[columns] for p in alike.values() if p.record.errors is not None]
     shared = point_covariances(model)[columns]
@@ -154,7 +154,7 @@ def contradicted_keyframes(store: AnnotationStore, person: str) -> frozenset[int
     return frozenset(r.frame for r in rows if r.keyframe and r.assessed_since and r.status in ("doubtful", "lost"))
 
 
-class JointUnits(NamedTuple):
+class CorrectableJoints(NamedTuple):
     """The limb joints of a body, and what each is corrected with."""
 
     joints: tuple[str, ...]
@@ -167,11 +167,11 @@ class JointUnits(NamedTuple):
     """Index of the limb of each joint in `tracker.body.limbs.limbs`, (J,); -1 for the trunk."""
 
 
-def joint_units(model: BodyModel) -> JointUnits:
+def correctable_joints(model: BodyModel) -> CorrectableJoints:
     """Return the limb joints of a body by the limb that carries them; a hip on the trunk belongs to the trunk."""
     joints = tuple(n for n in model.point_names if n in LIMB_JOINTS) or model.point_names
     parts, all_limbs = model.proximal_parts[[model.point_names.index(n) for n in joints]], limbs(model)
     limb_of = np.array([next((i for i, x in enumerate(all_limbs) if part in x.parts), -1) for part in parts])
     used = sorted({*limb_of.tolist()})
     names = tuple(TRUNK if i < 0 else limb_display_name(all_limbs[i].name) for i in used)
-    return JointUnits(joints, names, np.array([used.index(i) for i in limb_of]), limb_of)
+    return CorrectableJoints(joints, names, np.array([used.index(i) for i in limb_of]), limb_of)

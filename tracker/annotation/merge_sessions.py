@@ -29,7 +29,7 @@ from tracker.annotation.edit_union import (
 from tracker.annotation.numbered_settings import Numbered, join_numbered, numbered_settings, plain_settings, sizes_after
 from tracker.annotation.session_copies import write_session_copy
 from tracker.body.model import BodyModel
-from tracker.compute.distribution import program_version
+from tracker.compute.installed_package import program_version
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.arrays import Array

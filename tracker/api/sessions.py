@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TypeAlias
 
 from tracker.errors import SessionError, TrackerError
-from tracker.pipeline.chain import StoredSession, open_stored_session
+from tracker.pipeline.automatic_run import StoredSession, open_stored_session
 from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble
 from tracker.session.session import Session, load_session
-from tracker.validation import same_form
+from tracker.validation import nfc_name
 
 SessionOrFolder: TypeAlias = Session | str | Path
 """A session, or the path of its folder."""
@@ -84,16 +84,16 @@ def people_of(session: Session, names: Sequence[str] | None) -> tuple[int, ...]:
     Raises:
         SessionError: there is no such person.
     """
-    known = [same_form(p.name) for p in session.people]
+    known = [nfc_name(p.name) for p in session.people]
     if names is None:
         return tuple(range(len(known)))
     if isinstance(names, str):
         raise TypeError(f"expected a list of names, found the text '{names}'; write ['{names}']")
-    unknown = [name for name in names if same_form(name) not in known]
+    unknown = [name for name in names if nfc_name(name) not in known]
     if unknown:
         listed = ", ".join(p.name for p in session.people)
         raise SessionError(f"expected people among {listed}, found '{unknown[0]}'; name one of them")
-    return tuple(known.index(same_form(name)) for name in names)
+    return tuple(known.index(nfc_name(name)) for name in names)
 
 
 def person_of(session: Session, name: PersonName) -> int:

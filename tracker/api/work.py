@@ -11,8 +11,8 @@ from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.estimation.initialization.frame_trials import Trying
 from tracker.estimation.tracking.method import OptionValue
+from tracker.pipeline.automatic_run import ChainPlan, StoredSession, find_and_track, unplaced
 from tracker.pipeline.body_acquisition import acquire_body
-from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, unplaced
 from tracker.pipeline.find_people import FindSettings, find_people, sentences
 from tracker.pipeline.methods import method_named
 from tracker.pipeline.stored_run import TrackPlan
@@ -154,7 +154,7 @@ def track(
         views = check_names(cameras, list(stored.session.camera_names), "camera", "cameras")
         find_settings = FindSettings(keypoints=keypoints) if find_missing else None
         chain = ChainPlan(replace(plan, cameras=tuple(views)), find_settings, chosen if acquire_sizes else ())
-        run_chain(chain, stored, ProgressSink(progress))
+        find_and_track(chain, stored, ProgressSink(progress))
         return tracked_of(stored)
 
 

@@ -24,7 +24,7 @@ from tracker.estimation.initialization.generators.start_generators import GENERA
 from tracker.formats.model_toml import format_model
 from tracker.interchange.observations.stored import FOLDER as OBSERVATIONS
 from tracker.interchange.observations.stored_masks import list_masks
-from tracker.pipeline.chain import ChainPlan, StoredSession, begin_chain, run_chain
+from tracker.pipeline.automatic_run import ChainPlan, StoredSession, find_and_acquire, find_and_track
 from tracker.pipeline.find_people import FindSettings, find_people, frames_to_try
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import CALIBRATION_FILE, Session, save_session
@@ -45,13 +45,13 @@ def begin(session: Session, settings: Settings, frames: range, progress: Progres
         progress: receives the progress.
 
     Raises:
-        TrackerError: see `begin_chain`.
+        TrackerError: see `find_and_acquire`.
     """
     people = people_of(session, settings.people)
     with opened(session) as stored:
         find = None if settings.find is False else FindSettings(keypoints=settings.keypoints)
         chain = ChainPlan(plan_of(settings, people, frames), find, () if settings.acquire is False else people)
-        plan = begin_chain(chain, stored, ProgressSink(progress))
+        plan = find_and_acquire(chain, stored, ProgressSink(progress))
     assert plan.start is not None
     with AnnotationStore(session.annotations_path, read_only=True) as store:
         of_all = [{row.frame for row in store.frames(session.people[i].name) if row.keyframe} for i in plan.people]
@@ -83,7 +83,7 @@ def track_stretch(
     frames = range(stretch.first, stretch.last + 1, division.range.step)
     with opened(_copy(session, folder)) as stored:
         _place(stored, division.people, frames, stretch.names, settings.keypoints, progress)
-        run_chain(ChainPlan(plan_of(settings, division.people, frames), None), stored, ProgressSink(progress))
+        find_and_track(ChainPlan(plan_of(settings, division.people, frames), None), stored, ProgressSink(progress))
         return tracked_of(stored)
 
 

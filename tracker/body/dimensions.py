@@ -146,7 +146,7 @@ def standing_extent_m(model: BodyModel) -> tuple[float, float]:
     return min(ends), max(ends)
 
 
-def with_height_of_stature(model: BodyModel, like: BodyModel) -> BodyModel:
+def restate_height(model: BodyModel, like: BodyModel) -> BodyModel:
     """Return the very same body with its height stated as its stature, in the ratio of another body's.
 
     A body's height is the unit of its fractions. With other lengths of parts it no longer is how tall the body is.

@@ -7,13 +7,13 @@ compiled.
 """
 
 __all__ = [
-    "distribution",
     "extensions",
-    "interpretation",
+    "installed_package",
     "jit",
     "kernel_cache",
     "progress",
     "quantiles",
     "sampling",
     "threads",
+    "uncompiled_kernels",
 ]

@@ -13,8 +13,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from tracker.compute.interpretation import is_interpreted
 from tracker.compute.kernel_cache import use_kernel_cache
+from tracker.compute.uncompiled_kernels import is_interpreted
 
 __all__ = ["njit"]
 
@@ -22,7 +22,7 @@ use_kernel_cache()
 
 
 def njit(*functions: Callable[..., Any], **options: Any) -> Any:
-    """Make a kernel as `numba.njit` does, which can also be interpreted (`tracker.compute.interpretation`)."""
+    """Make a kernel as `numba.njit` does, which can also be interpreted (`tracker.compute.uncompiled_kernels`)."""
     if not functions:
         return lambda function: njit(function, **options)
     (function,) = functions

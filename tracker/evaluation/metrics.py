@@ -51,7 +51,7 @@ class Evaluation:
     acceleration_error_m_s2: float | None
     """Mean norm of the second difference of the error over frames and limb joints, m/s^2, as the human-mesh literature
     has it (A. Kanazawa et al. 2019); None without three frames in a row."""
-    per_frame: tuple["FrameError", ...]
+    per_frame: tuple["FrameAccuracy", ...]
     """The error of each frame."""
     offsets_mm: Mapping[str, tuple[float, ...]] | None = None
     """Mean difference of each joint from the reference in the frame of its proximal part, (3,); None without poses
@@ -77,7 +77,7 @@ class Evaluation:
     """Measures that other packages add (`tracker.evaluation.metric`), by name."""
 
 
-class FrameError(NamedTuple):
+class FrameAccuracy(NamedTuple):
     """The error of one frame."""
 
     frame: int
@@ -103,11 +103,11 @@ class PoseDoubt(NamedTuple):
     status: str
     """`keyframe` for a pose that a person set; empty where it was not assessed."""
     probability_off: float | None = None
-    """See `FrameError`."""
+    """See `FrameAccuracy`."""
     reason: str = ""
-    """See `FrameError`."""
+    """See `FrameAccuracy`."""
     seam_mm: float | None = None
-    """See `FrameError`."""
+    """See `FrameAccuracy`."""
 
 
 class JointErrors(NamedTuple):
@@ -228,14 +228,14 @@ def _acceleration_error(vectors: Array, fps: float) -> float | None:
     return float(norms.mean()) * fps**2 if len(norms) else None
 
 
-def _frame_error(frame: int, joints: Sequence[str], errors_mm: Array, assessed: PoseDoubt) -> FrameError:
+def _frame_error(frame: int, joints: Sequence[str], errors_mm: Array, assessed: PoseDoubt) -> FrameAccuracy:
     status = assessed.status
     known = assessed.probability_off, assessed.reason, assessed.seam_mm
     if not np.isfinite(errors_mm).any():
-        return FrameError(frame, status or None, None, None, None, *known)
+        return FrameAccuracy(frame, status or None, None, None, None, *known)
     worst = int(np.nanargmax(errors_mm))
     mean = float(np.nanmean(errors_mm))
-    return FrameError(frame, status or None, mean, float(errors_mm[worst]), joints[worst], *known)
+    return FrameAccuracy(frame, status or None, mean, float(errors_mm[worst]), joints[worst], *known)
 
 
 def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: Sequence[int]) -> Evaluation:

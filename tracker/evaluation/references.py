@@ -19,8 +19,8 @@ from tracker.formats.trc import MarkerTable, remap_axes
 from tracker.geometry.arrays import Array
 from tracker.interchange.observations.placing import name_points
 from tracker.interchange.observations.readers import FORMATS, SPACE_FORMATS, find_files
-from tracker.session.clocks import Clock, Placement, place_rows
 from tracker.session.folder import SESSION_FILE
+from tracker.session.row_placement import Clock, RowPlacement, place_rows
 from tracker.session.session import Session, load_session
 from tracker.session.store.records import PoseRecord
 from tracker.session.store.stored_poses import read_stored_poses
@@ -40,7 +40,7 @@ class Reference(NamedTuple):
 
 
 def read_joints(
-    path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z", known: Placement | None = None
+    path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z", known: RowPlacement | None = None
 ) -> MarkerTable:
     """Read the joints of one person under the project's names, in a session's frames and axes, metres.
 
@@ -86,10 +86,10 @@ def read_person(path: Path, fps: float | None, asked: Sequence[str], kind: str) 
     return tables[0], where
 
 
-def placement(session: Session, first_frame: int | None = None, clock: Clock | None = None) -> Placement:
-    """Return the facts of a session that place the rows of a file, with the user's choices; see `Placement`."""
+def placement(session: Session, first_frame: int | None = None, clock: Clock | None = None) -> RowPlacement:
+    """Return the facts of a session that place the rows of a file, with the user's choices; see `RowPlacement`."""
     declared = tuple({c.declared_fps for c in session.cameras if c.declared_fps is not None})
-    return Placement(session.n_frames, declared, first_frame, clock)
+    return RowPlacement(session.n_frames, declared, first_frame, clock)
 
 
 def read_reference(
@@ -98,7 +98,7 @@ def read_reference(
     person: int,
     joint_map: Path | None = None,
     axes: str = "x,y,z",
-    known: Placement | None = None,
+    known: RowPlacement | None = None,
 ) -> Reference:
     """Read a reference of any kind: joints of any program, a pose table (CSV), or a session folder.
 

@@ -51,9 +51,9 @@ class Observer:
     """Computes evidence from the frames of a recording. Thread-safe."""
 
     def __init__(
-        self, cameras: Sequence[CameraSource], recording: Recording, in_recording: Sequence[int] | None = None,
-        views: Sequence[Foreground] | None = None, keypoints: KeypointEvidence | None = None, in_time: bool = False,
-        origin: "Observer | None" = None,
+        self, cameras: Sequence[CameraSource], recording: Recording, recording_views: Sequence[int] | None = None,
+        views: Sequence[Foreground] | None = None, keypoints: KeypointEvidence | None = None,
+        at_nearest_times: bool = False, origin: "Observer | None" = None,
     ) -> None:  # fmt: skip
         """Read the backgrounds.
 
@@ -63,7 +63,7 @@ class Observer:
             in_recording: index of each view in the recording, if it has others too.
             views: the foreground of each view, if another observer has read the backgrounds.
             keypoints: of all people in these views, if they are evidence, too.
-            in_time: see `in_time`.
+            in_time: see `at_nearest_times`.
             origin: the observer that this one is made of; None if it is the first.
 
         Raises:
@@ -74,7 +74,7 @@ class Observer:
         """Footage of the views."""
         self.origin = origin or self
         """The observer of all cameras that this one was made of. Its pictures are those of the frames themselves."""
-        self._in_recording, self.keypoints, self._is_in_time = in_recording, keypoints, in_time
+        self._in_recording, self.keypoints, self._is_in_time = recording_views, keypoints, at_nearest_times
         # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
             ThreadPoolExecutor(FRAMES_AHEAD, name, initializer=cv2.setNumThreads, initargs=(1,))
@@ -102,24 +102,24 @@ class Observer:
         views = [view.of(source) for view, source in zip(self._views, cameras, strict=True)]
         return Observer(cameras, self.recording.with_cameras(cameras), None, views)
 
-    def in_time(self) -> "Observer":
+    def at_nearest_times(self) -> "Observer":
         """Return an observer of the same views that takes the picture of each that is nearest in time to the frame.
 
         Poses that follow one another are found by it: a motion is straight over half a frame, but not over several.
         """
         if self._is_in_time or all(c.clock.is_in_step(self.recording.n_frames) for c in self.cameras):
             return self
-        return self._with(range(len(self.cameras)), self.keypoints, in_time=True)
+        return self._with(range(len(self.cameras)), self.keypoints, at_nearest_times=True)
 
-    def _with(self, chosen: Sequence[int], keypoints: KeypointEvidence | None, in_time: bool) -> "Observer":
+    def _with(self, chosen: Sequence[int], keypoints: KeypointEvidence | None, at_nearest_times: bool) -> "Observer":
         """Return an observer of some of the views, with key points of all of them."""
         keypoints = None if keypoints is None else keypoints.of_views(chosen)
-        cameras, in_recording = [self.cameras[i] for i in chosen], [self.in_recording[i] for i in chosen]
+        cameras, recording_views = [self.cameras[i] for i in chosen], [self.recording_views[i] for i in chosen]
         views = [self._views[i] for i in chosen]
-        return Observer(cameras, self.recording, in_recording, views, keypoints, in_time, self.origin)
+        return Observer(cameras, self.recording, recording_views, views, keypoints, at_nearest_times, self.origin)
 
     @property
-    def in_recording(self) -> Sequence[int]:
+    def recording_views(self) -> Sequence[int]:
         """Index of each view in the recording, (V,)."""
         return range(len(self.cameras)) if self._in_recording is None else self._in_recording
 
@@ -133,7 +133,7 @@ class Observer:
         return ahead_frames(self.cameras, self._shown(k), k)
 
     def _shown(self, k: int) -> list[int]:
-        """Return the frame whose picture each view has on frame k: k, or that of the nearest time; see `in_time`."""
+        """Return the frame whose picture each view has on frame k: k, or that of the nearest time."""
         if not self._is_in_time:
             return [k] * len(self.cameras)
         return [c.clock.nearest(k, self.recording.n_frames) for c in self.cameras]

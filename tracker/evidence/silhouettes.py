@@ -73,7 +73,7 @@ class SilhouetteFinder:
         recording: Recording,
         shading: Shading = SHADOWS_AND_HIGHLIGHTS,
         step: Callable[[], None] = lambda: None,
-        in_recording: Sequence[int] | None = None,
+        recording_views: Sequence[int] | None = None,
     ) -> None:
         """Read the backgrounds, or learn them from the recording where there are none.
 
@@ -90,7 +90,7 @@ class SilhouetteFinder:
         """
         self.cameras, self.recording = tuple(cameras), recording
         self._shading, self._step = shading, step
-        self._in_recording = range(len(self.cameras)) if in_recording is None else in_recording
+        self._in_recording = range(len(self.cameras)) if recording_views is None else recording_views
         # Without a lens, a camera's working view is the footage itself, reduced.
         self._views = [WorkingView(replace(c.camera, distortion=np.zeros(0), fisheye=False)) for c in self.cameras]
         self._pool = ThreadPoolExecutor(2, "silhouettes", initializer=cv2.setNumThreads, initargs=(1,))

@@ -26,7 +26,7 @@ class Index(NamedTuple):
     """Presentation time stamps of the frames at which decoding can start, ascending."""
 
 
-def stamp_of(path: Path) -> str:
+def file_version_key(path: Path) -> str:
     """Return a text that identifies a version of a file: its path, size and time of change."""
     stat = path.stat()
     return f"{path.resolve()}|{stat.st_size}|{stat.st_mtime_ns}"
@@ -43,7 +43,7 @@ def load(video: Path, folder: Path | None) -> Index | None:
         return None
     try:
         with np.load(_place(video, folder)) as cached:
-            if str(cached["stamp"]) != stamp_of(video) or int(cached["version"]) != VERSION:
+            if str(cached["stamp"]) != file_version_key(video) or int(cached["version"]) != VERSION:
                 return None
             every = cached["every"].tolist()
             return Index(cached["pts"], {pts: i for i, pts in enumerate(every)}, cached["key_pts"])
@@ -64,7 +64,7 @@ def save(video: Path, folder: Path | None, index: Index) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with unfinished.open("wb") as file:
             np.savez_compressed(
-                file, version=VERSION, stamp=stamp_of(video), pts=index.pts, every=every, key_pts=index.key_pts
+                file, version=VERSION, stamp=file_version_key(video), pts=index.pts, every=every, key_pts=index.key_pts
             )
         unfinished.replace(place)
     except OSError:

@@ -23,7 +23,7 @@ import numpy as np
 
 from tracker.errors import RecordingError
 from tracker.files import check_regular, open_regular, read_regular, write_text_atomic
-from tracker.footage.frame_index import stamp_of
+from tracker.footage.frame_index import file_version_key
 from tracker.footage.image_file import decode_image
 from tracker.footage.video import Footage
 from tracker.formats.text_files import DOCUMENT_BYTES, TextKind, read_json
@@ -64,13 +64,13 @@ class Proxy:
             about: _About = check(read_json(self._about, _KIND), _About, f"proxy {self._about}", RecordingError)
         except RecordingError:
             return False
-        return about.version == VERSION and about.stamp == stamp_of(footage)
+        return about.version == VERSION and about.stamp == file_version_key(footage)
 
     def follow(self, footage: Path) -> bool:
         """Keep the proxy for footage that has moved: same size and time of change. Returns whether it was kept."""
         try:
             about: _About = check(read_json(self._about, _KIND), _About, f"proxy {self._about}", RecordingError)
-            stamp = stamp_of(footage)
+            stamp = file_version_key(footage)
             if about.version != VERSION or about.stamp.split("|")[-2:] != stamp.split("|")[-2:]:
                 return False
             write_text_atomic(self._about, json.dumps({**msgspec.structs.asdict(about), "stamp": stamp}))
@@ -131,7 +131,7 @@ class Proxy:
             self._about.parent.mkdir(parents=True, exist_ok=True)
             if not self.fits(path):
                 self.remove()
-                about = {"version": VERSION, "stamp": stamp_of(path), "n_frames": footage.n_frames}
+                about = {"version": VERSION, "stamp": file_version_key(path), "n_frames": footage.n_frames}
                 write_text_atomic(self._about, json.dumps(about))
             ends = self._read_ends()
             done, at = len(ends), int(ends[-1]) if len(ends) else 0

@@ -75,7 +75,7 @@ class ObservationLayout(Generic[T]):
     """Returns a file with points replaced, to be sent back; None for a layout that is read only."""
 
 
-class Unread(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class UnsupportedLayout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A kind of file that is not read."""
 
     program: str
@@ -113,13 +113,13 @@ class Unread(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 _KIND = text_files.TextKind("table of programs", text_files.DOCUMENT_BYTES, FormatError)
-_ROWS: Mapping[str, tuple[Unread, ...]] = msgspec.convert(
+_ROWS: Mapping[str, tuple[UnsupportedLayout, ...]] = msgspec.convert(
     text_files.parse_toml(text_files.packaged_texts("formats")["unread"], "unread.toml", _KIND),
-    dict[str, tuple[Unread, ...]],
+    dict[str, tuple[UnsupportedLayout, ...]],
 )
 
 
-def unread(kind: Literal["calibration", "cameras", "layout", "joints", "points"]) -> tuple[Unread, ...]:
+def unread(kind: Literal["calibration", "cameras", "layout", "joints", "points"]) -> tuple[UnsupportedLayout, ...]:
     """Return the files of a kind in the order in which they are tried."""
     return _ROWS[kind]
 

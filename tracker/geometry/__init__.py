@@ -6,8 +6,8 @@ Imports `compute`. Callers use the modules: `arrays`, `rigid`, `cameras`, `groun
 
 __all__ = [
     "arrays",
-    "camera_columns",
     "camera_correction",
+    "camera_derivatives",
     "camera_rig",
     "cameras",
     "euler",

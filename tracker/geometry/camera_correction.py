@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_columns import consecutive, moved_camera, n_columns
+from tracker.geometry.camera_derivatives import consecutive, moved_camera, n_camera_parameters
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import so3_exp, so3_log
 
@@ -25,7 +25,7 @@ def corrected(camera: Camera, correction: Array) -> Camera:
     """Return a camera with a correction, (N_CORRECTIONS,), except that of its clock."""
     if not correction[:TIME].any():
         return camera
-    step = np.zeros(n_columns(camera))
+    step = np.zeros(n_camera_parameters(camera))
     step[:TIME] = correction[:TIME]  # The columns of a whole camera begin with these.
     return moved_camera(camera, step)
 

@@ -25,8 +25,8 @@ from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model, has_preset_proportions
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.pipeline.marked_points import user_marked_points
 from tracker.pipeline.posed_recording import PosedRecording
-from tracker.pipeline.seen_points import seen_points
 from tracker.session.session import Session, save_model
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.records import SEEN, SOURCES, Change, PoseChange, PoseRecord
@@ -158,7 +158,7 @@ def posed_frames(session: Session, person: int, frames: Sequence[int], start: in
     keyframes = {k: s for k, s in usable.items() if s.record.keyframe}
     with AnnotationStore(session.annotations_path, read_only=True) as store:
         pins = {k: store.pins(session.people[person].name, k) for k in keyframes}
-    observed = {k: seen_points(session.cameras, model, s.record, pins[k]) for k, s in keyframes.items()}
+    observed = {k: user_marked_points(session.cameras, model, s.record, pins[k]) for k, s in keyframes.items()}
     cameras = [c.camera for c in session.cameras]
     seen = {k: pin_block(model, cameras, o).widened(_HAND) for k, o in observed.items() if o}
     placed = {k: t for k, s in keyframes.items() if (t := _placed(s, observed[k])) is not None and len(t.points)}

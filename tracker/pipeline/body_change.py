@@ -8,8 +8,8 @@ from tracker.body.dimensions import with_sizes_of
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model
+from tracker.pipeline.automatic_run import FOLLOWED
 from tracker.pipeline.body_acquisition import store_body
-from tracker.pipeline.chain import FOLLOWED
 from tracker.session.session import Session
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.stored_poses import read_stored_poses
@@ -44,7 +44,7 @@ def change_body(session: Session, store: AnnotationStore, person: int, name: str
     Raises:
         TrackerError: there is no such body, the person has it, or the session cannot be written.
     """
-    who, body = session.people[person], moved_body(session, person, name)
+    who, body = session.people[person], converted_body(session, person, name)
     stored = read_stored_poses(session.annotations_path, who.name, who.model)
     moved = {k: s for k, s in stored.items() if s.record.keyframe or s.source not in FOLLOWED}
     changed = store_body(session, store, person, body, {}, f"body of {who.name}: {body.name}", moved)
@@ -53,7 +53,7 @@ def change_body(session: Session, store: AnnotationStore, person: int, name: str
     return ChangedBody(changed, body, len(moved), float(np.mean(off_m or [0.0])), len(stored) - len(moved))
 
 
-def moved_body(session: Session, person: int, name: str) -> BodyModel:
+def converted_body(session: Session, person: int, name: str) -> BodyModel:
     """Return another body in the sizes of a person, as far as their parts correspond.
 
     Args:

@@ -7,10 +7,10 @@ import numpy as np
 
 from tracker.calibration.check.diagnosis import CameraFinding, Diagnosis, diagnose, findings, glance, sentence
 from tracker.calibration.check.fault_search import prior_sigmas
+from tracker.calibration.check.judged_frames import JudgedFrame
 from tracker.calibration.check.lens_priors import NEWS
 from tracker.calibration.check.residual_pieces import ResidualPieces, residual_pieces
 from tracker.calibration.check.single_frames import FrameScore, find_change, score_frame
-from tracker.calibration.check.viewed_frames import ViewedFrame
 from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.size_parameters import SizeParameters
@@ -179,13 +179,13 @@ def held_out_scores(
     return out
 
 
-def _checked(recording: PosedRecording, seen: Sequence[ViewedFrame], report: Report) -> CalibrationCheck:
+def _checked(recording: PosedRecording, seen: Sequence[JudgedFrame], report: Report) -> CalibrationCheck:
     sizes = [SizeParameters(b.model) for b in seen[0].bodies]
     diagnosis = diagnose(seen, sizes, recording.fps, report)
     return replace(_judged(recording, seen, diagnosis), residuals=residual_pieces(seen, sizes, diagnosis.state))
 
 
-def _judged(recording: PosedRecording, seen: Sequence[ViewedFrame], diagnosis: Diagnosis) -> CalibrationCheck:
+def _judged(recording: PosedRecording, seen: Sequence[JudgedFrame], diagnosis: Diagnosis) -> CalibrationCheck:
     cameras = findings(diagnosis, seen, recording.camera_names)
     if len(cameras) == 2:
         cameras = [c._replace(kinds=(), correction=np.zeros(N_CORRECTIONS)) for c in cameras]
@@ -218,7 +218,7 @@ class _Changes:
     """Finds since when cameras are off, by more and more frames around the change."""
 
     def __init__(
-        self, recording: PosedRecording, usable: Sequence[int], check: CalibrationCheck, seen: Sequence[ViewedFrame]
+        self, recording: PosedRecording, usable: Sequence[int], check: CalibrationCheck, seen: Sequence[JudgedFrame]
     ) -> None:
         self._recording, self._usable, self._check = recording, usable, check
         self._seen = {f.frame: f for f in seen}

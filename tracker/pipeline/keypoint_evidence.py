@@ -14,7 +14,12 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.sampling import spread_indices
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.from_joints import place_joints
-from tracker.estimation.acquisition.from_keypoints import BodyPoints, SeenBody, fit_to_keypoints, learn_seen_body
+from tracker.estimation.acquisition.from_keypoints import (
+    DetectorModel,
+    PersonObservations,
+    fit_to_keypoints,
+    learn_seen_body,
+)
 from tracker.estimation.acquisition.segment_lengths import segment_lengths
 from tracker.estimation.fitting.gauss_newton import PointTargets
 from tracker.estimation.fitting.hypothesis import Hypothesis
@@ -40,7 +45,7 @@ MAX_FRAMES = 12
 that twelve take a second."""
 
 
-def read_points(session: Session, name: str) -> dict[int, BodyPoints]:
+def read_points(session: Session, name: str) -> dict[int, PersonObservations]:
     """Return the observed points of each person, by index, that are points of the person's body.
 
     Args:
@@ -66,7 +71,7 @@ def assigned_observations(session: Session, name: str) -> ObservationSet:
     return _assigned(session, name)[0]
 
 
-def _assigned(session: Session, name: str) -> tuple[ObservationSet, dict[str, BodyPoints]]:
+def _assigned(session: Session, name: str) -> tuple[ObservationSet, dict[str, PersonObservations]]:
     observations = load_observations(session, name)
     found = body_points(observations, [c.camera for c in session.cameras])
     before = observations.people
@@ -124,7 +129,7 @@ def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[
     )
 
 
-def at_observed_height(model: BodyModel, points: BodyPoints) -> BodyModel:
+def at_observed_height(model: BodyModel, points: PersonObservations) -> BodyModel:
     """Return a body in preset sizes at the height at which most of its segments are as long as those observed."""
     if not has_preset_sizes(model):
         return model
@@ -134,7 +139,7 @@ def at_observed_height(model: BodyModel, points: BodyPoints) -> BodyModel:
     return model.with_height(float(np.clip(model.height_m * ratio, *HEIGHT_LIMITS_M)))
 
 
-def seen_joints(model: BodyModel, points: BodyPoints, n_frames: int) -> dict[int, PointTargets]:
+def seen_joints(model: BodyModel, points: PersonObservations, n_frames: int) -> dict[int, PointTargets]:
     """Return the observed limb joints of a person by frame, to acquire sizes with.
 
     A joint is off by as much on all frames, so that those of several frames together count as one.
@@ -150,8 +155,10 @@ def seen_joints(model: BodyModel, points: BodyPoints, n_frames: int) -> dict[int
 
 
 def learn_seen_bodies(
-    session: Session, points: Mapping[int, BodyPoints], bodies: Mapping[int, Mapping[int, PosedBody]] | None = None
-) -> dict[int, SeenBody]:
+    session: Session,
+    points: Mapping[int, PersonObservations],
+    bodies: Mapping[int, Mapping[int, PosedBody]] | None = None,
+) -> dict[int, DetectorModel]:
     """Learn how the detector sees each person.
 
     Args:
@@ -160,7 +167,7 @@ def learn_seen_bodies(
         bodies: of people whose poses other evidence shows: by index of the person and by frame, in the present bodies.
             Others are posed by the key points alone, which do not show what all of them have in common.
     """
-    cameras, out = [c.camera for c in session.cameras], dict[int, SeenBody]()
+    cameras, out = [c.camera for c in session.cameras], dict[int, DetectorModel]()
     for person, own in points.items():
         known = (bodies or {}).get(person) or fit_to_keypoints(session.people[person].model, own)
         if known:
@@ -169,7 +176,7 @@ def learn_seen_bodies(
 
 
 def keypoint_evidence(
-    session: Session, points: Mapping[int, BodyPoints], seen: Mapping[int, SeenBody], views: Sequence[str]
+    session: Session, points: Mapping[int, PersonObservations], seen: Mapping[int, DetectorModel], views: Sequence[str]
 ) -> KeypointEvidence:
     """Return key points as evidence of a run.
 
@@ -189,7 +196,10 @@ def keypoint_evidence(
 
 
 def with_keypoints(
-    session: Session, observer: Observer, points: Mapping[int, BodyPoints], seen: Mapping[int, SeenBody] | None = None
+    session: Session,
+    observer: Observer,
+    points: Mapping[int, PersonObservations],
+    seen: Mapping[int, DetectorModel] | None = None,
 ) -> Observer:
     """Return an observer to which key points are evidence, too; `seen` as in `keypoint_evidence`, learnt by default."""
     known = learn_seen_bodies(session, points) if seen is None else seen
@@ -197,7 +207,9 @@ def with_keypoints(
     return observer.with_keypoints(keypoint_evidence(session, points, known, views))
 
 
-def seen_bodies_record(session: Session, name: str, seen: Mapping[int, SeenBody], before: Mapping[str, Any]) -> Any:
+def seen_bodies_record(
+    session: Session, name: str, seen: Mapping[int, DetectorModel], before: Mapping[str, Any]
+) -> Any:
     """Return the setting `SEEN_BODIES` with how one detector sees the people, whose bodies are noted.
 
     Args:
@@ -216,17 +228,17 @@ def seen_bodies_record(session: Session, name: str, seen: Mapping[int, SeenBody]
     return {**before, name: own}
 
 
-def stored_seen_bodies(session: Session, store: AnnotationStore, name: str) -> dict[int, SeenBody] | None:
+def stored_seen_bodies(session: Session, store: AnnotationStore, name: str) -> dict[int, DetectorModel] | None:
     """Return how a detector sees the people by their present bodies, as it was stored; None where it was not."""
     stored = store.setting(SEEN_BODIES, {}).get(name)
     if stored is None:
         return None
-    out = dict[int, SeenBody]()
+    out = dict[int, DetectorModel]()
     for i, person in enumerate(session.people):
         own = stored.get(person.name)
         if own is None:
             continue
         if own["body"] != format_model(person.model):
             return None
-        out[i] = SeenBody(tuple(own["points"]), np.array(own["offsets_m"]), np.array(own["sigmas"]))
+        out[i] = DetectorModel(tuple(own["points"]), np.array(own["offsets_m"]), np.array(own["sigmas"]))
     return out

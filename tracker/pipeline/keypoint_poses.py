@@ -7,7 +7,7 @@ import numpy as np
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, part_of, result_of, unreported
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.from_keypoints import BodyPoints, fit_to_keypoints, learn_seen_body
+from tracker.estimation.acquisition.from_keypoints import PersonObservations, fit_to_keypoints, learn_seen_body
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, solve, weak_pull
 from tracker.estimation.fitting.interpenetration import SelfPenetration
 from tracker.estimation.fitting.keypoints import KeypointBlock
@@ -83,7 +83,7 @@ def imported_changes(person: str, poses: Mapping[int, PosedBody], revision: int,
 
 
 def keypoint_poses(
-    model: BodyModel, points: BodyPoints, cameras: Sequence[Camera], fps: float, report: Report = unreported
+    model: BodyModel, points: PersonObservations, cameras: Sequence[Camera], fps: float, report: Report = unreported
 ) -> dict[int, PosedBody]:
     """Fit a body to the key points of all views on each frame, robustly, and smooth its motion.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.pose_path import PosePath
-from tracker.calibration.check.viewed_frames import ViewedFrame
+from tracker.calibration.check.judged_frames import JudgedFrame
 from tracker.compute.progress import Report, unreported
 from tracker.compute.sampling import farthest_first, spread_indices
 from tracker.errors import TrackerError
@@ -104,7 +104,7 @@ class PosedRecording:
         joints = np.array([np.concatenate([own[k].points_world for own in self.poses]) for k in frames])
         return [frames[i] for i in sorted(farthest_first(joints, n, SAME_POSE_M, MIN_FRAMES))]
 
-    def seen(self, frames: Sequence[int], report: Report = unreported) -> list[ViewedFrame]:
+    def seen(self, frames: Sequence[int], report: Report = unreported) -> list[JudgedFrame]:
         """Read what the views show on frames."""
         out = []
         for i, k in enumerate(frames):
@@ -114,7 +114,7 @@ class PosedRecording:
             views = self.observer.evidence(k, regions_px, None, self._static_edges)
             paths = tuple(self._path(own, k) for own in self.poses)
             ahead_s = tuple(ahead / self.fps for ahead in self.observer.ahead_frames(k))
-            out.append(ViewedFrame(k, views, bodies, paths, k / self.fps - self.middle_s, ahead_s))
+            out.append(JudgedFrame(k, views, bodies, paths, k / self.fps - self.middle_s, ahead_s))
         return out
 
     def _path(self, own: Mapping[int, PosedBody], frame: int) -> PosePath:

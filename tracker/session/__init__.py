@@ -6,7 +6,6 @@ The room `store` has its annotations. Imports `geometry`, `body`, `formats` and 
 
 __all__ = [
     "assemble",
-    "clocks",
     "folder",
     "footage_files",
     "frame_list",
@@ -16,6 +15,7 @@ __all__ = [
     "missing_files",
     "relink",
     "rig_summary",
+    "row_placement",
     "session",
     "session_file",
     "synchronize",

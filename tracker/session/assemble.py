@@ -41,7 +41,7 @@ from tracker.session.matching import (
 )
 from tracker.session.rig_summary import check_shared_view, summarize_rig
 from tracker.session.session import PALETTE, Person, Session, check_content, create_session
-from tracker.validation import same_form
+from tracker.validation import nfc_name
 
 T = TypeVar("T")
 
@@ -262,24 +262,24 @@ def _read_calibration(request: NewSession) -> CalibratedCameras:
 
 def _filmed(request: NewSession) -> set[str]:
     """Return the names of the cameras that have footage."""
-    return {*map(same_form, request.camera_paths), *map(camera_name, request.videos)}
+    return {*map(nfc_name, request.camera_paths), *map(camera_name, request.videos)}
 
 
 def _with_compared_names(request: NewSession) -> NewSession:
     """Return a request whose names have the Unicode form in which they are compared."""
 
     def keys(values: Mapping[str, T]) -> dict[str, T]:
-        return {same_form(name): value for name, value in values.items()}
+        return {nfc_name(name): value for name, value in values.items()}
 
     models, heights = request.models, request.heights
     return replace(
         request,
         videos=tuple(request.videos),
         camera_paths=keys(request.camera_paths),
-        cameras=tuple(map(same_form, request.cameras)),
+        cameras=tuple(map(nfc_name, request.cameras)),
         offsets=keys(request.offsets),
         side_names=keys(request.side_names),
-        people=tuple(map(same_form, request.people)),
+        people=tuple(map(nfc_name, request.people)),
         models=keys(models) if isinstance(models, Mapping) else models,
         heights=keys(heights) if isinstance(heights, Mapping) else heights,
     )

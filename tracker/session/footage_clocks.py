@@ -17,7 +17,7 @@ from tracker.footage.sound import SoundSettings, read_sound, sound_delay
 from tracker.footage.start_times import CREATION_TIME, GPS_TIME, TIME_CODE, StartTime, read_start_times
 from tracker.footage.video import Footage, VideoFile
 from tracker.geometry.arrays import Array, IntArray
-from tracker.session.clocks import AGREE
+from tracker.session.row_placement import AGREE
 
 
 class ClockStarts(NamedTuple):

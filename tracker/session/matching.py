@@ -8,7 +8,7 @@ from tracker.files import paths_in
 from tracker.footage.frame_rates import same_rate, usual_rate
 from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.video import Footage
-from tracker.validation import FrameRate, check, same_form
+from tracker.validation import FrameRate, check, nfc_name
 
 _NOTED_JITTER = 0.04
 """Share of the interval between frames from which jitter is reported. Ticks of a millisecond, as of Matroska, shift
@@ -62,15 +62,15 @@ def shared_footage(paths: Mapping[str, Path]) -> list[str]:
 
 def camera_name(video: Path) -> str:
     """Return the camera after which a video file or an image folder is named."""
-    return same_form(video.name if video.is_dir() else video.stem)
+    return nfc_name(video.name if video.is_dir() else video.stem)
 
 
 def find_entry(folder: Path, name: str) -> Path:
     """Return the path of a file or folder by its name, in whichever Unicode form the system stores it."""
     path = folder / name
     if not path.exists() and folder.is_dir():
-        wanted = same_form(name)
-        return next(iter(paths_in(folder, SessionError, lambda entry: same_form(entry) == wanted)), path)
+        wanted = nfc_name(name)
+        return next(iter(paths_in(folder, SessionError, lambda entry: nfc_name(entry) == wanted)), path)
     return path
 
 
@@ -236,11 +236,11 @@ def check_names(given: Iterable[str], known: Sequence[str], what: str, among: st
     Raises:
         SessionError: one is not; the message lists those that are.
     """
-    given, compared = list(given), {same_form(name): name for name in known}
-    unknown = [n for n in given if same_form(n) not in compared]
+    given, compared = list(given), {nfc_name(name): name for name in known}
+    unknown = [n for n in given if nfc_name(n) not in compared]
     if unknown:
         raise SessionError(f"unknown {what} '{unknown[0]}' among {among}; expected one of {', '.join(known)}")
-    return [compared[same_form(n)] for n in given]
+    return [compared[nfc_name(n)] for n in given]
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -20,7 +20,7 @@ from tracker.session.footage_files import check_side_files, find_background, fin
 from tracker.session.matching import check_names, find_entry
 from tracker.session.missing_files import MissingFile, missing_files
 from tracker.session.session import Session, save_camera_files
-from tracker.validation import same_form
+from tracker.validation import nfc_name
 
 
 class Relinked(NamedTuple):
@@ -82,7 +82,7 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
         named = _files_named({m.path.name for m in missing}, places.search)
         for lost in missing:
             new = _choose(
-                lost, named.get(same_form(lost.path.name), []), partial(_check, session, lost.camera, lost.kind)
+                lost, named.get(nfc_name(lost.path.name), []), partial(_check, session, lost.camera, lost.kind)
             )
             if new is not None:
                 given.append(Relinked(lost.camera, lost.kind, lost.path, new))
@@ -119,12 +119,12 @@ def _given(session: Session, places: Places) -> list[Relinked]:
             f"no camera of {session.folder} has a background to relink", Remedy("relink_nothing", kind="background")
         )
     masked = _masked(session, places.masks) if places.masks is not None else ()
-    by_name = {same_form(name): path for name, path in places.camera_paths.items()}
+    by_name = {nfc_name(name): path for name, path in places.camera_paths.items()}
     missing = []
     for source in session.cameras:
         name = source.camera.name
         given: dict[PathKind, Path] = {}
-        if (own := by_name.get(same_form(name))) is not None:
+        if (own := by_name.get(nfc_name(name))) is not None:
             given["footage"] = own
         if places.background is not None and source.background is not None:
             given["background"] = find_background(places.background, name)
@@ -139,7 +139,7 @@ def _given(session: Session, places: Places) -> list[Relinked]:
 
 def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, list[Path]]:
     """Find all files and folders with the given names below some folders, by the form in which names are compared."""
-    wanted, found = {same_form(name) for name in names}, dict[str, list[Path]]()
+    wanted, found = {nfc_name(name) for name in names}, dict[str, list[Path]]()
     for folder in folders:
         if not folder.is_dir():
             raise SessionError(f"expected a folder to search, found {folder}, which is none", Remedy("relink_search"))
@@ -148,7 +148,7 @@ def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, lis
         root = Path(os.path.abspath(folder))
         everything = (Path(e.path) for e in entries_below(root, SessionError, passes_unreadable=True))
         for path in chain([root], everything):
-            key = same_form(path.name)
+            key = nfc_name(path.name)
             if key in wanted and path not in found.setdefault(key, []):
                 found[key].append(path)
     return found

@@ -65,10 +65,10 @@ def command(arguments: Annotated[TasksArguments, tyro.conf.arg(name="")]) -> Non
     from tracker.annotation.speed import measure_speed
     from tracker.session.lock import SessionLock
     from tracker.session.store.annotation_store import AnnotationStore
-    from tracker.session.store.annotator import one_form
+    from tracker.session.store.annotator import normalized_annotator
 
     set_annotator(arguments.annotator)
-    arguments = replace(arguments, of=None if arguments.of is None else one_form(arguments.of))
+    arguments = replace(arguments, of=None if arguments.of is None else normalized_annotator(arguments.of))
     deeds = [
         w for w in ("verify", "reject", "withdraw", "comment", "resolve") if getattr(arguments, w) not in (None, False)
     ]

@@ -57,7 +57,7 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
     """
     from platformdirs import user_state_path
 
-    from app.cli.batches import local, morning
+    from app.cli.batches import batch_summary, local
     from app.session.recent_sessions import TABLE_FILE, remember_batch
     from tracker.batch.manifest import Manifest
     from tracker.batch.plan import read_plan
@@ -87,7 +87,7 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
         return
     if not arguments.table and not manifest.is_finished():
         is_stopped = _run(manifest, arguments, progress)
-    found = morning.record(manifest)
+    found = batch_summary.record(manifest)
     with suppress(OSError) if arguments.table else nullcontext():  # a batch of others may be one to read only
         write_text_atomic(manifest.folder / TABLE_FILE, format_json(found))
     remember_batch(user_state_path("quadrille", appauthor=False), manifest.folder)
@@ -95,7 +95,7 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
         from app.export.batch_report import write_batch_report
 
         write_batch_report(found, arguments.report)
-    print(format_json(found) if arguments.json else morning.format_table(found))
+    print(format_json(found) if arguments.json else batch_summary.format_table(found))
     if is_stopped:
         sys.exit(130)
     if found["totals"]["failed"]:

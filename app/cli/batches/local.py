@@ -11,7 +11,7 @@ from app.cli.doctor import WORKER_BYTES
 from app.runtime.progress import Reporter
 from tracker.batch.manifest import Manifest
 from tracker.errors import TrackerError
-from tracker.system import free_bytes, n_cores, own_module, start_apart
+from tracker.system import free_bytes, n_cores, own_module, start_detached
 
 _LOOK_S = 0.5
 _END_S = 10.0
@@ -44,7 +44,7 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
     try:
         for number in range(n):
             with (logs / f"worker_{number}.txt").open("ab") as log:
-                workers.append(start_apart(words, stdout=log, stderr=log, env=environment))
+                workers.append(start_detached(words, stdout=log, stderr=log, env=environment))
         _watch(manifest, workers, progress)
     except KeyboardInterrupt:
         _stop(workers)

@@ -77,7 +77,7 @@ def check(session: "Session", frames: range, n: int, options: tuple[bool, bool],
         def report(stage: str, share: float, text: str = "", /) -> None:
             advance(share)
 
-        posed = PosedRecording.of_session(session, observer.in_time())
+        posed = PosedRecording.of_session(session, observer.at_nearest_times())
         if acquires:
             posed = with_acquired_bodies(posed, session, report)
         found = check_calibration(posed, frames, n, report)

@@ -75,7 +75,7 @@ def judge_session(session: "Session", name: str, progress: Reporter) -> list["Ju
 
     require_files(session)
     with open_observer(session.cameras) as observer, ChainProgress(progress) as sink:
-        return judge(session, observer.in_time(), name, TrackSettings(), sink)
+        return judge(session, observer.at_nearest_times(), name, TrackSettings(), sink)
 
 
 def record(found: list["Judgement"]) -> dict[str, Any]:

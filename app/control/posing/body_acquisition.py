@@ -58,7 +58,7 @@ class BodyAcquisition:
     def _acquire(self, person: int, model: BodyModel, settings: AcquisitionSettings) -> dict[str, Any]:
         """Acquire the sizes, make them the draft, and return what shows them."""
         session_state = self._session_state
-        session, observer = session_state.session, session_state.frames.observer.in_time()
+        session, observer = session_state.session, session_state.frames.observer.at_nearest_times()
         found = acquire_body(session, observer, person, range(session.n_frames), settings, self._work.report)
         sizes = tuple(AcquiredSize(*row) for row in size_changes(found))
         outlines = body_outlines(model, found.body)

@@ -23,6 +23,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
+from tracker.pipeline.automatic_run import FOLLOWED
 from tracker.pipeline.body_acquisition import (
     SIZES_EDITS,
     refitted_record,
@@ -30,8 +31,7 @@ from tracker.pipeline.body_acquisition import (
     sizes_changed,
     with_sizes_changed,
 )
-from tracker.pipeline.body_change import joints_off_m, moved_body
-from tracker.pipeline.chain import FOLLOWED
+from tracker.pipeline.body_change import converted_body, joints_off_m
 from tracker.session.session import save_model
 from tracker.session.store.records import Change, PoseChange
 from tracker.session.store.stored_poses import StoredPose
@@ -167,7 +167,10 @@ class BodySizeEditing:
         """
         with self._activities.editing(alone=True):
             session_state, name = self._session_state, self._session_state.session.people[person].name
-            before, body = session_state.saver.revisions.current(person), moved_body(session_state.session, person, to)
+            before, body = (
+                session_state.saver.revisions.current(person),
+                converted_body(session_state.session, person, to),
+            )
             session_state.set_body_models(save_model(session_state.session, person, body))
             session_state.follow_joints()
             refitted = self._refit(person, {}, with_found=True)

@@ -147,7 +147,7 @@ class Dragging:
             return
         with self._activities.editing():
             session_state.go_to(frame)
-            session_state.require_turn([person])
+            session_state.require_editable([person])
             values = session_state.state.poses[person]
             view, pointer = cameras[camera].camera, np.array(pointer_px)
             constraints = session_state.drag_constraints(person)

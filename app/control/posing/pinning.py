@@ -88,7 +88,7 @@ class Pinning:
             )
         with self._activities.editing():
             self._session_state.go_to(frame)
-            self._session_state.require_turn([person])
+            self._session_state.require_editable([person])
             state = self._session_state.state
             self._drag = _PinDrag(page, person, point, camera, state.pins, state.people, live)
             self._session_state.last_save = time.monotonic()

@@ -7,7 +7,7 @@ import numpy as np
 from app.control.session.session_state import SessionState
 from app.control.session.watching_pages import WatchingPages
 from app.runtime.jobs import LatestWinsWorker
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.search import CostMap
 from app.state.state import State
 from tracker.body.model import BodyModel, PosedBody
@@ -76,7 +76,7 @@ class CostMaps:
         if wanted is None or views is None or state.compiling is not None:
             return
         person, dofs = wanted
-        key = (state.frame, person, dofs, state.settings, state.revisions, *(Identity(v) for v in state.poses))
+        key = (state.frame, person, dofs, state.settings, state.revisions, *(ObjectIdentity(v) for v in state.poses))
         if key == self._computed or not self._is_valid(state, person, dofs):
             return
         bodies = tuple(map(PosedBody, state.models, state.poses, map(state.velocity, range(len(state.models)))))

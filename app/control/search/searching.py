@@ -68,7 +68,7 @@ class SearchRunner:
         """
         with self._activities.starting(self):
             if not self.running:
-                self._session_state.require_turn()
+                self._session_state.require_editable()
                 self._paused_job(person).step()
 
     def run_stage(self, person: int | None = None) -> None:
@@ -168,7 +168,7 @@ class SearchRunner:
     ) -> None:
         with self._activities.starting(self):
             if not self.running:
-                self._session_state.require_turn()
+                self._session_state.require_editable()
                 job = self._paused_job(person, start, contours)
                 self._session_state.set(search=replace(self._session_state.state.search, running=True))
                 job.run(until)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Protocol
 
-from app.storage.turns import TurnError, Turns
+from app.storage.edit_claims import EditClaimError, EditClaims
 
 
 class BackgroundJob(Protocol):
@@ -29,7 +29,7 @@ class Activities:
     """The jobs and gestures of one session. At most one of them changes poses at a time."""
 
     def __init__(
-        self, lock: threading.RLock, restore: Callable[[], None] = lambda: None, turns: Turns | None = None,
+        self, lock: threading.RLock, restore: Callable[[], None] = lambda: None, turns: EditClaims | None = None,
         owner: object = None,
     ) -> None:  # fmt: skip
         """Register nothing yet.
@@ -40,7 +40,7 @@ class Activities:
             turns: those who work on the session.
             owner: stands for the one whose activities these are.
         """
-        self._lock, self._restore, self._turns, self._owner = lock, restore, turns or Turns(), owner
+        self._lock, self._restore, self._turns, self._owner = lock, restore, turns or EditClaims(), owner
         self._jobs: list[BackgroundJob] = []
         self._on_shown_frame: list[BackgroundJob] = []
         self._finish_gestures: list[Callable[[], None]] = []
@@ -83,7 +83,7 @@ class Activities:
                     self._turns.require_alone(self._owner)
                 try:
                     yield
-                except TurnError:
+                except EditClaimError:
                     self._restore()
                     raise
                 return

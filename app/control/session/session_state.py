@@ -18,8 +18,8 @@ from app.state.search import SearchView
 from app.state.state import Costs, ShownFrame, State, finite_or_none, takes_changes_of
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.interpretation import interpreted
 from tracker.compute.kernel_cache import STAGES
+from tracker.compute.uncompiled_kernels import run_uncompiled
 from tracker.errors import SessionError, TrackerError
 from tracker.estimation.fitting.gauss_newton import value_mask, with_locked_dofs
 from tracker.estimation.fitting.retarget import retarget_pose
@@ -27,7 +27,7 @@ from tracker.estimation.posing.grab import Constraints
 from tracker.estimation.search.chamfer_cost import frame_cost
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
-from tracker.pipeline.seen_points import seen_points
+from tracker.pipeline.marked_points import user_marked_points
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 
@@ -128,7 +128,7 @@ class SessionState:
         with suppress(SessionError):
             record = self.saver.record(person, self.state.frame)
             if record is not None:
-                seen = seen_points(self.session.cameras, self.models[person], record)
+                seen = user_marked_points(self.session.cameras, self.models[person], record)
                 return replace(constraints, seen=tuple(seen))
         return constraints
 
@@ -224,7 +224,7 @@ class SessionState:
         self.set(**loaded | changes)
         self.request_evidence()
 
-    def take_over(self) -> bool:
+    def show_peer_changes(self) -> bool:
         """Show what others have stored of the shown frame, and return whether anything is new.
 
         The others leave poses alone that change here, so that these stay as they are shown.
@@ -248,14 +248,14 @@ class SessionState:
         )
         return True
 
-    def require_turn(self, people: Iterable[int] | None = None, frames: Iterable[int] | None = None) -> None:
+    def require_editable(self, people: Iterable[int] | None = None, frames: Iterable[int] | None = None) -> None:
         """Check that nobody else works on poses: by default those of everybody on the shown frame.
 
         Raises:
             TurnError: somebody does.
         """
         everybody = range(len(self.session.people))
-        self.saver.require_turn(everybody if people is None else people, frames or [self.state.frame])
+        self.saver.require_editable(everybody if people is None else people, frames or [self.state.frame])
 
     def request_evidence(self) -> None:
         """Request the frame's evidence in the background, unless it is cached; the costs follow.
@@ -304,7 +304,7 @@ class SessionState:
             views = self.frames.cached_evidence(scored.frame)
         if views is None or scored.cost_px is not None or scored.drag is not None:
             return
-        with interpreted():
+        with run_uncompiled():
             costs = self._scored(views, models, scored.poses, scored.velocities)
         with self.lock:
             if self.state.people is scored.people and self.state.frame == scored.frame:

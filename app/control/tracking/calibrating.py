@@ -176,7 +176,9 @@ class Calibrating:
         return {"check": check, "n_others": len(scores), "n_better": n_better(scores), "refused": refused}
 
     def _recording(self) -> PosedRecording:
-        return PosedRecording.of_session(self._session_state.session, self._session_state.frames.observer.in_time())
+        return PosedRecording.of_session(
+            self._session_state.session, self._session_state.frames.observer.at_nearest_times()
+        )
 
     def _follow_state(self, state: State) -> None:
         found = state.calibration

@@ -22,8 +22,8 @@ from tracker.estimation.initialization.first_pose import FirstPoses
 from tracker.estimation.initialization.frame_trials import TakenError, Trying
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
+from tracker.pipeline.automatic_run import ACQUIRING, ChainPlan, Sink, find_and_track, unplaced
 from tracker.pipeline.body_acquisition import SIZES_EDITS, resized_start, with_sizes_changed
-from tracker.pipeline.chain import ACQUIRING, ChainPlan, Sink, run_chain, unplaced
 from tracker.pipeline.find_people import AXES, FindSettings, axes_record, first_record
 from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, with_keypoints
 from tracker.pipeline.stored_run import TrackPlan
@@ -112,7 +112,7 @@ class FindingPeople:
 
     def _run(self, plan: ChainPlan) -> dict[str, Any]:
         try:
-            run_chain(plan, self, self)
+            find_and_track(plan, self, self)
         except StoppedError:
             message = "Stopped; nothing was changed." if self._edit is None else "Stopped; what was found stays."
             return {**_ENDED, "message": message, "tried": None}
@@ -128,7 +128,7 @@ class FindingPeople:
     @property
     def observer(self) -> Observer:
         """See `OpenSession.observer`."""
-        return self._session_state.frames.observer.in_time()
+        return self._session_state.frames.observer.at_nearest_times()
 
     def sources(self, person: int) -> Mapping[int, str]:
         """See `OpenSession.sources`."""

@@ -29,7 +29,7 @@ from tracker.interchange.observations.observed import ObservationSet
 from tracker.interchange.observations.plans import ImportPlan, ImportRequest, MaskPlan
 from tracker.interchange.observations.stored import list_observations, load_observations
 from tracker.interchange.plausibility.examine import plan_examined_import
-from tracker.pipeline.chain import unplaced
+from tracker.pipeline.automatic_run import unplaced
 from tracker.pipeline.keypoint_evidence import find_by_keypoints, read_points
 from tracker.pipeline.keypoint_poses import imported_changes, poses_of
 from tracker.pipeline.track_session import EstimateStep, Step, TrackSession
@@ -226,7 +226,7 @@ class Observing:
         return message.strip(), plan.name if found.is_complete else None
 
     def _judge(self, name: str) -> str:
-        session, observer = self._session_state.session, self._session_state.frames.observer.in_time()
+        session, observer = self._session_state.session, self._session_state.frames.observer.at_nearest_times()
         found = judge(session, observer, name, TrackSettings(), _ShownProgress(self._work.report), self._work.report)
         self._set(judged=name, judgements=tuple(found))
         return ""

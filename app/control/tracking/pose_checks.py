@@ -70,7 +70,7 @@ class PoseChecks:
                 present = session_state.saver.revisions.current(person)
                 pose = pose_in_run(session_state, person, change.frame)
             if record is not None and record.model_revision == present:
-                session, observer = session_state.session, session_state.frames.observer.in_time()
+                session, observer = session_state.session, session_state.frames.observer.at_nearest_times()
                 found = compared_pose(session, observer, settings, pose, self._report)
                 self._store(person, stored, checked_pose(session.people[person].model, record, found))
         except StoppedError:

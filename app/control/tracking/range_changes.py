@@ -10,7 +10,7 @@ from tracker.body.motion.interpolation import interpolate_pose
 from tracker.compute.sampling import without_gaps
 from tracker.estimation.posing.dof_series import move_dofs, smooth_dofs
 from tracker.geometry.arrays import Array
-from tracker.pipeline.seen_points import without_moved
+from tracker.pipeline.marked_points import without_moved
 from tracker.session.locked_dofs import require_unlocked
 from tracker.session.store.records import BETWEEN, SEEN, FrameRow, MarkChange, PoseChange, PoseRecord
 from tracker.validation import ROUNDING

@@ -254,7 +254,7 @@ class Ranges:
         for person, frame in poses:
             frames.setdefault(person, []).append(frame)
         for person, own in frames.items():
-            self._session_state.require_turn([person], own)
+            self._session_state.require_editable([person], own)
         self._session_state.open_edit_owner = None
         ends = [k for own in frames.values() for k in (min(own), max(own))]
         within = range(min(ends), max(ends) + 1) if ends else range(0)

@@ -14,7 +14,7 @@ from app.control.tracking import track_settings
 from app.control.tracking.poses_around import pose_in_run
 from app.remedies import page_sentence
 from app.runtime.jobs import LatestWinsWorker, StoppedError
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.reason import RankedPose, Reason
 from app.state.state import State
 from tracker.body.limbs import limb_display_name
@@ -23,7 +23,7 @@ from tracker.errors import TrackerError
 from tracker.estimation.appearance.background_density import MIN_SEEN
 from tracker.estimation.appearance.region_model import learning_frames
 from tracker.estimation.by_frame.frame_problem import Bodies
-from tracker.estimation.by_frame.part_evidence import UsualEvidence, contradiction, learn_run, read_frame
+from tracker.estimation.by_frame.part_evidence import UsualEvidence, contradiction, learn_usual_evidence, read_frame
 from tracker.estimation.fitting.hypothesis import limbs_elsewhere
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
@@ -164,7 +164,7 @@ class Reasons:
     def _with_alternatives(self, state: State, found: Reason) -> Reason:
         """Return a reason with the other poses that may be as likely, by the frames around."""
         session_state, person = self._session_state, found.person
-        observer = session_state.frames.observer.in_time()
+        observer = session_state.frames.observer.at_nearest_times()
         pose = pose_in_run(session_state, person, found.frame, state.people[person].alternatives)
         is_comparable = len(observer.cameras) > 1 and len(pose.known) > 1 and found.frame in pose.known
         if not is_comparable or state.revisions[person] != state.present[person]:
@@ -196,7 +196,7 @@ class Reasons:
                 (k, tuple(PosedBody(models[i], values) for i, values in zip(people, own, strict=True)))
                 for k, own in poses.items()
             ]
-            run = learn_run(observer, frames, self._report)
+            run = learn_usual_evidence(observer, frames, self._report)
             self._learnt = _Learnt(run, people, poses, observer)
         return self._learnt.run
 
@@ -222,6 +222,6 @@ def _bodies(state: State, people: Sequence[int]) -> Bodies:
 
 def _ingredients(state: State) -> tuple[object, ...]:
     """Return what a reason is made from, for comparison. Poses are compared by identity."""
-    shown = tuple(Identity(p.values) for p in state.people)
+    shown = tuple(ObjectIdentity(p.values) for p in state.people)
     cameras = state.calibration.n_changes
     return state.frame, state.person, shown, state.revisions, cameras, state.track.running, state.compiling

@@ -14,7 +14,7 @@ from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.progress import TrackState
 from app.state.run_choices import RunChoices
-from app.storage.turns import TurnError
+from app.storage.edit_claims import EditClaimError
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.tracking.confidence import Status
 from tracker.estimation.tracking.tracker import PoseEstimate, Subjects, TrackedFrame, TrackerSettings, TrackingRun
@@ -195,7 +195,7 @@ class Tracking:
     def _begin(self, legs: Sequence[Leg], label: str, edit: int | None, on_end: Callable[[bool], None]) -> None:
         """Begin a run in a worker thread; the caller is editing."""
         session_state, saver = self._session_state, self._session_state.saver
-        session_state.require_turn(None, [k for leg in legs for k in leg.run.frames])
+        session_state.require_editable(None, [k for leg in legs for k in leg.run.frames])
         session = TrackSession(
             make_tracker(self._settings),
             legs,
@@ -225,7 +225,7 @@ class Tracking:
         with self._activities.starting(self):
             run = self._run
             if run is not None and not run.job.running:
-                self._session_state.require_turn(None, run.session.frames)  # later stages write all of them again
+                self._session_state.require_editable(None, run.session.frames)  # later stages write all of them again
                 self._session_state.set(track=replace(self._session_state.state.track, running=True))
                 run.job.run()
 
@@ -279,7 +279,10 @@ class Tracking:
 
     def observer(self) -> Observer:
         """Return the observer of the chosen cameras."""
-        observer, cameras = self._session_state.frames.observer.in_time(), self._session_state.state.run_choices.cameras
+        observer, cameras = (
+            self._session_state.frames.observer.at_nearest_times(),
+            self._session_state.state.run_choices.cameras,
+        )
         chosen = [i for i, c in enumerate(observer.cameras) if c.camera.name in cameras]
         return observer.with_cameras(chosen) if chosen else observer
 
@@ -310,7 +313,7 @@ class Tracking:
     def _paused(self, run: _Run) -> None:
         with self._session_state.lock:
             if run is self._run:
-                with suppress(TurnError):  # saved again when the run ends, which reports the error
+                with suppress(EditClaimError):  # saved again when the run ends, which reports the error
                     self._save(run)
                 self._session_state.set(track=replace(self._session_state.state.track, running=False))
                 self._session_state.request_evidence()
@@ -337,7 +340,7 @@ class Tracking:
         """End a run, and tell how; poses that somebody else's work keeps from being saved are lost."""
         try:
             self._save(run)
-        except TurnError as error:
+        except EditClaimError as error:
             how, failed = f"stopped, because {page_text(error)}", True
             self._session_state.show_frame()  # the stored poses: a shown one may be lost
         summary = run.display.summary()

@@ -4,7 +4,7 @@ import numpy as np
 
 from app.control.controller import Controller
 from app.messages.server import DofObservability, ObservabilityMessage
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.page_view import View
 from app.state.state import State
 from tracker.body.model import PosedBody
@@ -64,5 +64,5 @@ def _dof(found: Observability, dof: int, sentence: str) -> DofObservability:
 
 def _ingredients(state: State) -> tuple[object, ...]:
     """Return what the message is made from, for comparison. Poses are compared by identity."""
-    shown = tuple(Identity(p.values) for p in state.people)
+    shown = tuple(ObjectIdentity(p.values) for p in state.people)
     return (state.frame, state.person, shown, state.revisions, state.calibration.n_changes)

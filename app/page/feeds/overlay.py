@@ -6,7 +6,7 @@ from collections.abc import Callable
 from app.control.controller import Controller
 from app.messages import encoding
 from app.state import page_view
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.page_view import View
 from app.state.state import State
 from tracker.evidence.view_evidence import ViewEvidence
@@ -61,11 +61,11 @@ def _ingredients(state: State) -> tuple[object, ...]:
     """Return what an overlay depends on, for comparison. Poses are compared by identity."""
     drawn = (
         state.frame,
-        tuple(Identity(p.values) for p in state.people),
-        Identity(state.drawn.people[state.person].errors),
+        tuple(ObjectIdentity(p.values) for p in state.people),
+        ObjectIdentity(state.drawn.people[state.person].errors),
         state.revisions,
         state.draft,
-        None if state.search.candidate is None else tuple(map(Identity, state.search.candidate)),
+        None if state.search.candidate is None else tuple(map(ObjectIdentity, state.search.candidate)),
         state.search.running,
         state.search_view,
         state.range_comparison,
@@ -73,16 +73,16 @@ def _ingredients(state: State) -> tuple[object, ...]:
         () if state.compared is None else state.compared.moved,
         state.drag,
         state.drag_seqs,
-        state.undrawn,
+        state.people_not_drawn,
         state.compiled,
-        Identity(state.finding.candidates),
+        ObjectIdentity(state.finding.candidates),
         state.calibration.n_changes,
-        Identity(state.calibration.preview) if state.calibration.is_previewed else None,
-        Identity(None if state.reason is None else state.reason.alternatives),
-        Identity(None if state.other_copy is None else state.other_copy.poses),
-        Identity(state.observations.plan),
-        Identity(state.observations.shown),
-        Identity(state.observations.judgements),
+        ObjectIdentity(state.calibration.preview) if state.calibration.is_previewed else None,
+        ObjectIdentity(None if state.reason is None else state.reason.alternatives),
+        ObjectIdentity(None if state.other_copy is None else state.other_copy.poses),
+        ObjectIdentity(state.observations.plan),
+        ObjectIdentity(state.observations.shown),
+        ObjectIdentity(state.observations.judgements),
     )
     return (*drawn, _pins(state), state.floor.picking)
 

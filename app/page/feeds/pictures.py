@@ -8,7 +8,7 @@ from app.drawing import overlays, pictures
 from app.drawing.seen_bodies import bodies_in
 from app.messages.base import encode_binary
 from app.messages.binary_headers import ImageHeader
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.page_view import EVIDENCE, PictureLayer, View
 from app.state.state import State
 
@@ -79,7 +79,7 @@ class PictureSets:
         if layer == "image":
             return frames.image(state.frame, camera, reduction), None
         if layer == "parts":
-            shown = [i for i in range(len(session.people)) if i not in state.undrawn]
+            shown = [i for i in range(len(session.people)) if i not in state.people_not_drawn]
             time, everybody = session.cameras[camera].clock.offset_frames(state.frame), bodies_in(session, state.drawn)
             bodies = [everybody[i].ahead(time) for i in shown]
             colors = overlays.part_colors([session.people[i] for i in shown])
@@ -97,7 +97,11 @@ def _wanted(state: State, view: View) -> dict[Key, tuple[object, ...]]:
         for camera in sorted(view.cameras):
             # Evidence has the scale of matching, whatever the size of the pane.
             content = () if layer in EVIDENCE else (view.reductions[camera],)
-            poses = (state.revisions, state.undrawn, *map(Identity, state.drawn.poses)) if layer == "parts" else ()
+            poses = (
+                (state.revisions, state.people_not_drawn, *map(ObjectIdentity, state.drawn.poses))
+                if layer == "parts"
+                else ()
+            )
             wanted[layer, camera] = (
                 state.frame,
                 state.footage.recoveries,

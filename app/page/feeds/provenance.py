@@ -10,7 +10,7 @@ from app.messages.observation import (
     ProvenanceMessage,
     WatchProvenance,
 )
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.page_view import View
 from app.state.state import State
 from app.storage.pose_origins import PoseOrigin
@@ -59,11 +59,11 @@ class ProvenanceFeed:
 
     def _ingredients(self, state: State) -> tuple[object, ...]:
         """Return what the messages are made from, for comparison."""
-        copy = Identity(state.other_copy), None if state.other_copy is None else state.frame
+        copy = ObjectIdentity(state.other_copy), None if state.other_copy is None else state.frame
         if self._wanted == _UNWATCHED:
             return copy
         present = (state.timeline_version, state.present, state.calibration.n_changes)
-        return (*copy, self._wanted, state.frame, present, Identity(state.checked))
+        return (*copy, self._wanted, state.frame, present, ObjectIdentity(state.checked))
 
 
 def provenance(state: State, person: int, origin: PoseOrigin | None) -> ProvenanceMessage:

@@ -11,7 +11,7 @@ from app.messages import search as wire
 from app.messages.base import Message, encode_binary, made_of
 from app.messages.binary_headers import LandscapeHeader, SearchCandidatesHeader, SearchStepsHeader
 from app.messages.client import Tab
-from app.state.identity import Identity
+from app.state.identity import ObjectIdentity
 from app.state.search import CostLandscape
 from app.state.state import State, finite_or_none
 from tracker.session.session import Session
@@ -33,7 +33,7 @@ class SearchFeed:
         self._setup: wire.SearchSetupMessage | None = None
         self._runs: wire.SearchRunsMessage | None = None
         self._steps: dict[int, tuple[int, int]] = {}  # by run: steps sent, times thinned
-        self._candidates: dict[int, tuple[Identity, ...]] = {}
+        self._candidates: dict[int, tuple[ObjectIdentity, ...]] = {}
         self._landscape: CostLandscape | None = None
 
     def updates(self, controller: Controller, with_figures: bool = True) -> list[Message | bytes]:
@@ -81,7 +81,7 @@ class SearchFeed:
         return [steps(run, first)]
 
     def _candidates_of(self, session: Session, run: SearchRun) -> list[bytes]:
-        key = tuple(map(Identity, run.candidates))
+        key = tuple(map(ObjectIdentity, run.candidates))
         if key == self._candidates.get(run.number, ()):
             return []
         self._candidates[run.number] = key

@@ -18,7 +18,7 @@ from app.state.state import State
 from tracker.compute.kernel_cache import STAGES
 from tracker.estimation.initialization.silhouette_check import SilhouetteCheck
 from tracker.estimation.posing.limb_moves import LimbMove
-from tracker.estimation.posing.placed_depth import UnseenDepth
+from tracker.estimation.posing.placed_depth import UndeterminedDepth
 
 POSE = np.zeros(3)
 CAMERAS = ("FRONT", "RIGHT", "BACK")
@@ -51,7 +51,7 @@ CHECK = SimpleNamespace(named=("RIGHT",), contradictions=["RIGHT is turned by 0.
 OFF = "Footage of RIGHT ends at frame 12"
 SETS = (ObservedSet("network", frames=90),)
 DRAFT = SizeDraft(0, None, {3: POSE})
-DEPTH = DepthNote(0, 0, POSE, UnseenDepth(("left_wrist", "left_knee"), 1))
+DEPTH = DepthNote(0, 0, POSE, UndeterminedDepth(("left_wrist", "left_knee"), 1))
 MOVES = (limb_move("left_forearm", 0.21), limb_move("right_shin", 0.12))
 
 ROWS = [

@@ -9,7 +9,7 @@ import pytest
 from command_line import SAMPLE, assert_refused, output_of, stored
 
 from tracker.estimation.acquisition import size_fit
-from tracker.estimation.acquisition.chamfer_search import ChamferSearchSettings
+from tracker.estimation.acquisition.shape_search import ChamferSearchSettings
 from tracker.estimation.acquisition.two_views import TwoViewSettings
 from tracker.formats.model_toml import format_model, load_model
 from tracker.session.session import load_session

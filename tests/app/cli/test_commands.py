@@ -342,8 +342,8 @@ def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
         "app.server.workbench.open_session", lambda found, doorway, *_: asked.append((found.folder, doorway.serving))
     )
     monkeypatch.setattr("app.session.samples.sample_copy", lambda *words: samples.append(words) or session)
-    monkeypatch.setattr("app.server.doorway.listen", lambda host, _: address.listen(host, 0))
-    monkeypatch.setattr("app.server.doorway.webbrowser.open", browsed.append)
+    monkeypatch.setattr("app.server.startup_server.listen", lambda host, _: address.listen(host, 0))
+    monkeypatch.setattr("app.server.startup_server.webbrowser.open", browsed.append)
     assert run()[0] == 0
     assert run(session, "--port", "0", "--no-browser")[0] == 0
     assert run("open", session)[0] == 0

@@ -9,7 +9,7 @@ from command_line import output_of
 
 from app.cli import doctor
 from tracker.compute import extensions
-from tracker.compute.distribution import install_command
+from tracker.compute.installed_package import install_command
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from gestures import FRONT, drag, drag_on, pixel_of, start_run, wait_for
 
 from app.participants.participants import Participants
-from app.storage.turns import TurnError
+from app.storage.edit_claims import EditClaimError
 from tracker.annotation.frame_choice import FrameChoice
 from tracker.errors import TrackerError
 
@@ -52,9 +52,9 @@ def test_an_edit_elsewhere_leaves_the_shown_pose_as_the_same_object(anna, ben):
 def test_a_pose_is_edited_in_turn(anna, ben):
     start = tuple(pixel_of(anna, "torso"))
     anna.dragging.begin(1, FRONT, 0, "torso", start)
-    with pytest.raises(TurnError, match="anna drags on frame 0"):
+    with pytest.raises(EditClaimError, match="anna drags on frame 0"):
         ben.dragging.begin(2, FRONT, 0, "torso", start)
-    with pytest.raises(TurnError, match="anna drags"):
+    with pytest.raises(EditClaimError, match="anna drags"):
         ben.pose_edits.turn(0, [0], 0.1, 0)
     assert ben.state.saved
     drag_on(ben, 1, "torso", (5.0, 0.0))  # another frame is free
@@ -128,7 +128,7 @@ def test_alone_again_ones_own_entries_are_gone_along(people):
 def test_undo_waits_for_a_drag_of_the_same_pose(anna, ben):
     drag(ben, "torso", (4.0, 0.0))
     anna.dragging.begin(1, FRONT, 0, "torso", tuple(pixel_of(anna, "torso")))
-    with pytest.raises(TurnError, match="anna drags"):
+    with pytest.raises(EditClaimError, match="anna drags"):
         ben.history.undo()
     anna.dragging.cancel(1)
     ben.history.undo()
@@ -287,7 +287,7 @@ def test_bodies_of_the_host_are_taken_over(anna, ben):
     height = anna.models[0].height_m
     ben.dragging.begin(1, FRONT, 0, "torso", tuple(pixel_of(ben, "torso")))
     anna.body_sizes.set_height(0, height + 0.1)
-    with pytest.raises(TurnError, match="ben drags"):
+    with pytest.raises(EditClaimError, match="ben drags"):
         anna.body_sizes.apply(0, refit=False)
     ben.dragging.end(1)
     anna.body_sizes.apply(0, refit=False)
@@ -301,10 +301,10 @@ def test_bodies_of_the_host_are_taken_over(anna, ben):
 def test_a_run_of_one_leaves_the_others_to_other_frames(anna, ben, tracker):
     start_run(anna)
     ben.navigation.seek(4)
-    with pytest.raises(TurnError, match="tracks frames 3 to 6"):
+    with pytest.raises(EditClaimError, match="tracks frames 3 to 6"):
         drag(ben, "torso", (4.0, 0.0))
     drag_on(ben, 9, "torso", (4.0, 0.0))
-    with pytest.raises(TurnError, match="tracks frames"):
+    with pytest.raises(EditClaimError, match="tracks frames"):
         ben.ranges.track(2, 8, backward=False)
     tracker.let_go(1000)
     wait_for(lambda: not anna.tracking.running)

@@ -6,7 +6,7 @@ import pytest
 from gestures import FRONT, drag, drag_on, pixel_of, start_run, wait_for
 
 from app.control.tracking import ranges
-from app.storage.turns import TurnError
+from app.storage.edit_claims import EditClaimError
 from tracker.errors import TrackerError
 
 
@@ -22,7 +22,7 @@ def test_a_paused_run_goes_on_only_when_its_frames_are_free(anna, ben, tracker):
     anna.tracking.pause()
     ben.navigation.seek(5)
     ben.dragging.begin(1, FRONT, 0, "torso", tuple(pixel_of(ben, "torso")))
-    with pytest.raises(TurnError, match="ben drags on frame 5"):
+    with pytest.raises(EditClaimError, match="ben drags on frame 5"):
         anna.tracking.resume()
     assert not anna.state.track.running
     ben.dragging.end(1)
@@ -60,7 +60,7 @@ def test_a_stop_reports_what_it_could_not_save(anna, ben, tracker):
 def test_a_refused_mark_leaves_nothing_running(anna, ben):
     drag(anna, "torso", (4.0, 0.0))
     anna.dragging.begin(1, FRONT, 0, "torso", tuple(pixel_of(anna, "torso")))
-    with pytest.raises(TurnError, match="anna drags on frame 0"):
+    with pytest.raises(EditClaimError, match="anna drags on frame 0"):
         ben.ranges.mark(0, 0, "none")
     assert not ben.ranges.running
     assert not ben.state.ranges.running
@@ -101,7 +101,7 @@ def test_work_on_a_range_has_its_turn(people, monkeypatch, anna, ben):
     anna.ranges.interpolate(2, 8)
     assert is_held.wait(20)
     ben.navigation.seek(6)
-    with pytest.raises(TurnError, match="anna is interpolating frames 3 to 7"):
+    with pytest.raises(EditClaimError, match="anna is interpolating frames 3 to 7"):
         drag(ben, "torso", (4.0, 0.0))
     assert people.present()[0].doing == "is interpolating frames 3 to 7"
     may_go_on.set()

@@ -11,16 +11,16 @@ import sys
 import pytest
 from gestures import wait_for
 
-from app.server import doorway as doorways
+from app.server import startup_server as doorways
 from app.server.address import Serving
-from app.server.doorway import STEPS, Doorway
+from app.server.startup_server import STEPS, StartupServer
 from app.server.static_files import KEPT, PageFiles, static_folder
 
 
 @pytest.fixture
 def doorway(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    with Doorway(Serving(port=0, browser=False)) as it:
+    with StartupServer(Serving(port=0, browser=False)) as it:
         yield it
 
 
@@ -68,7 +68,7 @@ def test_the_files_of_the_page_are_kept(doorway):
 @pytest.mark.skipif(not doorways.FORKS, reason="threads answer on this system")
 def test_a_process_of_its_own_answers_and_ends_with_the_program(monkeypatch, tmp_path):
     """However the program ends: the port is free again."""
-    code = "import os, sys; from app.server.doorway import Doorway; from app.server.address import Serving\n"
+    code = "import os, sys; from app.server.startup_server import Doorway; from app.server.address import Serving\n"
     code += "with Doorway(Serving(port=0)) as d: print(d.port, d._process.pid, flush=True); os.kill(os.getpid(), 9)"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     port, process = map(int, ended.stdout.split())
@@ -84,7 +84,7 @@ def test_a_process_of_its_own_answers_and_ends_with_the_program(monkeypatch, tmp
 def test_threads_answer_where_a_process_cannot(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(doorways, "FORKS", False)
-    with Doorway(Serving(port=0, browser=False)) as doorway:
+    with StartupServer(Serving(port=0, browser=False)) as doorway:
         doorway.show(STEPS[1])
         assert json.loads(get(doorway, "/starting.json")[2])["at"] == 1
 
@@ -122,8 +122,8 @@ def test_the_next_program_serves_the_same_port(doorway):
 def test_the_browser_is_opened_with_an_invitation(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     opened = []
-    monkeypatch.setattr("app.server.doorway.webbrowser.open", opened.append)
-    with Doorway(Serving(port=0)) as doorway:
+    monkeypatch.setattr("app.server.startup_server.webbrowser.open", opened.append)
+    with StartupServer(Serving(port=0)) as doorway:
         doorway.open_browser()
         wait_for(lambda: opened)
     assert doorway.access.invitation.code in opened[0]
@@ -132,7 +132,7 @@ def test_the_browser_is_opened_with_an_invitation(monkeypatch, tmp_path):
 
 def test_nobody_listens_afterwards(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    with Doorway(Serving(port=0, browser=False)) as doorway:
+    with StartupServer(Serving(port=0, browser=False)) as doorway:
         pass
     assert [each.fileno() for each in doorway.sockets] == [-1] * len(doorway.sockets)
 
@@ -142,7 +142,7 @@ import sys
 import app.main
 from app.cli import open
 from app.runtime.kernel_compiler import KernelCompiler
-from app.server.doorway import Doorway
+from app.server.startup_server import Doorway
 from app.session.samples import sample_copy
 from tracker.compute.kernel_cache import is_compiled
 from tracker.session.folder import session_folder

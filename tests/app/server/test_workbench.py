@@ -16,7 +16,7 @@ from app.control.session import save_retry
 from app.runtime.kernel_compiler import KernelCompiler
 from app.server import workbench
 from app.server.address import Serving
-from app.server.doorway import Doorway
+from app.server.startup_server import StartupServer
 from app.server.workbench import open_session
 from app.storage import rescue
 from tracker.errors import SessionError, TrackerError
@@ -58,7 +58,7 @@ def open_with(session, monkeypatch):
             patch.setattr(workbench, "serve_forever", served)
             lines = []
             try:
-                with SessionLock(session), Doorway(Serving(port=0, browser=False)) as doorway:
+                with SessionLock(session), StartupServer(Serving(port=0, browser=False)) as doorway:
                     open_session(load_session(session), doorway, KernelCompiler(), lines.append)
             finally:
                 open_it.lines = lines

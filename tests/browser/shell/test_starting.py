@@ -10,8 +10,8 @@ from page_driver import OPENED, reloaded, shows
 from serving import listening
 
 from app.server.address import Serving
-from app.server.doorway import STEPS, Doorway
 from app.server.server import create_app, serve_forever
+from app.server.startup_server import STEPS, StartupServer
 from app.server.static_files import static_folder
 
 COVERED = "getComputedStyle(document.querySelector('#starting')).display !== 'none'"
@@ -20,7 +20,7 @@ COVERED = "getComputedStyle(document.querySelector('#starting')).display !== 'no
 @pytest.fixture
 def doorway(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    with Doorway(Serving(port=0, browser=False)) as doorway:
+    with StartupServer(Serving(port=0, browser=False)) as doorway:
         yield doorway
 
 
@@ -115,7 +115,7 @@ async def test_an_open_page_comes_back_after_a_restart(browser, doorway, blank_v
         async with program(doorway, blank_viser):
             await shows(page, OPENED)
         doorway.__exit__(None, None, None)
-        with Doorway(Serving(port=doorway.port, browser=False)) as again:
+        with StartupServer(Serving(port=doorway.port, browser=False)) as again:
             assert again.access.root == doorway.access.root
             await reloaded(page, "document.querySelector('#steps li')")
             async with program(again, blank_viser):

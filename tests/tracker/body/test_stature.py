@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bodies import with_center
 
-from tracker.body.dimensions import dimensions_of, stature_m, with_dimensions, with_height_of_stature
+from tracker.body.dimensions import dimensions_of, restate_height, stature_m, with_dimensions
 from tracker.formats.model_toml import load_model
 
 
@@ -19,7 +19,7 @@ def test_the_height_follows_the_stature_and_the_body_stays():
         for n, p in sizes.parts.items()
     }
     short = with_dimensions(model, sizes._replace(parts=parts))
-    resized = with_height_of_stature(short, model)
+    resized = restate_height(short, model)
     assert short.height_m == 1.6
     assert resized.height_m == pytest.approx(1.6 - 0.15 * 1.6 * (0.2425 + 0.2527), abs=0.02)
     pose = np.random.default_rng(0).normal(0, 0.3, model.n_dofs)

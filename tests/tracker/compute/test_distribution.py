@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from app.remedies import command_line_text
-from tracker.compute import distribution
-from tracker.compute.distribution import install_command
+from tracker.compute import installed_package
+from tracker.compute.installed_package import install_command
 from tracker.errors import Remedy
 
 LINKED = json.dumps({"url": "file:///home/ann/my%20quadrille", "dir_info": {"editable": True}})
@@ -35,12 +35,12 @@ OWN = "'quadrille-mocap[export]'"
 )
 def test_an_extra_is_installed_as_the_program_was(monkeypatch, prefix, installer, direct, expected):
     records = {"INSTALLER": installer, "direct_url.json": direct}
-    monkeypatch.setattr(distribution.sys, "prefix", prefix)
+    monkeypatch.setattr(installed_package.sys, "prefix", prefix)
     monkeypatch.setattr(metadata, "distribution", lambda name: SimpleNamespace(read_text=records.get))
     assert install_command("export") == expected
     assert command_line_text("found none", Remedy("install_extra", extra="export")).endswith(f"with: {expected}")
 
 
 def test_a_tree_that_is_not_installed_names_the_distribution(monkeypatch):
-    monkeypatch.setattr(distribution, "DISTRIBUTION", "not-there")
+    monkeypatch.setattr(installed_package, "DISTRIBUTION", "not-there")
     assert install_command("dask").endswith("install 'not-there[dask]'")

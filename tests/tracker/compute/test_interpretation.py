@@ -7,14 +7,14 @@ import threading
 import numpy as np
 import pytest
 
-from tracker.compute.interpretation import interpret_modules, interpreted, is_interpreted
 from tracker.compute.jit import njit
+from tracker.compute.uncompiled_kernels import interpret_modules, is_interpreted, run_uncompiled
 
 _SCORE = """
 import numpy as np
 from app.session.samples import bundled
 from tracker.body.model import PosedBody
-from tracker.compute.interpretation import interpreted
+from tracker.compute.uncompiled_kernels import interpreted
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.observer import open_observer
 from tracker.estimation.posing.default_pose import default_pose
@@ -64,7 +64,7 @@ def kernel():
 
 @pytest.mark.slow
 def test_an_interpreted_kernel_compiles_nothing(kernel):
-    with interpreted():
+    with run_uncompiled():
         assert kernel(np.ones(3)) == 12
         assert not kernel.signatures
         assert not kernel.inner.signatures
@@ -74,7 +74,7 @@ def test_an_interpreted_kernel_compiles_nothing(kernel):
 
 @pytest.mark.slow
 def test_other_threads_compile(kernel):
-    with interpreted():
+    with run_uncompiled():
         other = threading.Thread(target=kernel, args=(np.ones(3),))
         other.start()
         other.join()
@@ -82,8 +82,8 @@ def test_other_threads_compile(kernel):
 
 
 def test_a_context_in_another_ends_alone():
-    with interpreted():
-        with interpreted():
+    with run_uncompiled():
+        with run_uncompiled():
             pass
         assert is_interpreted("any")
     assert not is_interpreted("any")

@@ -92,7 +92,7 @@ def test_a_finder_of_some_of_the_views_reads_their_footage(camera, tmp_path):
         cv2.imwrite(str(tmp_path / "empty" / f"{i:03d}.png"), texture().round().astype(np.uint8))
     other, camera = replace(camera, footage=tmp_path / "empty"), replace(camera, background=None)
     with Recording([other, camera]) as recording:
-        (silhouette,) = SilhouetteFinder([camera], recording, in_recording=[1]).silhouettes(4)
+        (silhouette,) = SilhouetteFinder([camera], recording, recording_views=[1]).silhouettes(4)
     assert jaccard(silhouette.mask, person(4)) > 0.9
 
 

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 import rigs
 
-from tracker.geometry.camera_columns import camera_difference, moved_camera, n_columns, project_with_columns
+from tracker.geometry.camera_derivatives import (
+    camera_difference,
+    moved_camera,
+    n_camera_parameters,
+    project_with_columns,
+)
 from tracker.geometry.cameras import Camera
 
 LENSES = [
@@ -39,7 +44,7 @@ def test_the_columns_are_the_derivatives(distortion, fisheye):
     for i in range(3):
         by = (camera.project(X + h * np.eye(3)[i]) - camera.project(X - h * np.eye(3)[i])) / (2 * h)
         np.testing.assert_allclose(projected.by_point[shown, :, i], by[shown], rtol=1e-5, atol=2e-3)
-    for step in np.eye(n_columns(camera)):
+    for step in np.eye(n_camera_parameters(camera)):
         by = (moved_camera(camera, h * step).project(X) - moved_camera(camera, -h * step).project(X)) / (2 * h)
         np.testing.assert_allclose(projected.by_camera[shown] @ step, by[shown], rtol=1e-5, atol=2e-3)
 
@@ -54,5 +59,5 @@ def test_a_point_on_the_axis_has_finite_derivatives(fisheye):
 
 def test_the_difference_undoes_a_move():
     camera = camera_with(*LENSES[2])
-    step = np.random.default_rng(0).normal(size=n_columns(camera)) * 0.01
+    step = np.random.default_rng(0).normal(size=n_camera_parameters(camera)) * 0.01
     np.testing.assert_allclose(camera_difference(camera, moved_camera(camera, step)), step, atol=1e-12)

@@ -23,9 +23,9 @@ from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
 from tracker.estimation.initialization.frame_trials import Trying
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.camera_correction import N_CORRECTIONS
-from tracker.pipeline import chain, track_session
+from tracker.pipeline import automatic_run, track_session
+from tracker.pipeline.automatic_run import ChainPlan, StoredSession, find_and_track, start_frame
 from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
-from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, start_frame
 from tracker.pipeline.find_people import FindSettings
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan
@@ -70,7 +70,7 @@ def found(monkeypatch):
         show(Trying(FRAME, 1, 2, "", None, None, None))
         return FirstPoses(FRAME, {0: first})
 
-    monkeypatch.setattr(chain, "find_people", find)
+    monkeypatch.setattr(automatic_run, "find_people", find)
     return calls
 
 
@@ -99,7 +99,7 @@ def opened(tmp_path, sample_folder):
 
 def run(opened, sink=None, frames=range(6), whole_run=False, acquire=(), is_finding=True):
     plan = TrackPlan(frames, (0,), TrackSettings(whole_run=whole_run))
-    return run_chain(ChainPlan(plan, FindSettings() if is_finding else None, acquire), opened, sink or Notes())
+    return find_and_track(ChainPlan(plan, FindSettings() if is_finding else None, acquire), opened, sink or Notes())
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def acquiring(opened, monkeypatch):
         body = with_dimensions(before, sizes._replace(height_m=1.1 * before.height_m, parts=thin))
         return Acquisition(body, (FRAME,), (body.neutral() + 0.01,), 2.0, asked.cost_px, None, None)
 
-    monkeypatch.setattr(chain, "acquire_body", acquire)
+    monkeypatch.setattr(automatic_run, "acquire_body", acquire)
     return asked
 
 

@@ -18,7 +18,7 @@ from tracker.formats.anipose import write_calibration
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.cameras import Camera
 from tracker.session.assemble import NewSession, assemble, unfilmed_cameras
-from tracker.session.clocks import place_rows
+from tracker.session.row_placement import place_rows
 from tracker.session.session import load_session
 
 __all__ = ["room"]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.trc import MarkerTable, read_trc, write_trc
-from tracker.session.clocks import Placement, listed_frames, place_rows
+from tracker.session.row_placement import RowPlacement, listed_frames, place_rows
 
 NTSC = {24: 24000 / 1001, 30: 30000 / 1001, 60: 60000 / 1001, 120: 120000 / 1001}
 
@@ -28,7 +28,7 @@ def line(n, rate, frames=None):
 
 
 def placed(file, fps, **known):
-    return place_rows(file, "TRC file x.trc", fps, Placement(**known))
+    return place_rows(file, "TRC file x.trc", fps, RowPlacement(**known))
 
 
 def by_frame(file):

@@ -19,7 +19,7 @@ from tracker.calibration.boards.rig_fit import (
 )
 from tracker.calibration.boards.view_choice import MAX_LENS_VIEWS, choose_frames, choose_views, outlines, posed_views
 from tracker.calibration.check.held_out import HeldOut, held_out_of
-from tracker.calibration.check.solvable import check_apart, solvable
+from tracker.calibration.check.unsolvable import check_apart, refuse_unsolvable
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import CalibrationError
 from tracker.geometry.cameras import Camera
@@ -99,7 +99,7 @@ def calibrate_rig(
     scale = 1.0 if board.square_m >= USUAL_SIZES["square"].low else board.square_m / USUAL_SIZES["square"].high
     board = replace(board, square_m=board.square_m / scale)
     blanks = [blank_camera(n, s, fisheye=f) for n, s, f in zip(names, sizes, fisheye, strict=True)]
-    with solvable("film the board in many places, nearer, farther and tilted"):
+    with refuse_unsolvable("film the board in many places, nearer, farther and tilted"):
         found = _calibrated(board, seen, blanks, needed_frame, report)
     _check_determined(found, board)
     return found if scale == 1.0 else replace(found, rig=found.rig.scaled(scale))

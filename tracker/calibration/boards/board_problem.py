@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibration.boards.board_description import Board
-from tracker.calibration.check.reprojection import Located, Observations, Prior, ReprojectionProblem
+from tracker.calibration.check.rig_adjustment import Located, Observations, Prior, ReprojectionProblem
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray, Mask
 

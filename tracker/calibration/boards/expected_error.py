@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.reprojection import column_ends
+from tracker.calibration.check.rig_adjustment import column_ends
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, Mask
-from tracker.geometry.camera_columns import project_with_columns
+from tracker.geometry.camera_derivatives import project_with_columns
 from tracker.geometry.cameras import Camera
 
 _OUTSIDE = 0.05
@@ -19,7 +19,7 @@ MAX_POINTS = 300
 """Most points of the volume; their errors are alike."""
 
 
-class VolumeError(NamedTuple):
+class VolumeAccuracy(NamedTuple):
     """Root mean square error of points in a volume, metres, after the best rigid fit, without noise of their own.
 
     An interval for the one true value: with a probability of 90% it lies between the bounds.
@@ -44,7 +44,7 @@ def in_pictures(cameras: Sequence[Camera], points_world: Array) -> Mask:
 
 def expected_error(
     cameras: Sequence[Camera], covariance: Array, points_world: Array, with_scale: bool = True
-) -> VolumeError:
+) -> VolumeAccuracy:
     """Propagate the covariance of cameras to points that they triangulate: the points nearest to their rays.
 
     Where a camera is off by c, its ray passes a point at -A^+ B c, with A and B the derivatives of the picture by point
@@ -60,7 +60,7 @@ def expected_error(
     shown = in_pictures(cameras, points_world)
     shown, points = shown[:, shown.sum(axis=0) >= 2], points_world[shown.sum(axis=0) >= 2]
     if not len(points):
-        return VolumeError(np.inf, np.inf, np.inf)
+        return VolumeAccuracy(np.inf, np.inf, np.inf)
     ends = column_ends(cameras)
     normal, moves = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3, ends[-1]))
     for i, camera in enumerate(cameras):
@@ -82,4 +82,4 @@ def expected_error(
     variances = np.linalg.eigvalsh(factor.T @ factor / len(points))
     normals = np.random.default_rng(0).normal(size=(_DRAWS, len(variances)))
     low, median, high = np.quantile(np.sqrt(normals**2 @ np.maximum(variances, 0.0)), (_OUTSIDE, 0.5, 1 - _OUTSIDE))
-    return VolumeError(float(median), float(low), float(high))
+    return VolumeAccuracy(float(median), float(low), float(high))

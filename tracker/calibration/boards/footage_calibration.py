@@ -19,7 +19,7 @@ from tracker.calibration.boards.board_diagnosis import found_instead
 from tracker.calibration.boards.board_problem import SeenCorners
 from tracker.calibration.boards.corner_detection import NO_CORNERS, CornerDetector, Corners
 from tracker.calibration.boards.view_choice import posed_views
-from tracker.calibration.check.reprojection import OUTLIER_SIGMAS
+from tracker.calibration.check.rig_adjustment import OUTLIER_SIGMAS
 from tracker.compute.progress import Report, part_of, unreported
 from tracker.compute.threads import map_parallel
 from tracker.errors import CalibrationError
@@ -50,7 +50,7 @@ class BoardViews(NamedTuple):
     """Some pictures of all cameras, (H, W) gray."""
 
 
-def every_frame(n_frames: int, every: int | None) -> range:
+def every_nth_frame(n_frames: int, every: int | None) -> range:
     """Return the frames in which to seek the board: each `every`-th, by default so that there are not too many."""
     return range(0, n_frames, every or max(1, -(-n_frames // MAX_FRAMES_READ)))
 
@@ -177,7 +177,7 @@ def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
             footage[name] = open_footage(path, name)
             stack.callback(footage[name].close)
         n_frames = common_length(footage, filmed.offsets, filmed.common_frames)
-        frames = every_frame(n_frames, filmed.every)
+        frames = every_nth_frame(n_frames, filmed.every)
         if filmed.floor_frame is not None:
             if not 0 <= filmed.floor_frame < n_frames:
                 raise CalibrationError(

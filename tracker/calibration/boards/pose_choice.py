@@ -8,7 +8,7 @@ import numpy as np
 from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_problem import BoardProblem, SeenCorners
 from tracker.calibration.boards.view_choice import posed_views
-from tracker.calibration.check.reprojection import Prior, Rig
+from tracker.calibration.check.rig_adjustment import Prior, Rig
 from tracker.estimation.fitting.bundle import ROUGH, solve_bundle
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray

@@ -11,10 +11,10 @@ import numpy as np
 
 from tracker.calibration.boards.board_description import Board
 from tracker.calibration.boards.board_problem import BoardProblem, SeenCorners
-from tracker.calibration.boards.expected_error import MAX_POINTS, VolumeError, expected_error
+from tracker.calibration.boards.expected_error import MAX_POINTS, VolumeAccuracy, expected_error
 from tracker.calibration.boards.pose_choice import Poses, best_poses, board_poses, posed_frames
 from tracker.calibration.check.lens_priors import UNKNOWN_LENS, prior_sigmas
-from tracker.calibration.check.reprojection import Prior, Rig, RigFit, fit_rig, plain_errors_px
+from tracker.calibration.check.rig_adjustment import Prior, Rig, RigFit, fit_rig, plain_errors_px
 from tracker.compute.sampling import spread_indices
 from tracker.estimation.fitting.bundle import ROUGH, solve_bundle
 from tracker.geometry.arrays import TINY, Array, IntArray
@@ -29,7 +29,7 @@ class RigCalibration(NamedTuple):
     fit: RigFit
     frames: IntArray
     """Frames of the adjustment, ascending, (F,)."""
-    volume: VolumeError
+    volume: VolumeAccuracy
     points_world: Array
     """Corners of the board on those frames, the volume in which the error is expected, (P, 3), metres."""
 
@@ -38,7 +38,7 @@ class RigCalibration(NamedTuple):
         own = self.fit.rig.own.copy()
         own[:, :3, 3] *= scale
         cameras = scaled_cameras(self.cameras, scale)
-        volume = VolumeError(*(scale * error for error in self.volume))
+        volume = VolumeAccuracy(*(scale * error for error in self.volume))
         fit = self.fit._replace(rig=Rig(cameras, own))
         return RigCalibration(cameras, fit, self.frames, volume, scale * self.points_world)
 

@@ -24,10 +24,10 @@ from tracker.calibration.check.fault_search import (
     as_tracked,
     covariance_of,
     further_steps,
-    is_followed,
+    is_repeated_clock_fault,
     prior_sigmas,
 )
-from tracker.calibration.check.viewed_frames import ViewedFrame
+from tracker.calibration.check.judged_frames import JudgedFrame
 from tracker.compute.progress import Report, unreported
 from tracker.estimation.acquisition.contour_bundle import RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
@@ -58,7 +58,7 @@ class Diagnosis:
 
 
 def diagnose(
-    frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], fps: float, report: Report = unreported
+    frames: Sequence[JudgedFrame], parameters: Sequence[SizeParameters], fps: float, report: Report = unreported
 ) -> Diagnosis:
     """Find the cameras that are off.
 
@@ -86,7 +86,7 @@ def diagnose(
     return diagnosis_of(search.settled(best))
 
 
-def glance(frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], fps: float) -> Diagnosis:
+def glance(frames: Sequence[JudgedFrame], parameters: Sequence[SizeParameters], fps: float) -> Diagnosis:
     """Find the worst fault by a single choice of evidence: the contours that the tracked poses accept.
 
     It costs a fraction of `diagnose`, whose arguments it has. The correction comes out too small, because evidence that
@@ -141,7 +141,7 @@ class CameraFinding(NamedTuple):
     """Whether the camera shows contours of the people at all."""
 
 
-def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequence[str]) -> list[CameraFinding]:
+def findings(diagnosis: Diagnosis, frames: Sequence[JudgedFrame], names: Sequence[str]) -> list[CameraFinding]:
     """Return what a diagnosis says of each camera, in their order."""
     out = []
     for i, name in enumerate(names):
@@ -153,7 +153,7 @@ def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequenc
         misfit_px, misfit_mm = misfit(frames, i, shown)
         gain = sum(k.gain_nats for k in kept) if kinds else diagnosis.steps[likely].gain_nats
         rivals = {r.kind: c for k in kept for r, c in k.rivals.items() if r.camera == i and r.kind not in kinds}
-        named = kinds if misfit_px >= SEEN_PX or is_followed(frames, i, kinds) else ()
+        named = kinds if misfit_px >= SEEN_PX or is_repeated_clock_fault(frames, i, kinds) else ()
         is_seen = any(len(f.views[i].points_px) for f in frames)
         out.append(
             CameraFinding(
@@ -164,7 +164,7 @@ def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequenc
     return out
 
 
-def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tuple[float, float]:
+def misfit(frames: Sequence[JudgedFrame], camera: int, correction: Array) -> tuple[float, float]:
     """Return the root mean square distance by which a correction moves the body's points in a view.
 
     Returns:

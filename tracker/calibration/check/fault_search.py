@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.calibration.check.judged_frames import JudgedFrame, seen_people
 from tracker.calibration.check.lens_priors import CALIBRATED
-from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
 from tracker.compute.threads import one_blas_thread
 from tracker.estimation.acquisition.contour_bundle import ContourBundle, RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
@@ -103,7 +103,7 @@ class Step(NamedTuple):
     """Fall of the cost."""
 
 
-def as_tracked(frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters]) -> RigState:
+def as_tracked(frames: Sequence[JudgedFrame], parameters: Sequence[SizeParameters]) -> RigState:
     """Return the poses of the frames, in the bodies and by the cameras that they were tracked with."""
     return RigState(
         np.zeros((len(frames[0].views), N_CORRECTIONS)), tuple(np.zeros(len(p.names)) for p in parameters),
@@ -152,7 +152,7 @@ class Selection(NamedTuple):
 class FaultSearch:
     """Fits the rig of some frames with various corrections free."""
 
-    def __init__(self, frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], sigmas: Array) -> None:
+    def __init__(self, frames: Sequence[JudgedFrame], parameters: Sequence[SizeParameters], sigmas: Array) -> None:
         self._frames, self._parameters, self._sigmas = frames, parameters, sigmas
 
     def begun(self) -> FittedRig:
@@ -225,7 +225,7 @@ class FaultSearch:
         promise = {
             h: s.gain_nats - _needed(h)
             for h, s in steps.items()
-            if s.gain_nats > _needed(h) or is_followed(self._frames, h.camera, (h.kind,))
+            if s.gain_nats > _needed(h) or is_repeated_clock_fault(self._frames, h.camera, (h.kind,))
         }
         promising = sorted(promise, key=lambda h: -promise[h])
         cameras = list(dict.fromkeys(h.camera for h in promising))[: EFFORT.cameras]
@@ -277,7 +277,7 @@ def fitted_rig(problem: ContourBundle, found: BundleFit[RigState]) -> FittedRig:
     return FittedRig(problem, found.state, found.equations, hessian, gradient, shared)
 
 
-def is_followed(frames: Sequence[ViewedFrame], camera: int, kinds: Collection[str]) -> bool:
+def is_repeated_clock_fault(frames: Sequence[JudgedFrame], camera: int, kinds: Collection[str]) -> bool:
     """Return whether a fault is one of time alone, of a camera whose clock was corrected before.
 
     Such a fault is followed until it stands: the time is found a little short where people were tracked with the wrong

@@ -5,7 +5,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_columns import ASPECT, DISTORTION, FOCAL, PRINCIPAL, ROTATION, SHIFT, n_columns
+from tracker.geometry.camera_derivatives import (
+    ASPECT,
+    DISTORTION,
+    FOCAL,
+    PRINCIPAL,
+    ROTATION,
+    SHIFT,
+    n_camera_parameters,
+)
 from tracker.geometry.cameras import Camera
 
 
@@ -47,7 +55,7 @@ def prior_sigmas(camera: Camera, prior: CameraPrior, pose: bool = True, lens: bo
         pose: whether its pose may move.
         lens: whether its focal length, principal point and distortion may move.
     """
-    out = np.zeros(n_columns(camera))
+    out = np.zeros(n_camera_parameters(camera))
     if pose:
         out[ROTATION], out[SHIFT] = prior.rotation_rad, prior.shift_m
     if lens:

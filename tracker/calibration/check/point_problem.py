@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from tracker.calibration.check.reprojection import Located, Observations, ReprojectionProblem, Rig
+from tracker.calibration.check.rig_adjustment import Located, Observations, ReprojectionProblem, Rig
 from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera

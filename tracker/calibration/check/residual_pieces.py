@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
+from tracker.calibration.check.judged_frames import JudgedFrame, seen_people
 from tracker.estimation.acquisition.contour_bundle import RigState, views_of
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.geometry.arrays import Array
@@ -24,7 +24,7 @@ class ResidualPieces(NamedTuple):
 
 
 def residual_pieces(
-    frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], state: RigState
+    frames: Sequence[JudgedFrame], parameters: Sequence[SizeParameters], state: RigState
 ) -> tuple[ResidualPieces, ...]:
     """Return the residuals of each view with its present camera and clock.
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibration.check.fault_search import EFFORT, LEAST_GAIN, fitted_rig
-from tracker.calibration.check.viewed_frames import ViewedFrame, seen_people
+from tracker.calibration.check.judged_frames import JudgedFrame, seen_people
 from tracker.estimation.acquisition.contour_bundle import ContourBundle, RigState
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.bundle import solve_bundle
@@ -30,7 +30,7 @@ class FrameScore(NamedTuple):
 
 
 def score_frame(
-    frame: ViewedFrame, parameters: Sequence[SizeParameters], sizes: Sequence[Array], corrections: Array
+    frame: JudgedFrame, parameters: Sequence[SizeParameters], sizes: Sequence[Array], corrections: Array
 ) -> FrameScore:
     """Fit the poses of a frame to all contours under given cameras and sizes.
 

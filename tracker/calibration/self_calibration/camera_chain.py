@@ -17,7 +17,7 @@ import numpy as np
 
 from tracker.calibration.boards.camera_graph import MIN_SHARED
 from tracker.calibration.boards.view_choice import MIN_CORNERS
-from tracker.calibration.check.reprojection import OUTLIER_SIGMAS, column_ends
+from tracker.calibration.check.rig_adjustment import OUTLIER_SIGMAS, column_ends
 from tracker.calibration.self_calibration.joint_adjustment import (
     AdjustedJoints,
     Gauge,
@@ -32,7 +32,7 @@ from tracker.calibration.self_calibration.stature import metres_per_unit
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_columns import ROTATION
+from tracker.geometry.camera_derivatives import ROTATION
 from tracker.geometry.camera_rig import scaled_cameras
 from tracker.geometry.cameras import Camera
 

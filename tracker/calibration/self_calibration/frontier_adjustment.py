@@ -17,7 +17,7 @@ import numpy as np
 
 from tracker.calibration.check.lens_priors import UNKNOWN_LENS, prior_sigmas
 from tracker.calibration.check.point_problem import PointProblem
-from tracker.calibration.check.reprojection import OUTLIER_SIGMAS, Prior, column_ends, inverse
+from tracker.calibration.check.rig_adjustment import OUTLIER_SIGMAS, Prior, column_ends, inverse
 from tracker.calibration.self_calibration.frontier_points import FrontierPoints, frontier_points
 from tracker.calibration.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses
 from tracker.calibration.self_calibration.person_calibration import adjusted_to, undetermined
@@ -25,7 +25,14 @@ from tracker.calibration.self_calibration.seen_joints import SeenJoints
 from tracker.errors import CalibrationError
 from tracker.evidence.images.working_view import working_scale
 from tracker.geometry.arrays import Array, Mask
-from tracker.geometry.camera_columns import FOCAL, POSE, ProjectedColumns, camera_difference, moved_camera, n_columns
+from tracker.geometry.camera_derivatives import (
+    FOCAL,
+    POSE,
+    ProjectionDerivatives,
+    camera_difference,
+    moved_camera,
+    n_camera_parameters,
+)
 from tracker.geometry.cameras import Camera
 
 
@@ -85,11 +92,11 @@ class _BorderProblem(PointProblem):
             found: the adjustment.
             outward: direction out of the silhouette at each observed point, (N, 2).
         """
-        free = tuple(np.full(n_columns(c) + 1, np.inf) for c in found.cameras)
+        free = tuple(np.full(n_camera_parameters(c) + 1, np.inf) for c in found.cameras)
         super().__init__(found.observed, Prior(found.cameras, free), len(found.fit.rig.own), found.fit.sigmas_px)
         self._outward = outward
 
-    def by_unknowns(self, found: ProjectedColumns, at: slice, camera: int) -> Array:
+    def by_unknowns(self, found: ProjectionDerivatives, at: slice, camera: int) -> Array:
         """See `ReprojectionProblem`."""
         return np.concatenate([found.by_camera, -self._outward[at, :, None]], axis=2)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from tracker.calibration.self_calibration.seen_joints import SeenJoints
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_columns import project_with_columns
+from tracker.geometry.camera_derivatives import project_with_columns
 from tracker.geometry.cameras import Camera
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from tracker.calibration.check.lens_priors import UNKNOWN_LENS
 from tracker.calibration.check.point_problem import PointProblem, triangulate_all
-from tracker.calibration.check.reprojection import Observations, Prior, Rig, RigFit, fit_rig
+from tracker.calibration.check.rig_adjustment import Observations, Prior, Rig, RigFit, fit_rig
 from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.camera_columns import FOCAL, POSE, SHIFT, n_columns
+from tracker.geometry.camera_derivatives import FOCAL, POSE, SHIFT, n_camera_parameters
 from tracker.geometry.cameras import ROUNDING_PX2, Camera
 
 
@@ -97,7 +97,7 @@ def no_common_view() -> CalibrationError:
 def _prior(cameras: Sequence[Camera], gauge: Gauge, lenses: UnknownLenses | None) -> Prior:
     sigmas, sharing = [], {i: len(group) for group in (lenses.alike if lenses else ()) for i in group}
     for i, camera in enumerate(cameras):
-        own = np.zeros(n_columns(camera))
+        own = np.zeros(n_camera_parameters(camera))
         own[POSE] = 0.0 if i == gauge.held else np.inf
         if i == gauge.scale:
             baseline = camera.T_camera_world[:3, :3] @ (camera.center_world - cameras[gauge.held].center_world)

@@ -13,8 +13,8 @@ from tracker.calibration.boards.camera_graph import MIN_SHARED
 from tracker.calibration.boards.view_choice import MAX_FRAMES, MAX_LENS_VIEWS
 from tracker.calibration.check.held_out import held_out_of
 from tracker.calibration.check.point_problem import triangulate_all
-from tracker.calibration.check.reprojection import Observations
-from tracker.calibration.check.solvable import check_apart
+from tracker.calibration.check.rig_adjustment import Observations
+from tracker.calibration.check.unsolvable import check_apart
 from tracker.calibration.self_calibration.camera_chain import pose_before_joints
 from tracker.calibration.self_calibration.identification import Statures, first_cameras
 from tracker.calibration.self_calibration.joint_adjustment import UnknownLenses

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.boards.expected_error import MAX_POINTS, VolumeError, expected_error
+from tracker.calibration.boards.expected_error import MAX_POINTS, VolumeAccuracy, expected_error
 from tracker.calibration.boards.rig_fit import TOLD_FOCAL
 from tracker.calibration.check.held_out import HeldOut
 from tracker.calibration.check.lens_priors import NEWS, UNKNOWN_LENS
 from tracker.calibration.check.point_problem import PointProblem, require_spread, triangulate_all
-from tracker.calibration.check.reprojection import Prior, Rig, plain_errors_px
+from tracker.calibration.check.rig_adjustment import Prior, Rig, plain_errors_px
 from tracker.calibration.self_calibration.joint_adjustment import (
     AdjustedJoints,
     Gauge,
@@ -55,7 +55,7 @@ class PersonCalibration:
     """Joints of the frames that were used, with sides mended."""
     held_out: HeldOut
     """Observations on those of them that a first adjustment left out."""
-    volume: VolumeError
+    volume: VolumeAccuracy
     """Error of triangulated joints, without that of the scale."""
     scale_sigma: float
     """Standard deviation of the scale, as a share of it."""
@@ -112,16 +112,16 @@ def held_out_errors(cameras: Sequence[Camera], frames: IntArray, seen: SeenJoint
     return HeldOut(frames, observed.cameras, np.linalg.norm(errors, axis=1))
 
 
-def volume_error(adjusted: AdjustedJoints, scale: float) -> VolumeError:
+def volume_error(adjusted: AdjustedJoints, scale: float) -> VolumeAccuracy:
     """Return the expected error of joints, metres; the scale has an error of its own."""
     points = adjusted.points_world[np.isfinite(adjusted.points_world).all(axis=1)]
     few = points[spread_indices(len(points), MAX_POINTS)]
     error = expected_error(adjusted.cameras, adjusted.fit.covariance, few, with_scale=False)
-    return VolumeError(*(scale * e for e in error))
+    return VolumeAccuracy(*(scale * e for e in error))
 
 
 def require_determined(
-    volume: VolumeError, adjusted: AdjustedJoints, seen: SeenJoints, scale: float, points: str = "joints"
+    volume: VolumeAccuracy, adjusted: AdjustedJoints, seen: SeenJoints, scale: float, points: str = "joints"
 ) -> None:
     """Refuse unknown focal lengths, and cameras by which a joint could be taken for another one."""
     for camera, sigma in zip(adjusted.cameras, adjusted.fit.focal_sigmas, strict=True):

@@ -12,7 +12,7 @@ import numpy as np
 
 from tracker.calibration.boards.footage_calibration import footage_paths
 from tracker.calibration.boards.rig_fit import blank_camera
-from tracker.calibration.check.solvable import solvable
+from tracker.calibration.check.unsolvable import refuse_unsolvable
 from tracker.calibration.self_calibration.identification import Statures
 from tracker.calibration.self_calibration.keypoint_calibration import LEAST_FPS, calibrate_by_person
 from tracker.calibration.self_calibration.person_calibration import PersonCalibration
@@ -72,7 +72,7 @@ def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalib
     Raises:
         TrackerError: files cannot be read or do not fit together, or show too little of the people.
     """
-    with solvable("give more of the footage, with people in many places and poses"):
+    with refuse_unsolvable("give more of the footage, with people in many places and poses"):
         return _calibrate(filmed, report)
 
 

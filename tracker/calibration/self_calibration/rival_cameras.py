@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.check.reprojection import OUTLIER_SIGMAS, robust_squares
+from tracker.calibration.check.rig_adjustment import OUTLIER_SIGMAS, robust_squares
 from tracker.calibration.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses, adjust_joints
 from tracker.calibration.self_calibration.person_calibration import volume_error
 from tracker.calibration.self_calibration.seen_joints import SeenJoints

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tracker.calibration.check.reprojection import Observations
+from tracker.calibration.check.rig_adjustment import Observations
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
 from tracker.geometry.robust_triangulation import Views

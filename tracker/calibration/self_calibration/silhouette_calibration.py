@@ -10,7 +10,7 @@ from tracker.calibration.boards.camera_graph import MIN_SHARED
 from tracker.calibration.boards.view_choice import MAX_FRAMES
 from tracker.calibration.check.held_out import held_out_of
 from tracker.calibration.check.point_problem import triangulate_all
-from tracker.calibration.check.solvable import check_apart
+from tracker.calibration.check.unsolvable import check_apart
 from tracker.calibration.self_calibration.frontier_adjustment import adjust_frontier
 from tracker.calibration.self_calibration.frontier_points import frontier_points
 from tracker.calibration.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses

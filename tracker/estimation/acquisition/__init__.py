@@ -10,7 +10,7 @@ __all__ = [
     "from_joints",
     "from_keypoints",
     "from_voxels",
-    "part_motions",
+    "part_derivatives",
     "piece_sums",
     "segment_lengths",
     "size_fit",

@@ -17,7 +17,7 @@ from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.pose_path import PosePath
 from tracker.compute.threads import map_parallel
-from tracker.estimation.acquisition.part_motions import motions_by_unknowns, points_by_sizes
+from tracker.estimation.acquisition.part_derivatives import part_jacobian, points_by_sizes
 from tracker.estimation.acquisition.piece_sums import GroupSums, SeenPieces, sums_of_views
 from tracker.estimation.acquisition.size_parameters import SizeArrays, SizeParameters
 from tracker.estimation.fitting.bundle import ArrowEquations
@@ -249,7 +249,7 @@ class ContourBundle:
         sums = GroupSums.zeros(n_cameras, n_sizes + body.n_dofs)
         for delay_s, kinematics in found.moments.items():
             views = [v for v in found.views if v.delay_s == delay_s]
-            J = motions_by_unknowns(body, kinematics, by_sizes, self._with_shapes)
+            J = part_jacobian(body, kinematics, by_sizes, self._with_shapes)
             of_views = sums_of_views([(v.shown_by, v.pieces) for v in views], body, kinematics, J.shape[1])
             moving, by_parts = J[:, :, n_sizes:] @ seen.path.velocity(delay_s), np.zeros((n_cameras, J[:, :, 0].size))
             for view, of_view in zip(views, of_views, strict=True) if n_cameras else ():

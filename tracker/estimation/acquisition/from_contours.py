@@ -29,7 +29,7 @@ from tracker.estimation.acquisition.from_voxels import (
     VoxelSizeSettings,
     fit_sizes_to_voxels,
 )
-from tracker.estimation.acquisition.part_motions import motions_by_unknowns
+from tracker.estimation.acquisition.part_derivatives import part_jacobian
 from tracker.estimation.acquisition.piece_sums import GroupSums, sums_of_views
 from tracker.estimation.acquisition.size_fit import SightedPerson, SizeFit, SizeFitSettings, fit_sizes_to_contours
 from tracker.estimation.acquisition.size_parameters import SizeParameters, SizePriors
@@ -198,7 +198,9 @@ def _fit_to_voxels(
     settings: VoxelSizeSettings, report: Callable[[float], None],
 ) -> VoxelSizes:  # fmt: skip
     """Fit sizes to the voxels of some frames. On each, the person is the first of the people."""
-    with closing(SilhouetteFinder(observer.cameras, observer.recording, in_recording=observer.in_recording)) as finder:
+    with closing(
+        SilhouetteFinder(observer.cameras, observer.recording, recording_views=observer.recording_views)
+    ) as finder:
         seen = [SilhouettedPerson(k, finder.silhouettes(k), own) for k, own in people.items()]
     return fit_sizes_to_voxels(parameters, seen, settings, report)
 
@@ -266,7 +268,7 @@ def _information(
     """Return the information matrix of the sizes by the visible contours of a frame, (n_sizes, n_sizes)."""
     body, (model, kinematics) = bodies[person], (bodies[person].model, bodies[person].kinematics)
     first, n = parts_of([b.model for b in bodies], person).start, len(parameters.names)
-    J = motions_by_unknowns(model, kinematics, parameters.derivatives(np.zeros(n)))
+    J = part_jacobian(model, kinematics, parameters.derivatives(np.zeros(n)))
     contours = [occluding_contours.trace(bodies, c) for c in cameras]
     views = [(c, _visible_pieces(contour, first, body, c)) for c, contour in zip(cameras, contours, strict=True)]
     sums = GroupSums.zeros(0, J.shape[2])

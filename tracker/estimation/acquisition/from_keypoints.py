@@ -33,7 +33,7 @@ from tracker.geometry.triangulation import sigma_px
 
 
 @dataclass(frozen=True, eq=False)
-class BodyPoints:
+class PersonObservations:
     """Observed points of one person."""
 
     names: tuple[str, ...]
@@ -45,11 +45,11 @@ class BodyPoints:
     confidence: Array
     """(F, V, N), 0 to 1; 0 where absent."""
 
-    def known_to(self, model: BodyModel) -> "BodyPoints":
+    def known_to(self, model: BodyModel) -> "PersonObservations":
         """Return those that are points of a body."""
         at = [i for i, n in enumerate(self.names) if n in model.point_names]
         names = tuple(self.names[i] for i in at)
-        return BodyPoints(names, self.joints_world[:, at], self.seen[:, :, at], self.confidence[:, :, at])
+        return PersonObservations(names, self.joints_world[:, at], self.seen[:, :, at], self.confidence[:, :, at])
 
     def places(self, frame: int) -> dict[str, Array]:
         """Return the points that are known on a frame by name, (3,) each, metres."""
@@ -61,7 +61,9 @@ _ROUNDS = 3
 """Fits to the key points, each with the offsets learnt from the one before."""
 
 
-def fit_to_keypoints(model: BodyModel, seen: BodyPoints, frames: Sequence[int] | None = None) -> dict[int, PosedBody]:
+def fit_to_keypoints(
+    model: BodyModel, seen: PersonObservations, frames: Sequence[int] | None = None
+) -> dict[int, PosedBody]:
     """Fit a body to the triangulated points of each frame that has four or more, without looking at pictures.
 
     Args:
@@ -92,7 +94,7 @@ def _refitted(body: PosedBody, points: IntArray, targets_world: Array) -> PosedB
     return PosedBody(body.model, solve(body.model, body.values, blocks).pose)
 
 
-def learn_offsets(bodies: Mapping[int, PosedBody], seen: BodyPoints) -> Array:
+def learn_offsets(bodies: Mapping[int, PosedBody], seen: PersonObservations) -> Array:
     """Return from each joint to its key point in the frame of the joint's proximal part, (N, 3), metres.
 
     It is the median over the frames, in which a detector is usually right; 0 for a point that is never known.
@@ -112,7 +114,7 @@ def learn_offsets(bodies: Mapping[int, PosedBody], seen: BodyPoints) -> Array:
         return np.nan_to_num(np.nanmedian(np.array(found), axis=0))
 
 
-class SeenBody(NamedTuple):
+class DetectorModel(NamedTuple):
     """How a detector sees the body of a person."""
 
     names: tuple[str, ...]
@@ -122,7 +124,7 @@ class SeenBody(NamedTuple):
     sigmas: Array
     """Standard deviation of each at confidence 1, (N,), in normalized image coordinates."""
 
-    def keypoints(self, model: BodyModel, seen: BodyPoints, cameras: Sequence[Camera]) -> PersonKeypoints:
+    def keypoints(self, model: BodyModel, seen: PersonObservations, cameras: Sequence[Camera]) -> PersonKeypoints:
         """Return the key points of a recording as evidence for a body; the variance falls with the confidence.
 
         A point on whose place the views of a frame disagree is no more certain than they agree (R. T. Birge 1932).
@@ -141,7 +143,9 @@ class SeenBody(NamedTuple):
         # The squared length of two normal coordinates has the median 2 ln 2.
         return PersonKeypoints(parts, places, seen.seen, np.fmax(sigmas, np.sqrt(usual / (2 * np.log(2)))))
 
-    def costs(self, bodies: Mapping[int, PosedBody], seen: BodyPoints, cameras: Sequence[Camera]) -> dict[int, float]:
+    def costs(
+        self, bodies: Mapping[int, PosedBody], seen: PersonObservations, cameras: Sequence[Camera]
+    ) -> dict[int, float]:
         """Return by frame the robust cost of the key points, nats, in which one that is absent counts as grossly off.
 
         Args:
@@ -158,7 +162,9 @@ class SeenBody(NamedTuple):
         return out
 
 
-def learn_seen_body(bodies: Mapping[int, PosedBody], seen: BodyPoints, cameras: Sequence[Camera]) -> SeenBody:
+def learn_seen_body(
+    bodies: Mapping[int, PosedBody], seen: PersonObservations, cameras: Sequence[Camera]
+) -> DetectorModel:
     """Learn how a detector sees a body, from frames on which its pose is known.
 
     Args:
@@ -174,10 +180,10 @@ def learn_seen_body(bodies: Mapping[int, PosedBody], seen: BodyPoints, cameras: 
         warnings.simplefilter("ignore", RuntimeWarning)  # a point that is never seen has no errors
         sigmas = MAD_TO_SIGMA * np.nanmedian(np.abs(errors), axis=(0, 1, 3))
     least = min(sigma_px(c) / c.pinhole.K[0, 0] for c in cameras)
-    return SeenBody(seen.names, offsets, np.maximum(np.nan_to_num(sigmas), least))
+    return DetectorModel(seen.names, offsets, np.maximum(np.nan_to_num(sigmas), least))
 
 
-def _places(model: BodyModel, seen: BodyPoints, offsets_part: Array) -> tuple[IntArray, Array]:
+def _places(model: BodyModel, seen: PersonObservations, offsets_part: Array) -> tuple[IntArray, Array]:
     """Return the proximal part of each key point, (N,), and its place there, (N, 3), metres."""
     points, neutral = _points(model, seen), PosedBody(model, model.neutral())
     parts = model.proximal_parts[points]
@@ -202,7 +208,7 @@ def _errors(points_world: Array, seen: Array, cameras: Sequence[Camera]) -> Arra
     return out
 
 
-def _points(model: BodyModel, seen: BodyPoints) -> IntArray:
+def _points(model: BodyModel, seen: PersonObservations) -> IntArray:
     return np.array([model.point_names.index(n) for n in seen.names], dtype=np.int64)
 
 

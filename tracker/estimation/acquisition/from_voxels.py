@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.dimensions import with_height_of_stature
+from tracker.body.dimensions import restate_height
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.threads import map_parallel
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.part_motions import (
+from tracker.estimation.acquisition.part_derivatives import (
     TIPS,
     FigureSizes,
     figure_by_sizes,
@@ -30,8 +30,8 @@ from tracker.estimation.fitting.gauss_newton import NormalEquations, PosePrior
 from tracker.estimation.voxel.body_pose import state_of
 from tracker.estimation.voxel.frame_voxels import FrameVoxels, carve_around
 from tracker.estimation.voxel.labels import label_voxels
-from tracker.estimation.voxel.levels import DetailLevels, find_levels
 from tracker.estimation.voxel.measurement import PartAxes, linearize, measure_parts
+from tracker.estimation.voxel.resolved_parts import ResolvedParts, find_resolved_parts
 from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.estimation.voxel.state import FilterState
 from tracker.evidence.contours.body_silhouette import body_silhouette
@@ -129,7 +129,7 @@ def fit_sizes_to_voxels(
             step, steps, covariance = _step(parameters, sizes, free, [f.equations for f in found])
             sizes = sizes + step
             poses = [body.move(p, s) for p, s in zip(poses, steps, strict=True)]
-    body = with_height_of_stature(parameters.body(sizes), parameters.base)
+    body = restate_height(parameters.body(sizes), parameters.base)
     return VoxelSizes(
         parameters, sizes, body, covariance, tuple(f.frame for f in frames), tuple(poses), overlaps[0], overlaps[-1]
     )
@@ -242,7 +242,7 @@ class _Frame:
         settings, state = self._settings.voxels, self._states[0]
         points = frame.voxels.points_world
         labels = label_voxels(points, self._states, settings.voxel_m, settings.label_rule)
-        levels = find_levels(DetailLevels.finest(), state, frame.voxels, labels.labels, 0, 1)
+        levels = find_resolved_parts(ResolvedParts.finest(), state, frame.voxels, labels.labels, 0, 1)
         tips = np.zeros(len(TIPS))
         for i in np.flatnonzero(TIPS):
             own = points[labels.labels == i]

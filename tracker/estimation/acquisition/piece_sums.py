@@ -13,7 +13,7 @@ import numpy as np
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.compute.jit import njit
-from tracker.estimation.acquisition.part_motions import N_MOTIONS, shape_derivatives
+from tracker.estimation.acquisition.part_derivatives import N_MOTIONS, shape_derivatives
 from tracker.estimation.fitting.contour_residuals import PieceSums
 from tracker.estimation.fitting.gauss_newton import NormalEquations
 from tracker.geometry.arrays import Array, IntArray
@@ -25,7 +25,7 @@ OF_CAMERA = slice(TIME)
 """Columns of a piece by which its camera moves: the logarithm of the focal length, then the rotation and the
 translation of its part in the world."""
 OF_PART = slice(1, None)
-"""Columns by which its part moves: the motions of `part_motions`, which begin with the same rotation and
+"""Columns by which its part moves: the motions of `part_derivatives`, which begin with the same rotation and
 translation."""
 
 
@@ -50,8 +50,8 @@ def sum_pieces(
         b: gradients by part, (P, k), 0 before.
         M: normal matrices by part, (P, k, k), 0 before.
     """
-    n_columns = b.shape[1]
-    world, eye, J = np.empty(3), np.empty(3), np.empty((2, n_columns))
+    n_camera_parameters = b.shape[1]
+    world, eye, J = np.empty(3), np.empty(3), np.empty((2, n_camera_parameters))
     for n in range(len(parts)):
         h00, h01, h11 = hessians[n, 0, 0], hessians[n, 0, 1], hessians[n, 1, 1]
         if h00 == 0.0 and h11 == 0.0:
@@ -67,13 +67,13 @@ def sum_pieces(
             for j in range(3):
                 eye[i] += T_camera_world[i, j] * world[j]
         _differentiate(unit, by_shapes[n], T, world, eye, T_camera_world, K, J)
-        for i in range(n_columns):
+        for i in range(n_camera_parameters):
             b[p, i] += gradients[n, 0] * J[0, i] + gradients[n, 1] * J[1, i]
             first, second = h00 * J[0, i] + h01 * J[1, i], h01 * J[0, i] + h11 * J[1, i]
-            for j in range(i, n_columns):
+            for j in range(i, n_camera_parameters):
                 M[p, i, j] += first * J[0, j] + second * J[1, j]
     for p in range(len(M)):
-        for i in range(n_columns):
+        for i in range(n_camera_parameters):
             for j in range(i):
                 M[p, i, j] = M[p, j, i]
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.dimensions import with_height_of_stature
+from tracker.body.dimensions import restate_height
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.pose_path import PosePath
 from tracker.estimation.acquisition.contour_bundle import SHAPE_KINDS, SIZE_KINDS, ContourBundle, RigState, SeenPerson
@@ -148,7 +148,7 @@ def fit_sizes_to_contours(
             covariance = _covariance(found.equations, parameters.sigmas, settings.frame_correlation)
             covariance[0, 0] += (parameters.base.height_sigma or 0.0) ** 2  # that of a fixed height, the first size
     (sizes,) = state.sizes
-    body = with_height_of_stature(parameters.body(sizes), parameters.base)
+    body = restate_height(parameters.body(sizes), parameters.base)
     return SizeFit(sizes, body, state.poses, cost, covariance, n_evaluations)
 
 

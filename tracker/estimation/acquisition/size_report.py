@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.dimensions import dimensions_of, main_axis, mirror_part, with_height_of_stature
+from tracker.body.dimensions import dimensions_of, main_axis, mirror_part, restate_height
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.acquisition.from_contours import Acquisition
@@ -127,7 +127,7 @@ def _with_sigmas(
 def _measured(parameters: SizeParameters, body: BodyModel) -> dict[str, float]:
     """Return each size of a body, metres, by its name for people."""
     sizes = dimensions_of(body)
-    out = {"height": with_height_of_stature(body, parameters.base).height_m}
+    out = {"height": restate_height(body, parameters.base).height_m}
     for part, own in sizes.parts.items():
         if parameters.coupled and part.startswith("right_") and mirror_part(part) in sizes.parts:
             continue

@@ -15,8 +15,8 @@ import numpy as np
 from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import Remedy, TrackerError
-from tracker.estimation.acquisition.chamfer_search import ChamferSearchSettings, search_shapes
 from tracker.estimation.acquisition.from_contours import Acquisition, learn_static_edges, moving, own_views
+from tracker.estimation.acquisition.shape_search import ChamferSearchSettings, search_shapes
 from tracker.estimation.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.estimation.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.estimation.search.chamfer_cost import ChamferCost

@@ -60,7 +60,7 @@ def estimate_fixed(problem: FrameProblem, person: int, bodies: Bodies) -> Person
     return PersonEstimate("good", "", part_costs_px(problem.views, costs), zero, 0, None)
 
 
-def estimate_at(
+def assess_given_pose(
     problem: FrameProblem, person: int, bodies: Bodies, alternatives: Sequence[Array] = ()
 ) -> PersonEstimate:
     """Assess a person in the pose that they have.

@@ -24,7 +24,7 @@ from tracker.estimation.by_frame.settings import (
 from tracker.estimation.fitting.clocked_residuals import ClockedResiduals, PersonResiduals, person_residuals
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE, PartCosts
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
-from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.fitting.hypothesis import SETTLED_M, Hypothesis, distance_m
 from tracker.estimation.fitting.interpenetration import BodyPenetration, SelfPenetration
 from tracker.estimation.fitting.keypoints import keypoint_blocks
@@ -198,7 +198,7 @@ class FrameProblem:
     ) -> Fit:
         """Minimize the cost of some blocks from a pose, (n_values,)."""
         model, active = self.people[person].model, self.people[person].active_dofs
-        return solve_fast(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
+        return solve_compiled_or_plain(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
 
     def sigma(self, person: int) -> Array:
         """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""

@@ -10,7 +10,7 @@ from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.model import BodyModel
 from tracker.estimation.by_frame.settings import MAX_ITERATIONS, TOLERANCE
 from tracker.estimation.fitting.gauss_newton import Fit, ResidualBlock
-from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.geometry.arrays import Array
 
 
@@ -41,7 +41,7 @@ def fit_by_chains(
     for name, dofs in fit_chains(model):
         if not (dofs & is_active).any():
             continue
-        fit = solve_fast(model, pose, blocks, dofs & is_active, MAX_ITERATIONS, TOLERANCE)
+        fit = solve_compiled_or_plain(model, pose, blocks, dofs & is_active, MAX_ITERATIONS, TOLERANCE)
         pose = fit.pose
         yield FitStep(name, fit)
 

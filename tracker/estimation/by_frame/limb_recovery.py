@@ -22,7 +22,7 @@ from tracker.compute.threads import N_HELPERS, kernel_pool
 from tracker.estimation.by_frame.pose_score import PoseScorer
 from tracker.estimation.by_frame.settings import RecoverSettings
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
-from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.fitting.hypothesis import BEAM_NATS, CLEAR_NATS, SAME_POSE_M, Hypothesis, apart, distinct
 from tracker.geometry.arrays import Array, IntArray
 
@@ -92,7 +92,9 @@ def _search_limb(
     """
 
     def limb_only(scorer: PoseScorer, pose: Array) -> Hypothesis:
-        return scorer.scored(model, solve_fast(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE))
+        return scorer.scored(
+            model, solve_compiled_or_plain(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE)
+        )
 
     def whole_body(scorer: PoseScorer, pose: Array) -> Hypothesis:
         return scorer.fitted(model, pose)

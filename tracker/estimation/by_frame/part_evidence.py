@@ -111,7 +111,9 @@ def read_frame(observer: Observer, frame: int, bodies: Bodies) -> SeenFrame:
     )  # fmt: skip
 
 
-def learn_run(observer: Observer, frames: Sequence[tuple[int, Bodies]], report: Report = unreported) -> UsualEvidence:
+def learn_usual_evidence(
+    observer: Observer, frames: Sequence[tuple[int, Bodies]], report: Report = unreported
+) -> UsualEvidence:
     """Learn what is usual from some sixty frames of a run, which may have some wrong poses.
 
     Args:

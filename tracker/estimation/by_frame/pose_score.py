@@ -19,7 +19,7 @@ from tracker.estimation.by_frame.settings import MAX_ITERATIONS, TOLERANCE, Esti
 from tracker.estimation.fitting.clocked_residuals import PersonResiduals, person_residuals
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
-from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.fitting.interpenetration import SelfPenetration
 from tracker.estimation.fitting.keypoints import keypoint_blocks
@@ -86,7 +86,9 @@ class PoseScorer:
 
     def fitted(self, model: BodyModel, pose: Array) -> Hypothesis:
         """Return the hypothesis of a pose, (n_values,), after its refinement."""
-        fit = solve_fast(model, pose, self.blocks, self.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+        fit = solve_compiled_or_plain(
+            model, pose, self.blocks, self.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
+        )
         return self.scored(model, fit)
 
     def costs(self, candidates: Array) -> Array:
@@ -121,7 +123,9 @@ class PoseScorer:
 
         def refine(own: PoseScorer, pose: Array) -> Array:
             blocks = [*own.blocks, PosePrior(pose, 1 / sigma)]
-            return solve_fast(model, pose, blocks, own.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE).pose
+            return solve_compiled_or_plain(
+                model, pose, blocks, own.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
+            ).pose
 
         return np.array(self.each(refine, poses))
 

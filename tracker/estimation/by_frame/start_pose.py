@@ -23,7 +23,7 @@ import numpy as np
 from tracker.body.limbs import Search
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.appearance.part_colors import Colors
-from tracker.estimation.by_frame.assessment import PersonEstimate, estimate_at
+from tracker.estimation.by_frame.assessment import PersonEstimate, assess_given_pose
 from tracker.estimation.by_frame.frame_problem import Bodies, FrameProblem, PersonPrior, with_body
 from tracker.estimation.by_frame.incremental_fit import fit_by_chains
 from tracker.estimation.by_frame.limb_recovery import search_entry, search_limbs
@@ -31,7 +31,7 @@ from tracker.estimation.by_frame.pose_score import PoseScorer
 from tracker.estimation.by_frame.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE, EstimationSettings
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
 from tracker.estimation.fitting.gauss_newton import PosePrior, ResidualBlock
-from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M, Hypothesis, distance_m
 from tracker.estimation.fitting.limb_exchange import exchanged, paired_limbs
 from tracker.estimation.tracking.person_memory import PersonMemory
@@ -91,7 +91,7 @@ def settle_starts(
     start, observe = frame.bodies, frame.observe
     known = [PersonPrior(m.model, b.values, m.active_dofs) for m, b in zip(memories, start, strict=True)]
     first = FrameProblem(frame.views, known, settings, (start, frame.contours))
-    before = {p: estimate_at(first, p, start) for p in people if len(memories[p].history) == 1}
+    before = {p: assess_given_pose(first, p, start) for p in people if len(memories[p].history) == 1}
     # In a close hold a right start is doubtful, and a search may take the other's limb.
     least = 1 if len(memories) == 1 else 2
     doubted = [p for p, e in before.items() if _contradiction(e) >= least]
@@ -108,7 +108,7 @@ def settle_starts(
     found = FrameProblem(observe(bodies), known, wide)
     out = {}
     for p in doubted:
-        is_better = _contradiction(estimate_at(found, p, bodies)) <= _contradiction(before[p])
+        is_better = _contradiction(assess_given_pose(found, p, bodies)) <= _contradiction(before[p])
         trace = traces[p] if is_better else tuple(entry._replace(taken=False) for entry in traces[p])
         out[p] = SearchedStart(bodies[p], trace, is_better)
     return out
@@ -195,7 +195,7 @@ def search_along_covariance(
 
     def refined(scorer: PoseScorer, pose: Array) -> Hypothesis:
         held = PosePrior(pose, 1 / own)
-        fit = solve_fast(
+        fit = solve_compiled_or_plain(
             model, pose, _blocks(scorer, held), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
         )
         return Hypothesis.refined(model, fit, scorer.cost(fit) - held.cost(model, fit.pose))
@@ -204,7 +204,7 @@ def search_along_covariance(
     cheapest = min(others, key=lambda x: x.cost)
     best = cheapest if cheapest.cost < here.cost - CLEAR_NATS else here
     entry = Search.of("samples", (), here.cost, cheapest.cost, best is cheapest)
-    return scorer.scored(model, solve_fast(model, best.pose, scorer.blocks, scorer.active_dofs, 0)), entry
+    return scorer.scored(model, solve_compiled_or_plain(model, best.pose, scorer.blocks, scorer.active_dofs, 0)), entry
 
 
 def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:
@@ -216,7 +216,7 @@ def _samples(model: BodyModel, pose: Array, scorer: PoseScorer, sigma: Array, dr
     """Return poses drawn around a pose, (n_values,) each."""
     free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
     blocks = _blocks(scorer, PosePrior(pose, 1 / sigma))
-    around = solve_fast(model, pose, blocks, scorer.active_dofs, 0)
+    around = solve_compiled_or_plain(model, pose, blocks, scorer.active_dofs, 0)
     # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))

@@ -2,7 +2,7 @@
 
 A descent takes a dozen steps of a tenth of a millisecond each. In Python the calls between kernels take as long as the
 kernels, and hold the interpreter's lock. `gauss_newton.solve` is the readable version, for any blocks and for ball
-joints; `solve_fast` calls the one that a body needs.
+joints; `solve_compiled_or_plain` calls the one that a body needs.
 """
 
 from collections.abc import Sequence
@@ -97,7 +97,7 @@ def solve_compiled(
     return Fit(found, cost, iterations, hessian)
 
 
-def solve_fast(
+def solve_compiled_or_plain(
     model: BodyModel,
     pose: Array,
     blocks: Sequence[ResidualBlock],

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.body.motion.continuation import SAME_PERSON_M
+from tracker.body.motion.path_identities import SAME_PERSON_M
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.voxels.visual_hull import VisualHull
 from tracker.evidence.voxels.voxel_grid import Voxels

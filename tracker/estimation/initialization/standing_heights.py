@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.motion.continuation import SAME_PERSON_M
+from tracker.body.motion.path_identities import SAME_PERSON_M
 from tracker.errors import TrackerError
 from tracker.estimation.initialization.generators.person_scene import PersonScene
 from tracker.estimation.initialization.generators.stature import upright_height

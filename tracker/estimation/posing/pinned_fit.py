@@ -18,7 +18,7 @@ from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.clocked_residuals import SummedBlocks, at_time, person_residuals
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import CLOSE_ENOUGH, OTHER_BODY_M, ResidualBlock, solve, value_mask
-from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.fitting.pins import pin_block
 from tracker.estimation.posing.grab import Constraints, holds_at
 from tracker.evidence.view_evidence import ViewEvidence
@@ -140,7 +140,7 @@ def _fit_one(
     blocks = [*evidence, *prior_blocks(model, pose, sigmas), *([pins] if pins is not None else [])]
     # No kernel covers points that are pinned or held.
     has_points = pins is not None or not all(isinstance(b, ContourResiduals) for b in evidence)
-    fit = (solve if has_points else solve_fast)(model, pose, blocks, active_dofs, tolerance=CLOSE_ENOUGH)
+    fit = (solve if has_points else solve_compiled_or_plain)(model, pose, blocks, active_dofs, tolerance=CLOSE_ENOUGH)
     if pins is None:
         return fit.pose, np.zeros(len(model.value_names), dtype=bool)
     by_pins = np.diag(pins.linearize(model, fit.pose, model.kinematics(fit.pose)).hessian)

@@ -24,7 +24,7 @@ _ACROSS = 0.5
 """Smallest share of a view's information on the weakest direction at which it looks across: from 45 degrees on."""
 
 
-class UnseenDepth(NamedTuple):
+class UndeterminedDepth(NamedTuple):
     """Points whose depth no view has shown, and the view that shows it best."""
 
     points: tuple[str, ...]
@@ -33,9 +33,9 @@ class UnseenDepth(NamedTuple):
     """Index of the view that looks across the weakest direction of the first of them."""
 
 
-def unseen_depth(
+def undetermined_depth(
     places_world: Mapping[str, Array], seen_by: Mapping[str, Sequence[int]], cameras: Sequence[Camera], point: str
-) -> UnseenDepth | None:
+) -> UndeterminedDepth | None:
     """Return the points whose depth no view has shown, if a given one is among them.
 
     Args:
@@ -57,7 +57,7 @@ def unseen_depth(
     best = int(np.argmax(shares))
     if shares[best] < _ACROSS:
         return None
-    return UnseenDepth((point, *(name for name in unseen if name != point)), best)
+    return UndeterminedDepth((point, *(name for name in unseen if name != point)), best)
 
 
 def _weakest(at: Array, views: Sequence[int], cameras: Sequence[Camera]) -> Array | None:

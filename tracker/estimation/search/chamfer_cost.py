@@ -263,7 +263,7 @@ def scored_views(
     )
 
 
-def measure_nothing(views: Sequence[ViewEvidence], models: tuple[BodyModel, ...]) -> None:
+def compile_measure_kernels(views: Sequence[ViewEvidence], models: tuple[BodyModel, ...]) -> None:
     """Call the kernels that measure contours, without a contour; none that traces contours is needed."""
     no_pieces = np.empty((0, 4), np.float32), np.empty(0, np.bool_)
     arrays = scored_views(views, outliers_px(views, None), [no_pieces] * len(views))

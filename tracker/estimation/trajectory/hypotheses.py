@@ -87,7 +87,7 @@ def through(costs: Sequence[Array], motion: Sequence[Array], reduced: Callable[[
     Args:
         costs: of the hypotheses of each frame, (K,) each.
         motion: cost of each triple of successive frames, (Ka, Kb, Kc) each; see `motion_nats`.
-        reduced: reduces costs along an axis: `cheapest` or `all_together`.
+        reduced: reduces costs along an axis: `cheapest` or `reduce_log_sum`.
     """
     if len(costs) < 3:
         return list(costs)
@@ -106,7 +106,7 @@ def cheapest(costs: Array, axis: int) -> Array:
     return np.asarray(costs.min(axis=axis))
 
 
-def all_together(costs: Array, axis: int) -> Array:
+def reduce_log_sum(costs: Array, axis: int) -> Array:
     """Return the negative logarithm of the sum of likelihoods along an axis."""
     least = costs.min(axis=axis, keepdims=True)
     return np.asarray(np.squeeze(least, axis) - np.log(np.exp(least - costs).sum(axis=axis)))

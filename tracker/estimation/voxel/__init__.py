@@ -10,9 +10,9 @@ __all__ = [
     "frame_estimator",
     "frame_voxels",
     "labels",
-    "levels",
     "measurement",
     "method",
+    "resolved_parts",
     "settings",
     "state",
 ]

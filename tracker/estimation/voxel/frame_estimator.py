@@ -13,9 +13,9 @@ from tracker.estimation.voxel.figure import N_PARTS, figure_of, part_rotations
 from tracker.estimation.voxel.frame_voxels import FrameVoxels, carve_around
 from tracker.estimation.voxel.kalman import LinearizedMeasurement, Update, joined, update
 from tracker.estimation.voxel.labels import Labels, label_voxels
-from tracker.estimation.voxel.levels import DetailLevels, carried, find_levels, measure_together
 from tracker.estimation.voxel.measurement import linearize, linearize_rotations, measure_parts
 from tracker.estimation.voxel.motion_model import predict
+from tracker.estimation.voxel.resolved_parts import ResolvedParts, carried, find_resolved_parts, measure_together
 from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.estimation.voxel.state import FilterState
 from tracker.evidence.silhouettes import ViewSilhouette
@@ -51,7 +51,7 @@ class VoxelEstimator:
         ]
         self._near: dict[int, Array] = {}  # poses close to those of the frame, where the fits of poses start
         self._has_motion = [len(s) > 1 for s in starts]
-        self._levels = [DetailLevels.finest()] * len(starts)
+        self._levels = [ResolvedParts.finest()] * len(starts)
         self._lost_limbs = [frozenset[str]()] * len(starts)
         self.labels: Labels | None = None
         self.voxels: FrameVoxels | None = None
@@ -102,7 +102,9 @@ class VoxelEstimator:
         return state if self._settings.limit_rad is None else self._within_limits(p, state)
 
     def _find_levels(self, p: int, state: FilterState, found: FrameVoxels, labels: Labels, patience: int) -> None:
-        self._levels[p] = find_levels(self._levels[p], state, found.voxels, labels.labels, N_PARTS * p, patience)
+        self._levels[p] = find_resolved_parts(
+            self._levels[p], state, found.voxels, labels.labels, N_PARTS * p, patience
+        )
 
     def _predicted(self, p: int, frame: int, keyframe: Array | None) -> FilterState:
         model, state = self._run.subjects.models[p], self.states[p]

@@ -21,7 +21,7 @@ class VoxelTracker:
     def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
         """See `Tracker.estimates`."""
         of = run.observer
-        finder = SilhouetteFinder(of.cameras, of.recording, in_recording=of.in_recording)
+        finder = SilhouetteFinder(of.cameras, of.recording, recording_views=of.recording_views)
 
         def silhouettes_of(frame: int) -> Sequence[ViewSilhouette]:
             found = finder.silhouettes(frame)

@@ -12,7 +12,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.from_keypoints import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import PersonObservations
 from tracker.estimation.tracking.pose_errors import point_covariances
 from tracker.estimation.tracking.tracker import TrackerSettings
 from tracker.evaluation.judging.verdicts import LIMBS, is_exchanged, jumps, outside, probability_beyond, with_doubt
@@ -24,7 +24,7 @@ from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.interchange.observations.stored import save_observations, source_path
 from tracker.interchange.plausibility.examine import contradictions
 from tracker.interchange.plausibility.readings import Reading, ReadPoints, read_beside
-from tracker.pipeline.chain import ChainPlan, Sink, StoredSession, run_chain
+from tracker.pipeline.automatic_run import ChainPlan, Sink, StoredSession, find_and_track
 from tracker.pipeline.find_people import FindSettings
 from tracker.pipeline.keypoint_evidence import assigned_observations, read_points
 from tracker.pipeline.stored_run import TrackPlan
@@ -77,7 +77,7 @@ class Judgement:
     """Median step from each tracked joint to the imported one, forward, left and up of the body part, (3,), metres."""
     spread_m: Mapping[str, float]
     """Median distance that is left of each joint without its offset, metres."""
-    imported: BodyPoints
+    imported: PersonObservations
     """The joints."""
     tracked: Mapping[int, StoredPose]
     """The poses that they were compared with, by frame."""
@@ -150,7 +150,7 @@ def judge(
 
 
 def judge_person(
-    person: str, imported: BodyPoints, tracked: Mapping[int, StoredPose], observer: Observer | None,
+    person: str, imported: PersonObservations, tracked: Mapping[int, StoredPose], observer: Observer | None,
     fps: float, report: Report = unreported, floor: GroundPlane | None = None,
 ) -> Judgement:  # fmt: skip
     """Judge the imported joints of a person by tracked poses.
@@ -204,7 +204,7 @@ def _throughout(read: ReadPoints) -> tuple[int, tuple[str, ...]]:
     return 0 if lag is None else -lag.frames, misread
 
 
-def _gaps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:
+def _gaps(imported: PersonObservations, own: StoredPose, frame: int) -> Array:
     """Return from the tracked joints to the imported ones, (N, 3), metres."""
     model = own.body.model
     points = [model.point_names.index(n) for n in imported.names]
@@ -238,7 +238,7 @@ def _lost(own: StoredPose, limb: str) -> float:
 
 
 def _constant(
-    imported: BodyPoints, tracked: Mapping[int, StoredPose], frames: Sequence[int], gaps: Array
+    imported: PersonObservations, tracked: Mapping[int, StoredPose], frames: Sequence[int], gaps: Array
 ) -> tuple[dict[str, Array], dict[str, float]]:
     """Return the median step of each joint in the frame of its part, and the median distance that is left."""
     offsets, spread = dict[str, Array](), dict[str, float]()
@@ -267,7 +267,7 @@ def _directions(offset: Array) -> str:
 
 
 def _reason(
-    limb: str, imported: BodyPoints, own: StoredPose, frame: int, jumps: Array, outside: "_Outside | None",
+    limb: str, imported: PersonObservations, own: StoredPose, frame: int, jumps: Array, outside: "_Outside | None",
     verdict: LimbVerdict,
 ) -> str:  # fmt: skip
     """Return why a limb is off, the most telling reason first."""
@@ -341,7 +341,7 @@ def best_motion(
         The poses of each person, by index and frame.
 
     Raises:
-        TrackerError: see `run_chain`.
+        TrackerError: see `find_and_track`.
     """
     with TemporaryDirectory(prefix="quadrille-judge-") as folder:
         twin = create_session(
@@ -357,6 +357,6 @@ def best_motion(
         )
         with closing(AnnotationStore(twin.annotations_path)) as store:
             opened = StoredSession(twin, store, observer)
-            run_chain(plan, opened, sink)
+            find_and_track(plan, opened, sink)
         bodies = opened.session.people
         return {i: read_stored_poses(twin.annotations_path, bodies[i].name, bodies[i].model) for i in people}

@@ -30,7 +30,7 @@ from tracker.formats.calibrations.units import check_focal_lengths, check_units
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.lengths import METRES_BY_WORD
-from tracker.validation import quoted, same_form
+from tracker.validation import nfc_name, quoted
 
 _SUFFIXES = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt", ".csv", ".calibration")
 """Files of a folder that may hold a calibration; the others are not opened."""
@@ -196,13 +196,13 @@ def _sections(
             if name in found:
                 twice = f"camera '{name}' is in two files or twice"
                 raise CalibrationError(f"{document.where}: {twice}; give each camera its own name")
-            found[name] = section | {"name": same_form(plain_text(section.get("name") or name))}
+            found[name] = section | {"name": nfc_name(plain_text(section.get("name") or name))}
     return layout, found
 
 
 def _camera_names(stems: list[str], footage: Collection[str]) -> list[str]:
     """Name cameras by their files; without what all names share at both ends, where the footage has these names."""
-    names = [same_form(stem) for stem in stems]
+    names = [nfc_name(stem) for stem in stems]
     if len(names) < 2 or any(name in footage for name in names):
         return names
     start, end = _shared([*names]), _shared([name[::-1] for name in names])

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.estimation.acquisition.from_keypoints import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import PersonObservations
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.robust_triangulation import Views
 from tracker.interchange.observations.observed import ObservationSet, observed_joints, triangulate_observations
 
 
-def body_points(observations: ObservationSet, cameras: Sequence[Camera]) -> dict[str, BodyPoints]:
+def body_points(observations: ObservationSet, cameras: Sequence[Camera]) -> dict[str, PersonObservations]:
     """Return the points of each person by name.
 
     Key points are matched across views and triangulated, exchanged sides are mended. Joints in space are seen by all
@@ -32,16 +32,16 @@ def body_points(observations: ObservationSet, cameras: Sequence[Camera]) -> dict
     found = triangulate_observations(observations, cameras)
     joints_world, px, confidence = found.joints.joints_world, found.positions_px[..., at, :], found.confidence[..., at]
     return {
-        person: BodyPoints(names, joints_world[:, i, at], _normalized(cameras, px[:, i]), confidence[:, i])
+        person: PersonObservations(names, joints_world[:, i, at], _normalized(cameras, px[:, i]), confidence[:, i])
         for i, person in enumerate(observations.people)
     }
 
 
-def _projected(views: Views, names: tuple[str, ...], joints_world: Array) -> BodyPoints:
+def _projected(views: Views, names: tuple[str, ...], joints_world: Array) -> PersonObservations:
     px, depths = views.project(joints_world)
     px, depths = np.moveaxis(px, 2, 1), np.moveaxis(depths, 2, 1)
     is_seen = np.isfinite(px).all(axis=-1) & (depths > NEAR_PLANE_M)
-    return BodyPoints(names, joints_world, _normalized(views.cameras, px), is_seen.astype(np.float64))
+    return PersonObservations(names, joints_world, _normalized(views.cameras, px), is_seen.astype(np.float64))
 
 
 def _normalized(cameras: Sequence[Camera], px: Array) -> Array:

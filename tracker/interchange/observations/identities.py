@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tracker.body.motion.continuation import SAME_PERSON_M, Bones, PersonPath, who_is_who
+from tracker.body.motion.path_identities import SAME_PERSON_M, Bones, PersonPath, who_is_who
 from tracker.compute.quantiles import known_median
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.robust_triangulation import Views, triangulate_points

@@ -17,9 +17,9 @@ from tracker.geometry.arrays import Array, IntArray
 from tracker.interchange.observations.observed import ObservedJoints
 from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.readers import SPACE_FORMATS
-from tracker.session.clocks import Placement, listed_frames, place_rows, row_places
+from tracker.session.row_placement import RowPlacement, listed_frames, place_rows, row_places
 from tracker.session.session import Session
-from tracker.validation import same_form
+from tracker.validation import nfc_name
 
 
 def place_pictures(
@@ -149,7 +149,7 @@ def read_space(
     given = read_joint_map(request.joint_map) if request.joint_map is not None else None
     read, notes = _of_people(session, request, format_name, paths, given)
     declared = tuple({c.declared_fps for c in session.cameras if c.declared_fps is not None})
-    known = Placement(session.n_frames, declared, request.first_frame, request.clock)
+    known = RowPlacement(session.n_frames, declared, request.first_frame, request.clock)
     problems, rows, tables = list[FormatError](), list[Array](), list[MarkerTable]()
     for path, table in read:
         where = f"{SPACE_FORMATS[format_name].program} file {path}"
@@ -188,8 +188,8 @@ def _of_people(
     asked = tuple(given.markers.values()) if given else ()
     found = SPACE_FORMATS[format_name].read(paths, request.unit_m, session.fps)
     found = [(path, own) for path, table in found for own in by_subject(table, asked)]
-    names = [same_form(table.person).casefold() for _, table in found]
-    wanted = [same_form(person).casefold() for person in request.people]
+    names = [nfc_name(table.person).casefold() for _, table in found]
+    wanted = [nfc_name(person).casefold() for person in request.people]
     notes = []
     is_named = len({*names}) == len(names)
     if is_named and {*wanted} <= {*names}:

@@ -15,7 +15,7 @@ from tracker.footage.image_file import ANYONE, LabelImage
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.interchange.observations.observed import ObservationSet, SourceFile
 from tracker.interchange.observations.sources import FileGroup
-from tracker.session.clocks import Clock
+from tracker.session.row_placement import Clock
 
 Content = Literal["key points", "masks", "joints"]
 """Content of the files of an import."""
@@ -41,7 +41,7 @@ class ImportRequest:
     """Key points and masks: frames by which those of a camera are late, taken off; of a camera that is named, even by
     0, the user has decided."""
     clock: Clock | None = None
-    """Points in space: whether rows lie at their numbers or at their times; see `Placement`."""
+    """Points in space: whether rows lie at their numbers or at their times; see `RowPlacement`."""
     axes: str = "x,y,z"
     """Points in space: axes of the file that are the session's x, y, z."""
     unit_m: float | None = None

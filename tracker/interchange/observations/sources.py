@@ -12,7 +12,7 @@ from tracker.files import entries_below
 from tracker.formats.keypoints.picture_names import PictureName, picture_names
 from tracker.interchange.observations.observed import SourceFile, checksum
 from tracker.session.matching import check_names
-from tracker.validation import same_form
+from tracker.validation import nfc_name
 
 Found: TypeAlias = tuple[Path, Path]
 """A file, and the folder that the path of its stored copy is relative to."""
@@ -219,11 +219,11 @@ def _lies_at(place: Path, path: Path) -> bool:
 
 def _camera_of(labels: Sequence[str], cameras: Sequence[str]) -> str:
     """Return the camera that a label names: exactly, or as a word in it, the longest name first; empty if none does."""
-    for label in map(same_form, labels):
-        exact = [name for name in cameras if same_form(name).casefold() == label.casefold()]
+    for label in map(nfc_name, labels):
+        exact = [name for name in cameras if nfc_name(name).casefold() == label.casefold()]
         if exact:
             return exact[0]
-        words = [n for n in cameras if re.search(rf"(?<![^\W_]){re.escape(same_form(n))}(?=DLC|\b|_)", label, re.I)]
+        words = [n for n in cameras if re.search(rf"(?<![^\W_]){re.escape(nfc_name(n))}(?=DLC|\b|_)", label, re.I)]
         longest = sorted(words, key=len)[-1:]
         if longest and all(n in longest[0] for n in words):
             return longest[0]

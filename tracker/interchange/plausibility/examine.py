@@ -18,7 +18,7 @@ from tracker.interchange.observations.importing import plan_import
 from tracker.interchange.observations.observed import ObservationSet, triangulate_observations
 from tracker.interchange.observations.plans import ImportPlan, ImportRequest, MaskPlan
 from tracker.interchange.plausibility.body_likelihood import PRIORS
-from tracker.interchange.plausibility.filmed_people import film_people
+from tracker.interchange.plausibility.filmed_people import segment_filmed_people
 from tracker.interchange.plausibility.readings import Reading, ReadPoints
 from tracker.session.session import Session
 
@@ -125,7 +125,9 @@ def _with_film(
 ) -> ReadPoints:
     up = floor_plane(session.up, session.floor).normal
     is_everybody = len(statures) == len(session.people)
-    return ReadPoints(names, points, frames, statures, up, session.fps, film_people(session, frames), is_everybody)
+    return ReadPoints(
+        names, points, frames, statures, up, session.fps, segment_filmed_people(session, frames), is_everybody
+    )
 
 
 def _window(points: Array, fps: float) -> IntArray:

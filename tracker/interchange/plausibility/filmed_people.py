@@ -190,7 +190,7 @@ class FilmedPeople:
         return np.where(inside, away_px * depths / camera.K[0, 0], np.nan)
 
 
-def film_people(session: Session, frames: IntArray) -> FilmedPeople:
+def segment_filmed_people(session: Session, frames: IntArray) -> FilmedPeople:
     """Find the people of some frames by the session's masks, backgrounds, or its own median, and their motion.
 
     Without readable footage, people may be anywhere in the pictures.

@@ -9,7 +9,7 @@ import os
 import msgspec
 
 from tracker.errors import TrackerError
-from tracker.validation import Name, quoted, same_form
+from tracker.validation import Name, nfc_name, quoted
 
 VARIABLE = "QUADRILLE_ANNOTATOR"
 """Environment variable with the name of the annotator."""
@@ -25,19 +25,19 @@ def annotator(default: str = "") -> str:
     return checked_annotator(name) if name else default
 
 
-def one_form(name: str) -> str:
+def normalized_annotator(name: str) -> str:
     """Return a name in the form in which annotators are compared: without superfluous space, in one form of Unicode."""
-    return " ".join(same_form(name).split())
+    return " ".join(nfc_name(name).split())
 
 
 def checked_annotator(name: str) -> str:
-    """Return the name of an annotator, in `one_form`.
+    """Return the name of an annotator, in `normalized_annotator`.
 
     Raises:
         TrackerError: it is no name.
     """
     try:
-        return one_form(msgspec.convert(name, Name)) or name
+        return normalized_annotator(msgspec.convert(name, Name)) or name
     except msgspec.ValidationError as error:
         raise TrackerError(
             f"expected the annotator as a name of 1 to 200 characters on one line, found {quoted(name)}; choose another"

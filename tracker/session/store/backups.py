@@ -22,7 +22,7 @@ from typing import NamedTuple
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.files import check_regular, open_regular, sync_folder
 from tracker.session.lock import SessionLock, is_held_here
-from tracker.session.store import checksums, verification
+from tracker.session.store import checksums, integrity
 
 FOLDER = "backups"
 """Folder of the backups, beside the store."""
@@ -151,8 +151,8 @@ def _damage(backup: Path) -> str | None:
         return "there is no such file, or it is empty"
     try:
         with closing(_reader(backup)) as db:
-            return verification.damage(db)
-    except (sqlite3.Error, OSError, DamagedStoreError, *verification.UNDECODABLE) as error:
+            return integrity.damage(db)
+    except (sqlite3.Error, OSError, DamagedStoreError, *integrity.UNDECODABLE) as error:
         return f"{type(error).__name__}: {error}"
 
 
@@ -161,7 +161,7 @@ def _is_copy(backup: Path, db: sqlite3.Connection) -> bool:
     try:
         with closing(_reader(backup)) as other:
             return checksums.contents(other) == checksums.contents(db)
-    except (sqlite3.Error, OSError, DamagedStoreError, *verification.UNDECODABLE):  # an older version, or damaged
+    except (sqlite3.Error, OSError, DamagedStoreError, *integrity.UNDECODABLE):  # an older version, or damaged
         return False
 
 
@@ -230,7 +230,7 @@ def open_reader(path: Path, connect: Connect) -> sqlite3.Connection:
             return db
         except sqlite3.Error as found:
             db.close()
-            if verification.primary_code(found) not in _NEEDS_ROLLBACK:
+            if integrity.primary_code(found) not in _NEEDS_ROLLBACK:
                 raise
             error = found
         if not _roll_back_in_place(path, connect):
@@ -282,7 +282,7 @@ def _rolled_back(path: Path, connect: Connect) -> bool:
         with closing(connect(path, "rw")) as db:
             db.execute("PRAGMA schema_version").fetchone()
     except sqlite3.Error as error:
-        if verification.primary_code(error) in _NEEDS_ROLLBACK:
+        if integrity.primary_code(error) in _NEEDS_ROLLBACK:
             return False  # the folder cannot be written
         raise
     return True

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.files import IrregularFileError, refuse_links, sync_folder
-from tracker.session.store import backups, checksums, records, schema, verification
-from tracker.session.store.verification import EndlessQueryError, limited
+from tracker.session.store import backups, checksums, integrity, records, schema
+from tracker.session.store.integrity import EndlessQueryError, limited
 
 T = TypeVar("T")
 
@@ -137,7 +137,7 @@ class Connection:
             raise self.damaged("expected the poses of the session, found an empty file of 0 bytes")
         db = backups.open_reader(self._path, _connect) if self._read_only else _connect(self._path, "rw")
         try:
-            damage = verification.damage(db)
+            damage = integrity.damage(db)
             if damage is not None:
                 raise self.damaged(damage)
             version = schema.version(db)
@@ -224,14 +224,14 @@ class Connection:
         except EndlessQueryError as error:
             raise self.damaged(str(error)) from error
         except sqlite3.Error as error:
-            code = verification.primary_code(error)
+            code = integrity.primary_code(error)
             if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
                 raise self.damaged(f"SQLite reports: {error}") from error
             self._is_suspect |= code in _OF_THE_FILE
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error}; check the disk and who has the file open"
             ) from error
-        except verification.UNDECODABLE as error:
+        except integrity.UNDECODABLE as error:
             raise self.damaged(f"its definitions or rows cannot be decoded ({type(error).__name__})") from error
         except IrregularFileError as error:
             raise self.damaged(f"{error.strerror} at {error.filename}") from error

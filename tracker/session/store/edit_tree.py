@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from tracker.compute.distribution import program_version
+from tracker.compute.installed_package import program_version
 from tracker.errors import SessionError
 from tracker.session.store import rows
 from tracker.session.store.connection import Connection

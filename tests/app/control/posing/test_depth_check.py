@@ -10,7 +10,7 @@ FRONT, RIGHT, BACK, LEFT = range(4)
 
 
 def unseen(controller):
-    return controller.state.unseen_depth
+    return controller.state.undetermined_depth
 
 
 def test_opposite_views_alone_miss_the_depth_until_a_view_across_is_used(controller):

@@ -16,8 +16,8 @@ from app.runtime.kernel_compiler import KernelCompiler
 from app.session.samples import bundled
 from app.state.page_view import View
 from tracker.compute import kernel_cache
-from tracker.compute.interpretation import is_interpreted
 from tracker.compute.kernel_cache import STAGES, compiled_mark, compiled_stages, record_compiled, record_stage
+from tracker.compute.uncompiled_kernels import is_interpreted
 from tracker.estimation.initialization.generators import silhouette_overlap
 from tracker.estimation.voxel import labels
 from tracker.evidence.voxels import carving
@@ -162,12 +162,12 @@ def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monk
         def join(self):
             beside.append("joined")
 
-    def start_beside(work, *arguments):
+    def start_child(work, *arguments):
         beside.append("started")
         work(*arguments)
         return Beside()
 
-    monkeypatch.setattr(compile_kernels, "start_beside", start_beside)
+    monkeypatch.setattr(compile_kernels, "start_beside", start_child)
     monkeypatch.setattr(compile_kernels, "record_stage", lambda stage: stages.append(stage) or record_stage(stage))
     monkeypatch.setattr(
         compile_kernels, "_track", lambda cameras, settings, models, start: tracked.append((cameras, settings, models))

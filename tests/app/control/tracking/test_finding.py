@@ -16,7 +16,7 @@ from tracker.estimation.acquisition.from_contours import Acquisition
 from tracker.estimation.fitting.hypothesis import Hypothesis
 from tracker.estimation.initialization.first_pose import FirstPose, FirstPoses
 from tracker.estimation.initialization.frame_trials import TakenError, Trying
-from tracker.pipeline import chain
+from tracker.pipeline import automatic_run
 
 FRAME = 1
 
@@ -46,7 +46,7 @@ def found(monkeypatch):
         assert go.wait(10)
         return poses_on(session, FRAME)
 
-    monkeypatch.setattr(chain, "find_people", find)
+    monkeypatch.setattr(automatic_run, "find_people", find)
     return go
 
 
@@ -103,8 +103,8 @@ def acquired(monkeypatch):
         body = session.people[person].model.with_height(1.1 * session.people[person].model.height_m)
         return Acquisition(body, (FRAME,), (body.neutral(),), 2.0, 1.0, None, None)
 
-    monkeypatch.setattr(chain, "acquire_body", acquire)
-    monkeypatch.setattr(chain, "has_preset_proportions", lambda model: True)
+    monkeypatch.setattr(automatic_run, "acquire_body", acquire)
+    monkeypatch.setattr(automatic_run, "has_preset_proportions", lambda model: True)
     return go
 
 
@@ -200,7 +200,7 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
             assert event.wait(10)
         raise TrackerError("expected a body that fills the silhouettes, found none")
 
-    monkeypatch.setattr(chain, "find_people", find)
+    monkeypatch.setattr(automatic_run, "find_people", find)
     controller = opened()
     controller.finding.start()
     wait_for(lambda: controller.state.finding.candidates)
@@ -246,7 +246,7 @@ def searching(opened, monkeypatch):
         except TakenError:
             return best
 
-    monkeypatch.setattr(chain, "find_people", find)
+    monkeypatch.setattr(automatic_run, "find_people", find)
     return opened(), go
 
 
@@ -278,7 +278,7 @@ def test_an_error_is_one_sentence(opened, monkeypatch):
             wait_for(lambda: controller.state.frame == frame)  # noqa: B023
         raise TrackerError("expected somebody in the silhouettes, found none", camera=camera)
 
-    monkeypatch.setattr(chain, "find_people", fail)
+    monkeypatch.setattr(automatic_run, "find_people", fail)
     controller = opened()
     camera = controller.session.cameras[1].camera.name
     controller.finding.start()

@@ -16,7 +16,7 @@ from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.evaluation.judging.judge import Judgement, LimbVerdict
 from tracker.interchange.observations.plans import ImportRequest
-from tracker.pipeline import chain
+from tracker.pipeline import automatic_run
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import load_session
 
@@ -279,7 +279,7 @@ def test_people_are_found_and_tracked_with_key_points(imported, monkeypatch, as_
         on_end(True)
 
     monkeypatch.setattr("app.control.tracking.tracking.Tracking.start_outward", start)
-    monkeypatch.setattr(chain, "_acquire", lambda people, *more: {})
+    monkeypatch.setattr(automatic_run, "_acquire", lambda people, *more: {})
     imported.observing.track("openpose", as_evidence)
     with pytest.raises(TrackerError, match="no other search for people"):
         imported.observing.track("openpose", as_evidence)

@@ -101,5 +101,5 @@ def test_held_out_errors_are_below_those_of_caliscopes_calibration(folder, found
 def test_the_error_in_the_volume_is_told(found):
     volume = found[0].found.rig.volume
     assert 0.0001 < volume.low_m < volume.expected_m < volume.high_m < 0.002
-    assert found[0].found.rig.fit.common_share > 2  # the board moves while unsynchronized cameras film it
+    assert found[0].found.rig.fit.variance_inflation > 2  # the board moves while unsynchronized cameras film it
     assert found[0].views.n_from_behind == 48

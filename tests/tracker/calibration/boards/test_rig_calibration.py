@@ -22,10 +22,10 @@ from tracker.calibration.boards.camera_graph import link_cameras
 from tracker.calibration.boards.expected_error import expected_error
 from tracker.calibration.boards.rig_fit import blank_camera, fit_lens, held_out_errors
 from tracker.calibration.boards.view_choice import choose_frames, choose_views, outlines, posed_views
-from tracker.calibration.check.reprojection import column_ends
+from tracker.calibration.check.rig_adjustment import column_ends
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
-from tracker.geometry.camera_columns import FOCAL, POSE, moved_camera
+from tracker.geometry.camera_derivatives import FOCAL, POSE, moved_camera
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ from seen_points import cloud, moved_rig, ring_of, seen_points
 
 from tracker.calibration.check.lens_priors import CALIBRATED, prior_sigmas
 from tracker.calibration.check.point_problem import PointProblem, require_spread, triangulate_all
-from tracker.calibration.check.reprojection import Observations, Prior, Rig, fit_rig
+from tracker.calibration.check.rig_adjustment import Observations, Prior, Rig, fit_rig
 from tracker.errors import CalibrationError
 from tracker.estimation.fitting.bundle import solve_bundle
-from tracker.geometry.camera_columns import camera_difference
+from tracker.geometry.camera_derivatives import camera_difference
 
 
 def scipys_minimum(problem, rig):

@@ -9,10 +9,10 @@ from filmed_people import blanks, dancing, observed, rig
 from tracker.calibration.boards.expected_error import expected_error
 from tracker.calibration.check.lens_priors import CALIBRATED
 from tracker.calibration.check.point_problem import PointProblem
-from tracker.calibration.check.reprojection import Observations, Prior, Rig, column_ends
+from tracker.calibration.check.rig_adjustment import Observations, Prior, Rig, column_ends
 from tracker.calibration.self_calibration.joint_adjustment import Gauge, UnknownLenses, adjust_joints
 from tracker.calibration.self_calibration.seen_joints import joints_of_people
-from tracker.geometry.camera_columns import FOCAL, POSE, SHIFT, moved_camera, n_columns
+from tracker.geometry.camera_derivatives import FOCAL, POSE, SHIFT, moved_camera, n_camera_parameters
 
 CAMERAS = rig(3)
 
@@ -54,13 +54,15 @@ def test_cameras_that_see_no_joint_together_are_not_adjusted():
 
 def test_lenses_of_one_model_pull_each_other():
     means = blanks(CAMERAS)
-    prior = Prior(tuple(means), tuple(np.where(np.arange(n_columns(c)) == FOCAL, 0.5, 0.0) for c in means), ((0, 1),))
+    prior = Prior(
+        tuple(means), tuple(np.where(np.arange(n_camera_parameters(c)) == FOCAL, 0.5, 0.0) for c in means), ((0, 1),)
+    )
     alike = PointProblem(Observations(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2))), prior, 1, np.ones(3))
 
     def cost(logs):
         moved = []
         for camera, log in zip(means, logs, strict=True):
-            step = np.zeros(n_columns(camera))
+            step = np.zeros(n_camera_parameters(camera))
             step[FOCAL] = log
             moved.append(moved_camera(camera, step))
         return alike.linearize(Rig(tuple(moved), np.zeros((1, 3))))

@@ -7,7 +7,7 @@ import pytest
 from detected_people import acted, detected
 from filmed_people import SIZE, dancing, observed, rig
 
-from tracker.calibration.check.reprojection import Observations
+from tracker.calibration.check.rig_adjustment import Observations
 from tracker.calibration.self_calibration.keypoint_calibration import require_unmirrored
 from tracker.errors import CalibrationError
 

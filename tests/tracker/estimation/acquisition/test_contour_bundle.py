@@ -6,9 +6,9 @@ from rig_oracle import columns, motions_of_points, sums_of_rows
 from rig_scenes import CAMERAS, viewed
 
 from tracker.calibration.check.fault_search import as_tracked, prior_sigmas
-from tracker.calibration.check.viewed_frames import seen_people
+from tracker.calibration.check.judged_frames import seen_people
 from tracker.estimation.acquisition.contour_bundle import ContourBundle
-from tracker.estimation.acquisition.part_motions import N_MOTIONS, motions_by_unknowns
+from tracker.estimation.acquisition.part_derivatives import N_MOTIONS, part_jacobian
 from tracker.estimation.acquisition.piece_sums import (
     OF_CAMERA,
     OF_PART,
@@ -19,8 +19,8 @@ from tracker.estimation.acquisition.piece_sums import (
 )
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
-from tracker.geometry.camera_columns import project_with_columns
 from tracker.geometry.camera_correction import DRIFT, N_CORRECTIONS, ROTATION, TIME, corrected
+from tracker.geometry.camera_derivatives import project_with_columns
 from tracker.geometry.rigid import so3_exp
 
 CORRECTION = np.array([0.004, -0.003, 0.002, 0.01, -0.005, 0.01, 0.003, 0.0, 0.0])
@@ -66,7 +66,7 @@ def test_sums_are_converted_as_all_columns_at_once(pieces, with_shapes):
     _, body, camera = pieces
     parameters, velocity = SizeParameters(body.model), np.random.default_rng(1).normal(size=body.model.n_dofs)
     by_sizes = parameters.derivatives(np.zeros(len(parameters.names)))
-    J = motions_by_unknowns(body.model, body.kinematics, by_sizes, with_shapes)
+    J = part_jacobian(body.model, body.kinematics, by_sizes, with_shapes)
     sums, columns_of = summed(pieces, with_shapes)
     moving = J[:, :, -len(velocity) :] @ velocity
     found = GroupSums.zeros(2 * N_CORRECTIONS, J.shape[2])

@@ -6,7 +6,7 @@ from rigs import cameras, ring
 from staging import posed
 
 from tracker.body.model import PosedBody
-from tracker.estimation.acquisition.from_keypoints import BodyPoints, fit_to_keypoints, learn_seen_body
+from tracker.estimation.acquisition.from_keypoints import PersonObservations, fit_to_keypoints, learn_seen_body
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 
@@ -34,11 +34,11 @@ def recording():
             seen[k, v] = eye[:, :2] / eye[:, 2:] + rng.normal(0, SIGMA, (len(NAMES), 2))
     joints += rng.normal(0, 0.01, joints.shape)
     seen[::10, :, NAMES.index("left_wrist")] += 0.2
-    return bodies, BodyPoints(NAMES, joints, seen, np.full(seen.shape[:3], 0.8))
+    return bodies, PersonObservations(NAMES, joints, seen, np.full(seen.shape[:3], 0.8))
 
 
 def first_frames(points):
-    return BodyPoints(NAMES, points.joints_world[:FEW], points.seen[:FEW], points.confidence[:FEW])
+    return PersonObservations(NAMES, points.joints_world[:FEW], points.seen[:FEW], points.confidence[:FEW])
 
 
 def test_offsets_and_noise_are_those_of_the_detector(recording):
@@ -57,7 +57,7 @@ def test_a_point_on_which_the_views_of_a_frame_disagree_is_less_certain_there(re
     seen[5, :3, knee] += [[0.05, 0.0], [0.0, -0.05], [-0.05, 0.0]]  # saturated: each view is as sure as ever
     seen[7, 0, knee] += 0.05  # one view alone contradicts: robust fits leave it out
     usual, found = (
-        learnt.keypoints(MODEL, BodyPoints(NAMES, points.joints_world, s, points.confidence), CAMERAS).sigmas
+        learnt.keypoints(MODEL, PersonObservations(NAMES, points.joints_world, s, points.confidence), CAMERAS).sigmas
         for s in (points.seen, seen)
     )
     assert (found[5, :, knee] > 0.03).all()
@@ -87,5 +87,5 @@ def test_sparse_points_leave_frames_out(recording):
     _, points = recording
     joints = points.joints_world[:2].copy()
     joints[1, 3:] = np.nan
-    few = BodyPoints(NAMES, joints, points.seen[:2], points.confidence[:2])
+    few = PersonObservations(NAMES, joints, points.seen[:2], points.confidence[:2])
     assert set(fit_to_keypoints(MODEL, few)) == {0}

@@ -9,7 +9,7 @@ from tracker.body.dimensions import dimensions_of, stature_m, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.estimation.acquisition.from_voxels import SilhouettedPerson, VoxelSizeSettings, fit_sizes_to_voxels
-from tracker.estimation.acquisition.part_motions import figure_by_sizes, parts_by_unknowns, points_by_sizes
+from tracker.estimation.acquisition.part_derivatives import figure_by_sizes, parts_by_unknowns, points_by_sizes
 from tracker.estimation.acquisition.size_fit import SizeFitSettings, fit_sizes_to_contours
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.estimation.fitting.gauss_newton import fit_to_points

@@ -5,7 +5,7 @@ import pytest
 from rig_oracle import motions_of_points
 from staging import posed
 
-from tracker.estimation.acquisition.part_motions import motions_by_pose, motions_by_sizes, points_by_sizes
+from tracker.estimation.acquisition.part_derivatives import motions_by_pose, part_size_jacobian, points_by_sizes
 from tracker.estimation.acquisition.size_parameters import SizeParameters
 from tracker.formats.model_toml import PRESETS, load_model
 
@@ -45,7 +45,7 @@ def test_surface_points_move_as_their_derivatives_say(name):
     parameters, sizes, pose = staged(name)
     body = parameters.body(sizes)
     kinematics = body.kinematics(pose)
-    by_sizes = motions_by_sizes(body, kinematics, parameters.derivatives(sizes))
+    by_sizes = part_size_jacobian(body, kinematics, parameters.derivatives(sizes))
     for part in range(len(body.parts)):
         unit, normals = on_surface(body, part)
         T = kinematics.Ts_world_part[part]

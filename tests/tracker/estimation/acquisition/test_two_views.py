@@ -9,7 +9,7 @@ from staging import camera_at, edge_map, in_posture, own_evidence, view_evidence
 from tracker.body.dimensions import dimensions_of
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.estimation.acquisition.chamfer_search import (
+from tracker.estimation.acquisition.shape_search import (
     ChamferSearchSettings,
     back_project_contours,
     chamfer_distance_m,

@@ -10,7 +10,7 @@ from tracker.body.model import PosedBody
 from tracker.estimation.fitting.clocked_residuals import ClockedResiduals, person_residuals
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import PosePrior
-from tracker.estimation.fitting.gauss_newton_compiled import solve_fast
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.search.chamfer_cost import ChamferCost
 
 CAMERAS = cameras_around(4)
@@ -34,7 +34,7 @@ class Moving:
     def error_mm(self, views):
         """Mean error of the points after a fit to views."""
         blocks = [person_residuals(views, [self.start]), PosePrior.of_spreads(self.model)]
-        found = solve_fast(self.model, self.start.values, blocks, max_iterations=30)
+        found = solve_compiled_or_plain(self.model, self.start.values, blocks, max_iterations=30)
         off = PosedBody(self.model, found.pose).points_world - self.body.points_world
         return 1000 * np.linalg.norm(off, axis=1).mean()
 

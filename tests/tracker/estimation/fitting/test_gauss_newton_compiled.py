@@ -9,7 +9,7 @@ from tracker.body.model import PosedBody
 from tracker.estimation.fitting import gauss_newton, gauss_newton_compiled
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
 from tracker.estimation.fitting.gauss_newton import PointTargets, PosePrior
-from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled, solve_fast
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled, solve_compiled_or_plain
 from tracker.estimation.fitting.interpenetration import BodyPenetration, SelfPenetration
 from tracker.estimation.fitting.keypoints import KeypointBlock
 from tracker.evidence.keypoints import ViewKeypoints
@@ -208,6 +208,6 @@ def test_uncovered_cases_are_refused_by_name(staged, strange, named):
         joints = list(model.joints)
         joints[shoulder] = replace(joints[shoulder], kind="ball", axes=())
         model = replace(model, joints=tuple(joints))
-        assert solve_fast(model, model.neutral(), [PosePrior.of_spreads(model)]).cost == 0
+        assert solve_compiled_or_plain(model, model.neutral(), [PosePrior.of_spreads(model)]).cost == 0
     with pytest.raises(TypeError, match=named):
         solve_compiled(model, model.neutral(), blocks)

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, own_evidence, posed, shaken, solid, view_evidence
 
 from tracker.body.model import PosedBody
-from tracker.estimation.search.chamfer_cost import ChamferCost, measure_nothing
+from tracker.estimation.search.chamfer_cost import ChamferCost, compile_measure_kernels
 from tracker.estimation.search.chamfer_kernels import measure_view
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence, default_theta_px
@@ -314,7 +314,7 @@ def test_the_cost_at_the_prediction_is_that_of_its_poses(gavrila, outliers):
 def test_kernels_that_measure_are_compiled_apart_from_those_that_trace():
     """With the types with which a cost calls them: otherwise they are compiled twice."""
     view = ViewEvidence(FRONT, 1.0, ring(1, 2, 3).astype(np.float32), np.zeros((480, 640), np.float32))
-    measure_nothing([view], (BALL.model,))
+    compile_measure_kernels([view], (BALL.model,))
     compiled = list(measure_view.signatures)
     for outliers in ("truncated", "paper"):
         ChamferCost([view], [BALL], THETA, outliers)([BALL.values])

@@ -11,9 +11,9 @@ from tracker.estimation.trajectory.hypotheses import (
     DISTINCT_M,
     HypothesisSet,
     Paths,
-    all_together,
     cheapest,
     motion_nats,
+    reduce_log_sum,
     through,
 )
 from tracker.estimation.trajectory.motion_model import Group, MotionModel, acceleration
@@ -61,11 +61,11 @@ def test_paths_cost_what_all_of_them_cost_one_by_one(freedom, sizes, seed):
     known = every_path(sets, motion if len(coefficients) else None, coefficients)
     costs = [s.costs() for s in sets]
     if len(sizes) < 3:  # nothing shows their motion: each frame is on its own
-        for reduced in (cheapest, all_together):
+        for reduced in (cheapest, reduce_log_sum):
             for found, own in zip(through(costs, nats, reduced), costs, strict=True):
                 np.testing.assert_array_equal(found, own)
         return
-    least, together = through(costs, nats, cheapest), through(costs, nats, all_together)
+    least, together = through(costs, nats, cheapest), through(costs, nats, reduce_log_sum)
     for t, size in enumerate(sizes):
         for i in range(size):
             own = np.array([cost for path, cost in known.items() if path[t] == i])

@@ -7,7 +7,7 @@ from figures import figure
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.voxel.body_pose import state_of
 from tracker.estimation.voxel.labels import label_voxels
-from tracker.estimation.voxel.levels import DetailLevels, carried, find_levels, measure_together
+from tracker.estimation.voxel.resolved_parts import ResolvedParts, carried, find_resolved_parts, measure_together
 from tracker.estimation.voxel.settings import VoxelSettings
 from tracker.formats.model_toml import load_model
 
@@ -24,7 +24,11 @@ def seen(**pose):
 def levels_of(before=None, patience=1, **pose):
     state, voxels = seen(**pose)
     labels = label_voxels(voxels.points_world, [state], voxels.grid.size_m, SETTINGS.label_rule)
-    return find_levels(before or DetailLevels.finest(), state, voxels, labels.labels, 0, patience), state, labels.clouds
+    return (
+        find_resolved_parts(before or ResolvedParts.finest(), state, voxels, labels.labels, 0, patience),
+        state,
+        labels.clouds,
+    )
 
 
 @pytest.mark.slow

@@ -62,10 +62,10 @@ def test_legs_that_look_like_shadows_are_followed(monkeypatch):
         return hide_legs(whole, {0}, [np.zeros_like(s.mask) for s in whole])
 
     finder = SimpleNamespace(silhouettes=silhouettes, close=lambda: None)
-    monkeypatch.setattr(tracker, "SilhouetteFinder", lambda cameras, recording, in_recording: finder)
+    monkeypatch.setattr(tracker, "SilhouetteFinder", lambda cameras, recording, recording_views: finder)
 
     def leg_errors(floor):
-        observer = SimpleNamespace(cameras=seen, recording=None, in_recording=range(len(seen)))
+        observer = SimpleNamespace(cameras=seen, recording=None, recording_views=range(len(seen)))
         run = TrackingRun(observer, Subjects.of([body]), [start], frames, FPS, floor)
         *_, last = VoxelTracker().estimates(run)
         own, truth = body.named_points_world(last.poses[0]), joints_at(frames[-1] / FPS)

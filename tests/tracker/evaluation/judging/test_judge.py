@@ -8,7 +8,7 @@ from stored_motions import random_poses
 
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.estimation.acquisition.from_keypoints import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import PersonObservations
 from tracker.evaluation.judging.judge import judge_person
 from tracker.evaluation.judging.verdicts import LIMBS
 from tracker.formats.model_toml import load_model
@@ -44,7 +44,7 @@ def joints(tracked):
 
 
 def judged(joints, tracked):
-    points = BodyPoints(
+    points = PersonObservations(
         NAMES, joints, np.empty((len(joints), 0, len(NAMES), 2)), np.empty((len(joints), 0, len(NAMES)))
     )
     return judge_person("ann", points, tracked, None, 25.0)

@@ -3,7 +3,7 @@ import pytest
 from figures import figure
 from scipy.spatial import cKDTree
 
-from tracker.evidence.voxels.paths import neighbor_graph, path_lengths
+from tracker.evidence.voxels.geodesic_distance import neighbor_graph, path_lengths
 from tracker.evidence.voxels.voxel_grid import VoxelGrid, Voxels
 
 

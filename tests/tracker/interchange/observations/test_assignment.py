@@ -9,7 +9,7 @@ from tracker.evaluation.judging import judge as judged
 from tracker.formats.keypoints.detections import read_openpose
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import write_trc
-from tracker.interchange.exports.like.sending import export_like
+from tracker.interchange.exports.like.patched_files import export_patched
 from tracker.interchange.observations.importing import plan_import, store_import
 from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations
@@ -106,7 +106,7 @@ def test_mended_points_are_those_of_the_right_person(session, tmp_path):
     imported(session, tmp_path)
     store(session, "ann", edited=(EDITED,), moved=(0.1, 0.0, 0.0))
     store(session, "ben")
-    done = export_like(session, load_observations(session, "op"), tmp_path / "back")
+    done = export_patched(session, load_observations(session, "op"), tmp_path / "back")
     assert done.frames == (EDITED,)
     files = [sorted((tmp_path / folder / "cam0").glob("*.json")) for folder in ("k", "back")]
     before, after = (np.array([[p.points for p in read_openpose(file)] for file in some]) for some in files)

@@ -7,7 +7,7 @@ import pytest
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.errors import FormatError, Remedy
-from tracker.interchange.exports.like.sending import export_like
+from tracker.interchange.exports.like.patched_files import export_patched
 from tracker.interchange.observations.checks import view_shifts
 from tracker.interchange.observations.importing import plan_import, store_import, stored_pictures
 from tracker.interchange.observations.observed import ObservedPoints
@@ -131,6 +131,6 @@ def test_late_key_points_are_refused_until_the_user_decides(tmp_path, points):
     assert json.loads(dict(observations.options)["offsets"]) == {"cam1": 3}
     first = {s.camera: int(s.frames[0]) for s in stored_pictures(session, observations)}
     assert first == {"cam0": 0, "cam1": -3, "cam2": 0, "cam3": 0}
-    done = export_like(session, observations, tmp_path / "back")
+    done = export_patched(session, observations, tmp_path / "back")
     assert not done.changed
     assert len(done.paths) == 4 * N

@@ -12,7 +12,7 @@ import pytest
 from damage import altered, old_store, written_store
 
 from tracker.errors import DamagedStoreError
-from tracker.session.store import checksums, schema, verification
+from tracker.session.store import checksums, integrity, schema
 from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.connection import Connection
 from tracker.session.store.edit_tree import now
@@ -81,14 +81,14 @@ def test_foreign_definitions_are_refused(path, foreign, read_only):
 def test_foreign_definitions_in_an_older_store(tmp_path, version):
     path = old_store(tmp_path / "annotations.sqlite", version)
     with closing(sqlite3.connect(path)) as db:
-        assert verification.foreign_definition(db) is None
+        assert integrity.foreign_definition(db) is None
     altered(path, "CREATE TRIGGER gone AFTER INSERT ON poses BEGIN DELETE FROM poses; END")
     with pytest.raises(DamagedStoreError, match="the trigger 'gone' is none of the program"):
         AnnotationStore(path)
 
 
 def test_the_words_of_the_program_define_tables_alone():
-    words, names = verification._own_words()
+    words, names = integrity._own_words()
     assert not words & {"SELECT", "CHECK", "DEFAULT", "AS", "GENERATED", "TRIGGER", "VIEW", "VIRTUAL", "COLLATE", "'"}
     assert names >= {*checksums.COLUMNS, "contents", "told"}
     assert all("CREATE" in text or "ALTER" in text or "INSERT" in text for text in schema.STATEMENTS if text.strip())
@@ -261,7 +261,7 @@ def test_each_day_of_the_calendar_is_a_time():
 
 @pytest.mark.slow
 def test_a_query_without_end_is_stopped(path, monkeypatch):
-    monkeypatch.setattr(verification, "_FREE_STEPS", 1_000_000)
+    monkeypatch.setattr(integrity, "_FREE_STEPS", 1_000_000)
     with closing(Connection(path, read_only=True)) as connection:
         endless = "WITH RECURSIVE n (k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT count(*) FROM n"
         with pytest.raises(DamagedStoreError, match="a query took more steps than its rows can need"):
@@ -273,14 +273,14 @@ def test_a_signal_ends_a_long_query(path, monkeypatch):
     def stop():
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(verification, "_FREE_STEPS", 0)
-    with closing(sqlite3.connect(path)) as db, pytest.raises(KeyboardInterrupt), verification.limited(db, stop):
+    monkeypatch.setattr(integrity, "_FREE_STEPS", 0)
+    with closing(sqlite3.connect(path)) as db, pytest.raises(KeyboardInterrupt), integrity.limited(db, stop):
         db.execute("WITH RECURSIVE n (k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT count(*) FROM n").fetchall()
 
 
 @pytest.mark.parametrize("n_frames", [300])
 def test_queries_of_the_program_stay_far_below_the_limit(path, n_frames, monkeypatch):
     """A tenth of the steps per byte, and none for free, are enough to check and read a store."""
-    monkeypatch.setattr(verification, "_FREE_STEPS", 0)
-    monkeypatch.setattr(verification, "_STEPS_PER_BYTE", verification._STEPS_PER_BYTE / 10)
+    monkeypatch.setattr(integrity, "_FREE_STEPS", 0)
+    monkeypatch.setattr(integrity, "_STEPS_PER_BYTE", integrity._STEPS_PER_BYTE / 10)
     read_all(path)

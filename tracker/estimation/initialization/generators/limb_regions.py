@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tracker.estimation.initialization.generators.standing_body import typical_person
 from tracker.estimation.initialization.generators.torso_template import Torso
 from tracker.evidence.voxels.figure_masks import STRAY
-from tracker.evidence.voxels.paths import VoxelGraph, path_lengths
+from tracker.evidence.voxels.geodesic_distance import VoxelGraph, path_lengths
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.geometry.arrays import Array, IntArray
 

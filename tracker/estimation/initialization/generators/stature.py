@@ -7,7 +7,7 @@ from tracker.estimation.initialization.generators.head_template import Head
 from tracker.estimation.initialization.generators.person_scene import PersonScene
 from tracker.estimation.initialization.generators.standing_body import typical_person
 from tracker.estimation.initialization.generators.voxel_start import FigureParts, locate_parts, possible_heads
-from tracker.evidence.voxels.paths import neighbor_graph
+from tracker.evidence.voxels.geodesic_distance import neighbor_graph
 from tracker.evidence.voxels.shadows import is_changed_at
 from tracker.geometry.arrays import Array
 

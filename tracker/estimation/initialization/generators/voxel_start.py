@@ -13,7 +13,7 @@ from tracker.estimation.initialization.generators.head_template import Head, fin
 from tracker.estimation.initialization.generators.limb_regions import LimbRegion, find_limbs
 from tracker.estimation.initialization.generators.standing_body import SIDES, typical_person
 from tracker.estimation.initialization.generators.torso_template import Torso, find_torso
-from tracker.evidence.voxels.paths import VoxelGraph
+from tracker.evidence.voxels.geodesic_distance import VoxelGraph
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.compute.distribution import program_version
+from tracker.compute.installed_package import program_version
 from tracker.geometry.arrays import Array
 from tracker.interchange.exports.motion import ExportedMotion, ExportOptions, frames_text
 from tracker.interchange.exports.provenance import PoseProvenance, pose_provenance

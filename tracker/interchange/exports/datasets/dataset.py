@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from tracker.compute.distribution import program_version
+from tracker.compute.installed_package import program_version
 from tracker.errors import FormatError, Remedy
 from tracker.files import write_text_atomic
 from tracker.formats.calibrations.writing import write_layout

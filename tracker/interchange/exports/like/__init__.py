@@ -1,7 +1,9 @@
 """Send imported observations back in their own files.
 
-Imports what exports do, and `observations`. Callers use `sending.export_like`. `mended_points` places the points on the
-poses of a session.
+Imports what exports do, and `observations`. Callers use `patched_files.export_patched`. `mended_points` places the
+points on the poses of a session.
 """
 
-__all__ = ["sending"]
+__all__ = [
+    "patched_files",
+]

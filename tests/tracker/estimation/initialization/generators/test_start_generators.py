@@ -9,7 +9,7 @@ from tracker.estimation.initialization.generators.head_template import find_head
 from tracker.estimation.initialization.generators.person_scene import silhouette_axes
 from tracker.estimation.initialization.generators.start_generators import from_axis, from_search, from_voxels
 from tracker.estimation.initialization.generators.stature import standing_height, upright_height
-from tracker.evidence.voxels.paths import neighbor_graph
+from tracker.evidence.voxels.geodesic_distance import neighbor_graph
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model

@@ -7,7 +7,7 @@ from tracker.errors import TrackerError
 from tracker.estimation.initialization.generators.head_template import find_head
 from tracker.estimation.initialization.generators.torso_template import find_torso
 from tracker.estimation.initialization.generators.voxel_start import start_pose, turned_round
-from tracker.evidence.voxels.paths import neighbor_graph
+from tracker.evidence.voxels.geodesic_distance import neighbor_graph
 from tracker.evidence.voxels.voxel_grid import Voxels
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import PRESETS, load_model

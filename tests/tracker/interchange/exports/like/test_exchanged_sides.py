@@ -6,7 +6,7 @@ from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.errors import FormatError
 from tracker.formats.trc import write_trc
-from tracker.interchange.exports.like.sending import export_like
+from tracker.interchange.exports.like.patched_files import export_patched
 from tracker.interchange.observations.importing import plan_import, store_import
 from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations
@@ -55,9 +55,9 @@ def test_exchanged_sides_go_back_right_on_request(session, tmp_path, kind):
     path = write(kind, session, tmp_path / "k", exchanged(points))
     right = write(kind, session, tmp_path / "right", points)
     observations = imported(session, path)
-    plain = export_like(session, observations, tmp_path / "plain")
+    plain = export_patched(session, observations, tmp_path / "plain")
     assert (plain.changed, plain.exchanged) == ((), ())
-    done = export_like(session, observations, tmp_path / "back", exchange_sides=True)
+    done = export_patched(session, observations, tmp_path / "back", exchange_sides=True)
     assert done.exchanged == tuple((frame, "ann", session.camera_names[VIEW]) for frame in FRAMES)
     assert len(done.changed) == (2 if kind == "openpose" else 1)
     for file in done.paths:
@@ -73,7 +73,7 @@ def _numbers(path):
 
 def test_files_in_order_stay_byte_for_byte(session, tmp_path):
     path = write_openpose(tmp_path / "k", session.camera_names, seen(session, [walking(N)]))
-    done = export_like(session, imported(session, path), tmp_path / "back", exchange_sides=True)
+    done = export_patched(session, imported(session, path), tmp_path / "back", exchange_sides=True)
     assert (done.changed, done.exchanged) == ((), ())
     files = [f.relative_to(path) for f in path.rglob("*.json")]
     assert all((path / f).read_bytes() == (tmp_path / "back" / f).read_bytes() for f in files)
@@ -82,4 +82,4 @@ def test_files_in_order_stay_byte_for_byte(session, tmp_path):
 def test_points_in_space_have_no_sides_to_exchange(session, tmp_path):
     write_trc(tmp_path / "a.trc", BODY_25.points, walking(N), 30.0)
     with pytest.raises(FormatError, match="expected key points, in which sides can be exchanged"):
-        export_like(session, imported(session, tmp_path / "a.trc"), tmp_path / "b.trc", exchange_sides=True)
+        export_patched(session, imported(session, tmp_path / "a.trc"), tmp_path / "b.trc", exchange_sides=True)

@@ -20,7 +20,7 @@ from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import read_trc, write_trc
 from tracker.interchange.exports.keypoints import project_through_lens
-from tracker.interchange.exports.like.sending import export_like
+from tracker.interchange.exports.like.patched_files import export_patched
 from tracker.interchange.observations.importing import plan_import, store_import, stored_pictures
 from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations, source_path
@@ -96,7 +96,7 @@ def sent_back(session, bodies, path, out, joints=None, **choices):
     """Store poses beside imported observations, and export them as they came."""
     observations = imported(session, path)
     store(session, bodies, joints=joints)
-    return export_like(session, observations, out, **choices)
+    return export_patched(session, observations, out, **choices)
 
 
 def write_kind(kind, session, folder, truth):
@@ -157,7 +157,7 @@ def test_untouched_files_leave_as_they_came(session, tmp_path, kind):
     path, choices = write_kind(kind, session, tmp_path, observed(session, poses(session)))
     before = contents(path) if path.is_dir() else path.read_bytes()
     observations = imported(session, path, **choices)
-    done = export_like(session, observations, tmp_path / f"back{path.suffix}")
+    done = export_patched(session, observations, tmp_path / f"back{path.suffix}")
     after = contents(tmp_path / "back") if path.is_dir() else (tmp_path / f"back{path.suffix}").read_bytes()
     assert after == before
     assert (done.changed, done.frames) == ((), ())
@@ -423,10 +423,10 @@ def test_several_files_of_one_picture_are_not_sent_back(session, tmp_path, bodie
 def test_programs_to_which_nothing_is_sent_back(session, tmp_path, bodies):
     write_sleap_csv(tmp_path / "f", session.camera_names, BODY_25.points, seen(session, [observed(session, bodies)]))
     observations = imported(session, tmp_path / "f")
-    export_like(session, observations, tmp_path / "untouched")
+    export_patched(session, observations, tmp_path / "untouched")
     store(session, bodies)
     with pytest.raises(FormatError, match="to which points are sent back, found SLEAP's analysis in CSV") as caught:
-        export_like(session, observations, tmp_path / "back")
+        export_patched(session, observations, tmp_path / "back")
     assert caught.value.remedy == Remedy("export_other_format")
 
 
@@ -490,7 +490,7 @@ def test_choices_of_the_import_hold_on_the_way_back(session, tmp_path, bodies):
     path = write_openpose(tmp_path / "k", session.camera_names, half[2:])
     store(session, bodies)
     observations = imported(session, path, first_frame=2, picture_size=(320, 240))
-    export_like(session, observations, tmp_path / "back")
+    export_patched(session, observations, tmp_path / "back")
     name = f"cam0/cam0_{EDITED - 2:012d}_keypoints.json"
     one, other = (read_openpose(folder / name)[0].points for folder in (path, tmp_path / "back"))
     assert np.abs(one[:, :2] - other[:, :2]).max() < 0.01
@@ -501,7 +501,7 @@ def test_axes_and_units_of_the_file(session, tmp_path, bodies):
     turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # y of the file points up
     write_trc(tmp_path / "a.trc", BODY_25.points, truth @ turn.T, 30.0, units="mm")
     store(session, bodies)
-    export_like(session, imported(session, tmp_path / "a.trc", axes="x,-z,y"), tmp_path / "b.trc")
+    export_patched(session, imported(session, tmp_path / "a.trc", axes="x,-z,y"), tmp_path / "b.trc")
     one, other = read_trc(tmp_path / "a.trc"), read_trc(tmp_path / "b.trc")
     assert np.abs(one.points - other.points).max() < 0.015
     assert not np.array_equal(one.points[EDITED], other.points[EDITED])
@@ -545,7 +545,7 @@ def test_each_person_has_the_rows_of_their_own_file(tmp_path):
         write_trc(path, BODY_25.points, wrong[first:], session.fps, frames=np.arange(first, N))
     observations = stored_as_asked(session, ImportRequest("mp", paths, ("ann", "bob")))
     store(session, bodies, person="bob")
-    export_like(session, observations, tmp_path / "out")
+    export_patched(session, observations, tmp_path / "out")
     assert (tmp_path / "out" / "ann.trc").read_bytes() == paths[0].read_bytes()
     before, after = read_trc(paths[1]), read_trc(tmp_path / "out" / "bob.trc")
     moved = np.abs(before.points - after.points).max(axis=(1, 2))
@@ -559,7 +559,7 @@ def test_points_of_other_layouts_are_not_written_back(session, tmp_path, kind, b
     observations = imported(session, path, unit_m=1.0)
     store(session, bodies)
     with pytest.raises(TrackerError, match=r"points are written back, found .*; export the poses as TRC or CSV"):
-        export_like(session, observations, tmp_path / "out")
+        export_patched(session, observations, tmp_path / "out")
 
 
 def test_rows_at_another_rate_are_where_their_time_is(session, tmp_path):
@@ -581,15 +581,15 @@ def test_a_stored_file_that_was_changed(session, tmp_path):
     path = source_path(session, "mp", observations.sources[0])
     path.write_text(path.read_text() + "\n")
     with pytest.raises(SessionError, match="is not as it was imported"):
-        export_like(session, observations, tmp_path / "b.trc")
+        export_patched(session, observations, tmp_path / "b.trc")
     path.unlink()
     with pytest.raises(SessionError, match="cannot read the imported file"):
-        export_like(session, observations, tmp_path / "b.trc")
+        export_patched(session, observations, tmp_path / "b.trc")
 
 
 def test_nothing_is_replaced(session, tmp_path):
     write_trc(tmp_path / "a.trc", BODY_25.points, observed(session, poses(session)), 30.0)
     observations = imported(session, tmp_path / "a.trc")
     with pytest.raises(TrackerError, match="not to exist, found a file"):
-        export_like(session, observations, tmp_path / "a.trc")
+        export_patched(session, observations, tmp_path / "a.trc")
     assert json.dumps([p.name for p in tmp_path.iterdir() if p.name.endswith(".tmp")]) == "[]"

@@ -9,7 +9,7 @@ from tracker.body.model import PosedBody
 from tracker.formats.bvh import UPRIGHT_Y, BvhFrame, write_bvh
 from tracker.formats.bvh_reading import patch_bvh, read_bvh
 from tracker.formats.model_toml import format_model, load_model
-from tracker.interchange.exports.like.sending import export_like
+from tracker.interchange.exports.like.patched_files import export_patched
 from tracker.interchange.observations.importing import plan_import, store_import
 from tracker.interchange.observations.plans import ImportRequest
 from tracker.interchange.observations.stored import load_observations
@@ -56,7 +56,7 @@ def sent(session, tmp_path, poses, by_hand=lambda name: True):
             sources = tuple("manual" if own else "tracked" for own in hand)
             changes.append(PoseChange("ann", k, PoseRecord(values, sources, revision, keyframe=k == EDITED)))
         annotations.commit("Poses", changes)
-    return export_like(session, load_observations(session, "mocap"), tmp_path / "b.bvh", learn_offsets=False)
+    return export_patched(session, load_observations(session, "mocap"), tmp_path / "b.bvh", learn_offsets=False)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ _OF_SESSION = ("footage", "inconsistent_frames", "keyframe_doubts")
 """Fields of the state that are the same for everybody."""
 
 
-class TakingOver:
+class PeerChanges:
     """Shows what others have stored. Frame, selection and view stay one's own."""
 
     def __init__(self, session_state: SessionState, on_new: Callable[[], None]) -> None:
@@ -34,7 +34,7 @@ class TakingOver:
         session_state = self._session_state
         if owner is session_state.saver.moves or not frames:
             return
-        if session_state.state.frame in frames and session_state.take_over():
+        if session_state.state.frame in frames and session_state.show_peer_changes():
             self._on_new()
         session_state.refresh_saving()
 

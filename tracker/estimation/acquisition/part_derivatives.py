@@ -36,19 +36,19 @@ def points_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArra
     return np.concatenate([origins, landmarks])
 
 
-def motions_by_unknowns(
-    model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays, with_shapes: bool = True
-) -> Array:
+def part_jacobian(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays, with_shapes: bool = True) -> Array:
     """Differentiate the motions of all parts by the sizes and then the pose, (n_parts, N_MOTIONS, n_sizes + n_dofs).
 
     Without shapes, tapers and exponents are left out of the motions.
     """
-    own = motions_by_sizes(model, kinematics, by_sizes, with_shapes)
+    own = part_size_jacobian(model, kinematics, by_sizes, with_shapes)
     return np.concatenate([own, motions_by_pose(model, kinematics)[:, : own.shape[1]]], axis=2)
 
 
-def motions_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays, with_shapes: bool = True) -> Array:
-    """Differentiate the motions of all parts by the sizes, (n_parts, N_MOTIONS, n_sizes); see `motions_by_unknowns`."""
+def part_size_jacobian(
+    model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays, with_shapes: bool = True
+) -> Array:
+    """Differentiate the motions of all parts by the sizes, (n_parts, N_MOTIONS, n_sizes); see `part_jacobian`."""
     Rs, origins = kinematics.Ts_world_part[:, :3, :3], _origins_by_sizes(model, kinematics, by_sizes)
     still = np.zeros_like(origins)
     shapes = [by_sizes.tapers, by_sizes.exponents] if with_shapes else []

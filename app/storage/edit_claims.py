@@ -8,7 +8,7 @@ from app.state.state import State
 from tracker.errors import TrackerError
 
 
-class TurnError(TrackerError):
+class EditClaimError(TrackerError):
     """Another person works on a pose; nothing was changed."""
 
 
@@ -18,7 +18,7 @@ class _Worker(NamedTuple):
     state: Callable[[], State]
 
 
-class Turns:
+class EditClaims:
     """Those who may change poses of one session. The caller holds the session's lock."""
 
     def __init__(self) -> None:
@@ -53,7 +53,7 @@ class Turns:
         for person, frame in poses if others else ():
             for other, work in others:
                 if frame in work.frames and (work.people is None or person in work.people):
-                    raise TurnError(
+                    raise EditClaimError(
                         f"expected frame {frame} to be free, found that {other.name()} {work.what}; "
                         "wait until that is done, or edit another frame"
                     )
@@ -65,7 +65,7 @@ class Turns:
             TurnError: somebody does.
         """
         for other, work in self._others(owner):
-            raise TurnError(
+            raise EditClaimError(
                 f"expected nobody else at work while bodies or cameras change, found that {other.name()} {work.what}; "
                 "wait until that is done"
             )

@@ -2,7 +2,7 @@
 
 Files count frames from 0 or from 1, and may begin within the recording. Programs round rates; cut files keep or restart
 their numbers and times. A reading on which these agree is taken. A contradiction is refused with its readings,
-and `Placement` decides. Rows at another rate are resampled.
+and `RowPlacement` decides. Rows at another rate are resampled.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ _EXACT = 1e-3
 """Distance from a whole frame at which a row lies on the frame: times have six digits, rates up to ten."""
 
 
-class Placement(NamedTuple):
+class RowPlacement(NamedTuple):
     """Facts and choices that place rows, beside the file's own numbers."""
 
     n_frames: int | None = None
@@ -51,7 +51,7 @@ class Placement(NamedTuple):
     """By the user's choice: each Frame# is a frame of the session, or rows lie at their Time."""
 
 
-def place_rows(table: MarkerTable, where: str, fps: float, known: Placement | None = None) -> MarkerTable:
+def place_rows(table: MarkerTable, where: str, fps: float, known: RowPlacement | None = None) -> MarkerTable:
     """Place the rows of a file at frames of a session; rows at another rate are resampled linearly by time.
 
     Args:
@@ -71,12 +71,12 @@ def place_rows(table: MarkerTable, where: str, fps: float, known: Placement | No
     return replace(placed, notes=(*table.notes, *_notes(table, rows, placed, fps, is_chosen)))
 
 
-def row_places(table: MarkerTable, where: str, fps: float, known: Placement | None = None) -> Array:
+def row_places(table: MarkerTable, where: str, fps: float, known: RowPlacement | None = None) -> Array:
     """Return the frame of the session at which each row of a file lies, (n_rows,), fractional at another rate.
 
     Arguments and errors are those of `place_rows`.
     """
-    known = known or Placement()
+    known = known or RowPlacement()
     if known.clock == "time":
         if not (np.diff(table.times) > 0).all():
             raise FormatError(f"{where}: expected Time that rises from row to row", Remedy("count_frames"))
@@ -122,7 +122,9 @@ def _rounding_s(table: MarkerTable) -> float:
     return 1e-6
 
 
-def _frames_per_number(table: MarkerTable, where: str, fps: float, rates: Sequence[float], known: Placement) -> float:
+def _frames_per_number(
+    table: MarkerTable, where: str, fps: float, rates: Sequence[float], known: RowPlacement
+) -> float:
     """Return how many frames of the session one step of Frame# is.
 
     Raises:

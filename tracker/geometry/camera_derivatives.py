@@ -37,7 +37,7 @@ DISTORTION = slice(PRINCIPAL.stop, None)
 N_BEFORE_DISTORTION = DISTORTION.start
 
 
-class ProjectedColumns(NamedTuple):
+class ProjectionDerivatives(NamedTuple):
     """Points in the picture of a camera, with derivatives."""
 
     px: Array
@@ -48,7 +48,7 @@ class ProjectedColumns(NamedTuple):
     """Derivatives by the correction of the camera, (N, 2, n_columns)."""
 
 
-def n_columns(camera: Camera) -> int:
+def n_camera_parameters(camera: Camera) -> int:
     """Return how many numbers correct a camera: 10, and one for each coefficient of its distortion."""
     return N_BEFORE_DISTORTION + camera.distortion.size
 
@@ -81,7 +81,7 @@ def camera_difference(camera: Camera, other: Camera) -> Array:
     )
 
 
-def project_with_columns(camera: Camera, points_world: Array) -> ProjectedColumns:
+def project_with_columns(camera: Camera, points_world: Array) -> ProjectionDerivatives:
     """Project points to original pixels, and differentiate by the points and by the camera.
 
     Args:
@@ -96,14 +96,14 @@ def project_with_columns(camera: Camera, points_world: Array) -> ProjectedColumn
     K = camera.K[:2, :2]
     by_point_camera = K @ by_direction
     offsets = slopes @ K.T
-    by_camera = np.zeros((len(points_world), 2, n_columns(camera)))
+    by_camera = np.zeros((len(points_world), 2, n_camera_parameters(camera)))
     by_camera[:, :, ROTATION] = by_point_camera @ -rigid.skew(points_camera)
     by_camera[:, :, SHIFT] = -by_point_camera
     by_camera[:, :, FOCAL] = offsets
     by_camera[:, :, ASPECT] = offsets * (1.0, -1.0)
     by_camera[:, :, PRINCIPAL] = np.eye(2)
     by_camera[:, :, DISTORTION] = K @ by_distortion
-    return ProjectedColumns(offsets + camera.K[:2, 2], by_point_camera @ R, by_camera)
+    return ProjectionDerivatives(offsets + camera.K[:2, 2], by_point_camera @ R, by_camera)
 
 
 def _brown_conrady(points: Array, distortion: Array) -> tuple[Array, Array, Array]:

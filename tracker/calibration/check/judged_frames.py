@@ -14,7 +14,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.camera_correction import corrected, later_s
 
 
-class ViewedFrame(NamedTuple):
+class JudgedFrame(NamedTuple):
     """People on a frame, and all that the views show around them."""
 
     frame: int
@@ -30,7 +30,7 @@ class ViewedFrame(NamedTuple):
     """Time by which the picture of each view was taken later than the frame, by the present clocks, seconds."""
 
 
-def seen_people(frames: Sequence[ViewedFrame], state: RigState | None = None) -> list[SeenPerson]:
+def seen_people(frames: Sequence[JudgedFrame], state: RigState | None = None) -> list[SeenPerson]:
     """Return the evidence of each person on each frame.
 
     Args:

@@ -56,7 +56,7 @@ class ChamferSearchSettings:
     """Largest distance that counts, metres."""
 
 
-class ShapeFound(NamedTuple):
+class ShapeSearchResult(NamedTuple):
     """The result of the search."""
 
     sizes: Array
@@ -72,7 +72,7 @@ def search_shapes(
     person: SightedPerson,
     settings: ChamferSearchSettings,
     report: Callable[[float], None] = lambda share: None,
-) -> ShapeFound:
+) -> ShapeSearchResult:
     """Search the shapes of all parts of a person.
 
     Args:
@@ -91,7 +91,7 @@ def search_shapes(
             report((step * len(groups) + i) / (settings.passes * len(groups)))
             sizes = space.search(sizes, blocks, range(step, settings.levels))
     body = parameters.body(sizes)
-    return ShapeFound(
+    return ShapeSearchResult(
         sizes, before, _Space(parameters, person.moved(body, person.pose), sizes, settings).mean_distance_m(sizes)
     )
 

@@ -27,7 +27,7 @@ from app.server.access import access_for
 from app.server.address import Serving, listen, page_address, port_of
 from app.server.static_files import KEPT, POLICY, PREFIX, PageFiles, connect_sources, static_folder
 from app.state.role import Role
-from tracker.system import FORKS, start_beside
+from tracker.system import FORKS, start_child
 
 STEPS = ("Loading the program", "Opening the session", "Preparing the views")
 _ICON = "icon.svg"
@@ -48,7 +48,7 @@ class Answer(NamedTuple):
     """Cache-Control."""
 
 
-class Doorway:
+class StartupServer:
     """Serves the page at listening sockets, from `with` to `close`."""
 
     def __init__(self, serving: Serving) -> None:
@@ -91,7 +91,7 @@ class Doorway:
         """Begin to answer."""
         if FORKS:  # threads would take turns with the loading program, and hold it up
             reading, self._steps = os.pipe()
-            self._process = start_beside(self._answer_until_closed, reading)
+            self._process = start_child(self._answer_until_closed, reading)
             os.close(reading)
         else:
             self._start_threads()
@@ -172,7 +172,7 @@ class Doorway:
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
-    def __init__(self, listening: socket.socket, doorway: Doorway) -> None:
+    def __init__(self, listening: socket.socket, doorway: StartupServer) -> None:
         super().__init__(listening.getsockname()[:2], partial(_Handler, doorway), bind_and_activate=False)
         self.socket.close()
         self.socket = listening
@@ -184,7 +184,7 @@ class _Server(ThreadingHTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     timeout = _TIMEOUT_S
 
-    def __init__(self, doorway: Doorway, request: socket.socket, address: Any, server: BaseServer) -> None:
+    def __init__(self, doorway: StartupServer, request: socket.socket, address: Any, server: BaseServer) -> None:
         self._doorway = doorway
         super().__init__(request, address, server)  # answers the request
 

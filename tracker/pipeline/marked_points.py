@@ -16,7 +16,7 @@ _Seen = dict[str, dict[str, Any]]
 """Position in each camera, original px, by point."""
 
 
-def seen_points(
+def user_marked_points(
     cameras: Sequence[CameraSource], model: BodyModel, record: PoseRecord, pins: Sequence[Pin] = ()
 ) -> list[PointObservation]:
     """Return the points of a person that users have marked on a frame, ascending by point and name of the camera.

@@ -26,7 +26,7 @@ _LEG_PAIRS = tuple(zip(LIMBS["left_leg"], LIMBS["right_leg"], strict=True))
 """Parts of the left and the right leg that are measured together."""
 
 
-class DetailLevels(NamedTuple):
+class ResolvedParts(NamedTuple):
     """Which parts the voxels resolve."""
 
     is_resolved: NDArray[np.bool_]
@@ -35,7 +35,7 @@ class DetailLevels(NamedTuple):
     """Number of frames in a row on which a part was merged with another, (10,)."""
 
     @classmethod
-    def finest(cls) -> "DetailLevels":
+    def finest(cls) -> "ResolvedParts":
         """Return the levels where every part stands apart."""
         return cls(np.ones(N_PARTS, dtype=bool), np.zeros(N_PARTS, dtype=np.int64))
 
@@ -57,9 +57,14 @@ class DetailLevels(NamedTuple):
         return tuple((a, b) for a, b in _LEG_PAIRS if not self.is_resolved[[a, b]].any())
 
 
-def find_levels(
-    before: DetailLevels, state: FilterState, voxels: Voxels, labels: NDArray[np.int16], first_label: int, patience: int
-) -> DetailLevels:
+def find_resolved_parts(
+    before: ResolvedParts,
+    state: FilterState,
+    voxels: Voxels,
+    labels: NDArray[np.int16],
+    first_label: int,
+    patience: int,
+) -> ResolvedParts:
     """Return which parts stand apart from the parts beside them.
 
     A coarser level waits: legs that pass each other touch for a few frames only, and the prediction tells them apart.
@@ -88,7 +93,7 @@ def find_levels(
     for upper, lower in LIMBS.values():  # an upper arm beside the trunk still begins a forearm that stands out
         resolved[upper] |= resolved[lower]
     resolved[:2] = True
-    return DetailLevels(resolved, n_merged)
+    return ResolvedParts(resolved, n_merged)
 
 
 def _touching(grid: NDArray[np.int16], own: NDArray[np.int64], part: int) -> int:
@@ -124,7 +129,7 @@ def measure_together(
     return LinearizedMeasurement(np.concatenate(rows), H, np.eye(len(H)) * sigma_m**2)
 
 
-def carried(before: FilterState, state: FilterState, levels: DetailLevels) -> Array:
+def carried(before: FilterState, state: FilterState, levels: ResolvedParts) -> Array:
     """Return the rotations of a state, (10, 3, 3), in which unresolved parts turn with the part that they hang on.
 
     Args:

@@ -13,7 +13,7 @@ _modules: frozenset[str] = frozenset()
 
 
 @contextmanager
-def interpreted() -> Generator[None, None, None]:
+def run_uncompiled() -> Generator[None, None, None]:
     """Interpret all kernels that this thread calls and the program has not loaded."""
     before = getattr(_this_thread, "interprets", False)
     _this_thread.interprets = True

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from tracker.calibration.check.lens_priors import CALIBRATED
 from tracker.estimation.fitting.bundle import ROUGH, ArrowEquations, solve_bundle
 from tracker.geometry.arrays import Array, IntArray, Mask
-from tracker.geometry.camera_columns import (
+from tracker.geometry.camera_derivatives import (
     FOCAL,
-    ProjectedColumns,
+    ProjectionDerivatives,
     camera_difference,
     moved_camera,
-    n_columns,
+    n_camera_parameters,
     project_with_columns,
 )
 from tracker.geometry.cameras import Camera
@@ -109,7 +109,7 @@ class Prior:
     @classmethod
     def held(cls, cameras: Sequence[Camera]) -> "Prior":
         """Return the knowledge of cameras that stay."""
-        return cls(tuple(cameras), tuple(np.zeros(n_columns(c)) for c in cameras))
+        return cls(tuple(cameras), tuple(np.zeros(n_camera_parameters(c)) for c in cameras))
 
 
 class RigFit(NamedTuple):
@@ -124,8 +124,8 @@ class RigFit(NamedTuple):
     """Projection minus observation, (N, 2), px."""
     weights: Array
     """Robust weight of each observation, 0 to 1, (N,)."""
-    common_share: float
-    """By how much errors of one view agree, at least 1; see `ReprojectionProblem.common_share`."""
+    variance_inflation: float
+    """By how much errors of one view agree, at least 1; see `ReprojectionProblem.variance_inflation`."""
 
     @property
     def focal_sigmas(self) -> Array:
@@ -239,7 +239,7 @@ class ReprojectionProblem(ABC):
                 index, self.observations.groups[at], J * scale, own * scale, errors[:, :, None] * scale, cost
             )
 
-    def by_unknowns(self, found: ProjectedColumns, at: slice, camera: int) -> Array:
+    def by_unknowns(self, found: ProjectionDerivatives, at: slice, camera: int) -> Array:
         """Return the derivatives of some projections by the unknowns of their camera, (N, 2, n)."""
         return found.by_camera[:, :, self.columns[camera]]
 
@@ -254,11 +254,11 @@ class ReprojectionProblem(ABC):
 
     def step_of(self, camera: int, shared: Array) -> Array:
         """Return the correction of one camera, (n_columns,), of a step of the shared unknowns, (n,)."""
-        out = np.zeros(n_columns(self.prior.cameras[camera]))
+        out = np.zeros(n_camera_parameters(self.prior.cameras[camera]))
         out[self.columns[camera]] = shared[self.ends[camera] : self.ends[camera + 1]]
         return out
 
-    def common_share(self, rig: Rig) -> float:
+    def variance_inflation(self, rig: Rig) -> float:
         """Return by how much errors of one view agree, at least 1: variance of their means over that of lone errors.
 
         A board that moves while cameras film it at slightly different times shifts all its corners together. A view
@@ -386,7 +386,7 @@ def _result(problem: ReprojectionProblem, rig: Rig) -> RigFit:
     errors = problem.errors_px(rig)
     squares = np.sum(errors**2, axis=1) / problem.sigmas_px[problem.observations.cameras] ** 2
     squares = np.nan_to_num(squares, nan=np.inf)
-    weights, share = robust_weights(squares), problem.common_share(rig)
+    weights, share = robust_weights(squares), problem.variance_inflation(rig)
     information = _information(squares, weights, problem.left) / share
     data = problem.observed(rig).reduced()[1] + problem.alikeness
     precision = information * data + np.diag(problem.precision)
@@ -407,7 +407,7 @@ def inverse(matrix: Array) -> Array:
 
 def column_ends(cameras: Sequence[Camera]) -> list[int]:
     """Return where the corrections of each camera begin among those of all, and where the last ones end."""
-    return [0, *itertools.accumulate(n_columns(c) for c in cameras)]
+    return [0, *itertools.accumulate(n_camera_parameters(c) for c in cameras)]
 
 
 def _information(squares: Array, weights: Array, left: float) -> float:

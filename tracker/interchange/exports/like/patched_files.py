@@ -205,7 +205,7 @@ class LikeExport:
     """How far a replaced point is from its place at most, metres, where the format does not let it go there."""
 
 
-def export_like(
+def export_patched(
     session: Session,
     observations: ObservationSet,
     out: Path,

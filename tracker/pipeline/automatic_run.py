@@ -1,6 +1,6 @@
 """Drive a recording to tracked poses from whatever is there: find, acquire, track out from the start, assess.
 
-Command line, page and batch call `run_chain` with a plan, an open session that stores the results, and a sink that
+Command line, page and batch call `find_and_track` with a plan, an open session that stores the results, and a sink that
 shows them. Each stage is stored when it is done. The same plan goes on where it was stopped.
 """
 
@@ -13,7 +13,7 @@ from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, part_of
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.acquisition.from_contours import Acquisition, AcquisitionSettings
-from tracker.estimation.acquisition.from_keypoints import BodyPoints
+from tracker.estimation.acquisition.from_keypoints import PersonObservations
 from tracker.estimation.fitting.gauss_newton import PointTargets
 from tracker.estimation.initialization.first_pose import FirstPoses
 from tracker.estimation.initialization.frame_trials import Trying
@@ -106,7 +106,7 @@ class OpenSession(Protocol):
         """Track and store the poses; return the plan."""
 
 
-def run_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
+def find_and_track(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
     """Find the people who have no pose, acquire sizes, and track out from there everybody who has a pose there.
 
     Args:
@@ -118,12 +118,12 @@ def run_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
         The plan of tracking with the frame that the run went out from.
 
     Raises:
-        TrackerError: see `begin_chain`.
+        TrackerError: see `find_and_acquire`.
     """
-    return opened.track(begin_chain(plan, opened, sink), sink)
+    return opened.track(find_and_acquire(plan, opened, sink), sink)
 
 
-def begin_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
+def find_and_acquire(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
     """Find the people who have no pose, and acquire sizes; nothing is tracked yet.
 
     Args:
@@ -167,7 +167,11 @@ def begin_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
 
 
 def _acquire(
-    people: Sequence[int], track: TrackPlan, points: Mapping[int, BodyPoints], opened: OpenSession, report: Report
+    people: Sequence[int],
+    track: TrackPlan,
+    points: Mapping[int, PersonObservations],
+    opened: OpenSession,
+    report: Report,
 ) -> dict[int, dict[int, PosedBody]]:
     """Acquire the sizes of those people who have none of their own, or those of an earlier calibration, one after the
     other, and store each; return their bodies by frame."""
@@ -304,4 +308,4 @@ def open_stored_session(session: Session) -> Generator[StoredSession, None, None
     with SessionLock(session.folder), AnnotationStore(session.annotations_path) as store:
         session = follow_history(session, store)
         with open_observer(session.cameras) as observer:
-            yield StoredSession(session, store, observer.in_time())
+            yield StoredSession(session, store, observer.at_nearest_times())

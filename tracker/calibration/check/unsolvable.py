@@ -26,7 +26,7 @@ def check_apart(cameras: Sequence[Camera]) -> None:
 
 
 @contextmanager
-def solvable(advice: str) -> Generator[None, None, None]:
+def refuse_unsolvable(advice: str) -> Generator[None, None, None]:
     """Refuse observations whose equations have no solution, or none that is finite.
 
     Args:

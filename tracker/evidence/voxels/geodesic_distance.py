@@ -12,6 +12,7 @@ from tracker.geometry.arrays import Array
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
+
 VoxelGraph: TypeAlias = "csr_matrix"
 """Distances of neighbouring voxels, (N, N), each pair once, in edges of a voxel."""
 _STEPS = np.array([s for s in itertools.product((-1, 0, 1), repeat=3) if s > (0, 0, 0)])
