@@ -17,13 +17,13 @@ def command(session: SessionArg, /, json: bool = False) -> None:
         session: session folder.
         json: print one JSON object.
     """
-    from app.session.proxies import index
+    from app.session.proxies import make_proxies
     from tracker.session.relink import require_files
     from tracker.session.session import load_session
 
     loaded = load_session(session)
     require_files(loaded)
-    found = index(loaded, Reporter(silent=json))
+    found = make_proxies(loaded, Reporter(silent=json))
     if json:
         print(format_json(found))
     else:

@@ -75,12 +75,12 @@ def command(
         require_files(found)
         doorway.open_browser()
 
-        from app.server.workbench import FirstView, open_session
+        from app.server.workbench import FirstView, serve_until_closed
 
         gc.freeze()
         gc.enable()
         first = FirstView(frame or 0, 0 if person is None else at.people[0])
-        chosen = open_session(found, doorway, compiler, lambda line: print(line, flush=True), first)
+        chosen = serve_until_closed(found, doorway, compiler, lambda line: print(line, flush=True), first)
     if chosen is not None:
         words = ["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"]
         words += ["--frame", str(chosen.frame)] if chosen.frame else []

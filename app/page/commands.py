@@ -131,7 +131,7 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.ShowPerson: lambda controller, _, m: controller.visibility.show(m.person, m.shown),
     wire.Solo: lambda controller, _, m: controller.visibility.solo(m.on),
     wire.ShowBefore: lambda controller, _, m: controller.comparing.show_before(m.shown),
-    wire.LookThrough: lambda controller, _, m: controller.view_3d.snap(m.camera),
+    wire.LookThrough: lambda controller, _, m: controller.view_3d.look_through_camera(m.camera),
     wire.Pause3d: lambda controller, page, m: controller.view_3d.pause(page, m.pause),
     pose_wire.Drag: _drag,
     pose_wire.DragPin: _pin,

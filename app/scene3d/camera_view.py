@@ -120,7 +120,7 @@ class CameraView:
             view.arrived = True
         elif view.arrived and not view.is_back(report) and self._controller.state.snapped == view.camera:
             view.turned_away = True
-            self._controller.view_3d.snap(None)
+            self._controller.view_3d.look_through_camera(None)
 
     def _update(self, view: _PageView) -> None:
         """Move a view to the camera of the state."""

@@ -102,7 +102,7 @@ class Frusta:
 
         @handle.on_click
         def _(_: Any) -> None:
-            self._controller.view_3d.snap(index)
+            self._controller.view_3d.look_through_camera(index)
 
         return handle
 

@@ -117,7 +117,7 @@ class ServedPage:
         from app.runtime.kernel_compiler import KernelCompiler
         from app.server.address import Serving
         from app.server.startup_server import StartupServer
-        from app.server.workbench import open_session
+        from app.server.workbench import serve_until_closed
 
         serving = Serving(port=self._port, browser=False)
         with SessionLock(self._folder), StartupServer(serving) as doorway, closing(KernelCompiler()) as compiler:
@@ -128,7 +128,7 @@ class ServedPage:
                 self._controller, self._stop, self.address = controller, stop, doorway.address
                 self._ready.set()
 
-            open_session(session, doorway, compiler, lambda line: None, begun=begun)
+            serve_until_closed(session, doorway, compiler, lambda line: None, begun=begun)
 
 
 def serve(session: Session | str | Path, port: int = 0) -> ServedPage:

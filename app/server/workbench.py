@@ -74,7 +74,7 @@ class FirstView(NamedTuple):
 _BEGINNING = FirstView()
 
 
-def open_session(
+def serve_until_closed(
     session: Session,
     doorway: StartupServer,
     compiler: KernelCompiler,

@@ -14,7 +14,7 @@ from tracker.session.lock import SessionLock
 from tracker.session.session import Session
 
 
-def index(session: Session, progress: Reporter) -> dict[str, Any]:
+def make_proxies(session: Session, progress: Reporter) -> dict[str, Any]:
     """Make the proxies that are missing, incomplete, or made of other footage.
 
     An interrupted call keeps its frames, and the next call continues there.

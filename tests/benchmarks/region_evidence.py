@@ -35,7 +35,7 @@ from tracker.estimation.appearance.region_model import (
     learning_frames,
     worst_parts,
 )
-from tracker.estimation.by_frame.frame_problem import Bodies, trust, with_body
+from tracker.estimation.by_frame.frame_problem import Bodies, prediction_sigmas, with_body
 from tracker.estimation.by_frame.pose_score import common_evidence, scorer_without_prediction
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.tracking.pose_errors import SELDOM_NATS
@@ -134,7 +134,7 @@ def displaced(tracked: Tracked, observer: Observer) -> list[Bodies]:
         views = common_evidence(observer, frame, [bodies, people], SETTINGS) if moved else ()
         for i in moved:
             model, scorer = tracked.models[i], scorer_without_prediction(views, bodies, i, SETTINGS)
-            refined = scorer.refined(model, [bodies[i].values], trust(model, SETTINGS))[0]
+            refined = scorer.refined(model, [bodies[i].values], prediction_sigmas(model, SETTINGS))[0]
             bodies = with_body(bodies, i, PosedBody(model, refined))
         out.append(bodies)
     return out

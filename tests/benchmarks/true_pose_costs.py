@@ -20,7 +20,7 @@ from true_starts import joint_centers, limb_joints, track_from
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.acquisition.from_joints import height_from_joints
-from tracker.estimation.by_frame.frame_problem import trust
+from tracker.estimation.by_frame.frame_problem import prediction_sigmas
 from tracker.estimation.by_frame.pose_score import common_evidence, scorer_without_prediction
 from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.gauss_newton import fit_to_points
@@ -118,7 +118,7 @@ def _compare(dancer: Dancer, observer: Observer, settings: TrackSettings, frame:
     true = fit_to_points(model, dancer.joints[frame], centers=True).pose
     guesses = [(PosedBody(model, pose),) for pose in (true, tracked)]
     views = common_evidence(observer, frame, guesses, settings)
-    scorer, sigma = scorer_without_prediction(views, guesses[0], 0, settings), trust(model, settings)
+    scorer, sigma = scorer_without_prediction(views, guesses[0], 0, settings), prediction_sigmas(model, settings)
     once = scorer.refined(model, [true], sigma)[0]
     refined = np.array([once, scorer.refined(model, [once], sigma)[0]])
     best = refined[int(scorer.costs_with_priors(model, refined).argmin())]

@@ -15,7 +15,7 @@ from tracker.estimation.chamfer.settings import TrackSettings
 from tracker.estimation.fitting.gauss_newton import fit_to_points
 from tracker.estimation.runs import run_estimate
 from tracker.estimation.tracking.tracker import Subjects, TrackingRun
-from tracker.estimation.trajectory.hypotheses import reduce_log_sum, through
+from tracker.estimation.trajectory.hypotheses import path_marginals, reduce_log_sum
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import open_observer
 from tracker.formats.joint_maps import LIMB_JOINTS
@@ -73,7 +73,7 @@ def _height(model, poses):
 def drawing(search, curves):
     """The picture as SVG."""
     model, paths, sets = search.model, search.paths, search.sets
-    nats = through([s.costs() for s in sets], paths.motion_nats(sets), reduce_log_sum)
+    nats = path_marginals([s.costs() for s in sets], paths.motion_nats(sets), reduce_log_sum)
     heights = [np.array(_height(model, s.poses)) for s in sets]
     low, high = min(h.min() for h in heights) - 0.05, max(h.max() for h in heights) + 0.05
 

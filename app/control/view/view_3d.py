@@ -55,7 +55,7 @@ class View3dSettings:
             if pages != self._session_state.state.pages_blurring_faces:
                 self._session_state.set(pages_blurring_faces=pages)
 
-    def snap(self, camera: int | None) -> None:
+    def look_through_camera(self, camera: int | None) -> None:
         """Look through a camera, by index, with its image behind the bodies; None frees the view."""
         if camera is None or 0 <= camera < len(self._session_state.session.cameras):
             self._session_state.set(snapped=camera)

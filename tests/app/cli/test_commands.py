@@ -339,7 +339,8 @@ def test_simulate(run, tmp_path):
 def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
     asked, samples, browsed = [], [], []
     monkeypatch.setattr(
-        "app.server.workbench.open_session", lambda found, doorway, *_: asked.append((found.folder, doorway.serving))
+        "app.server.workbench.serve_until_closed",
+        lambda found, doorway, *_: asked.append((found.folder, doorway.serving)),
     )
     monkeypatch.setattr("app.session.samples.sample_copy", lambda *words: samples.append(words) or session)
     monkeypatch.setattr("app.server.startup_server.listen", lambda host, _: address.listen(host, 0))
@@ -375,7 +376,7 @@ def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
 
 def test_samples_are_opened_as_working_copies_by_name(run, monkeypatch, tmp_path):
     asked, quiet = [], ("--port", "0", "--no-browser")
-    monkeypatch.setattr("app.server.workbench.open_session", lambda found, *_: asked.append(found.folder))
+    monkeypatch.setattr("app.server.workbench.serve_until_closed", lambda found, *_: asked.append(found.folder))
     monkeypatch.setattr("app.session.samples.user_data_path", lambda *_, **__: tmp_path)
     assert run("--sample", "elbow_rotation", *quiet)[0] == 0
     assert asked == [tmp_path / "samples" / "elbow_rotation"]

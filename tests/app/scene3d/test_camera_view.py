@@ -63,7 +63,7 @@ def pose_of(controller, camera):
 
 
 def snap(controller, page, camera):
-    controller.view_3d.snap(camera)
+    controller.view_3d.look_through_camera(camera)
     wait_for(lambda: (page.background is None) == (camera is None))
 
 
@@ -85,7 +85,7 @@ def test_a_turn_leaves_the_camera(controller, page):
 
 def test_a_turn_right_after_arriving_leaves_it_too(controller, page):
     page.may_go_on.clear()
-    controller.view_3d.snap(0)
+    controller.view_3d.look_through_camera(0)
     assert page.shown.wait(20)
     # Both are said while the view is still at work.
     position, wxyz = pose_of(controller, 0)

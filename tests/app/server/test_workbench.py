@@ -17,7 +17,7 @@ from app.runtime.kernel_compiler import KernelCompiler
 from app.server import workbench
 from app.server.address import Serving
 from app.server.startup_server import StartupServer
-from app.server.workbench import open_session
+from app.server.workbench import serve_until_closed
 from app.storage import rescue
 from tracker.errors import SessionError, TrackerError
 from tracker.session.lock import SessionLock
@@ -59,7 +59,7 @@ def open_with(session, monkeypatch):
             lines = []
             try:
                 with SessionLock(session), StartupServer(Serving(port=0, browser=False)) as doorway:
-                    open_session(load_session(session), doorway, KernelCompiler(), lines.append)
+                    serve_until_closed(load_session(session), doorway, KernelCompiler(), lines.append)
             finally:
                 open_it.lines = lines
         return lines
@@ -116,7 +116,7 @@ def test_a_program_that_could_not_save_ends_with_status_1(run, session, monkeypa
     def failing(*_):
         raise TrackerError("edits are not saved: the disk is full; they are kept in /x/rescue.json")
 
-    monkeypatch.setattr("app.server.workbench.open_session", failing)
+    monkeypatch.setattr("app.server.workbench.serve_until_closed", failing)
     status, out, err = run("open", session, "--no-browser", "--port", "0")
     assert (status, out, "kept in /x/rescue.json" in err) == (1, "", True)
 

@@ -202,7 +202,7 @@ class FrameProblem:
 
     def sigma(self, person: int) -> Array:
         """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
-        return trust(self.people[person].model, self.settings)
+        return prediction_sigmas(self.people[person].model, self.settings)
 
     def _sigma_of(self, person: int, untrusted: Sequence[Limb]) -> Array:
         """Return `sigma`, large for untrusted limbs."""
@@ -308,7 +308,7 @@ def penetration(bodies: Bodies, person: int, settings: EstimationSettings) -> li
     return [BodyPenetration(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []
 
 
-def trust(model: BodyModel, settings: EstimationSettings) -> Array:
+def prediction_sigmas(model: BodyModel, settings: EstimationSettings) -> Array:
     """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
     return np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
 

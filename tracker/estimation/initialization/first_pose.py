@@ -19,7 +19,11 @@ from tracker.estimation.initialization.generators.person_scene import PersonScen
 from tracker.estimation.initialization.generators.start_generators import GENERATORS
 from tracker.estimation.initialization.generators.stature import HEIGHT_SIGMA
 from tracker.estimation.initialization.own_figure import others_on_frame, own_figure
-from tracker.estimation.initialization.silhouette_check import check_against_silhouettes, filling, is_cut_off
+from tracker.estimation.initialization.silhouette_check import (
+    check_against_silhouettes,
+    is_cut_off,
+    starts_in_silhouettes,
+)
 from tracker.estimation.initialization.standing_heights import StandingHeights
 from tracker.estimation.initialization.start_fit import StartFitter, StartTrack, short_tracks, track_back
 from tracker.estimation.tracking.confidence import Status, worst
@@ -164,7 +168,7 @@ def _on_frame(
     height_m = source.heights.around(scene, frame, person) if has_preset_sizes(model) else None
     proposals = _proposals(scene, model if height_m is None else model.with_height(height_m), generators)
     fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others), step)
-    compared = compare_starts(fitter, proposals, lambda tracks: filling(tracks, silhouettes, masks))
+    compared = compare_starts(fitter, proposals, lambda tracks: starts_in_silhouettes(tracks, silhouettes, masks))
     best = compared.tracked[0]
     notes = _notes(best.start, compared.is_facing_sure, hull, silhouettes)
     doubts = [

@@ -85,7 +85,7 @@ def _shared(seen: Iterable[tuple[str, Mask, Mask]]) -> SilhouetteCheck:
     return SilhouetteCheck(tuple(name for name, _ in found), np.array([share for _, share in found]))
 
 
-def filling(
+def starts_in_silhouettes(
     tracked: Sequence[StartTrack], silhouettes: Sequence[ViewSilhouette], masks: Sequence[FigureMask]
 ) -> list[StartTrack]:
     """Return the starts whose bodies fill the silhouettes.

@@ -10,7 +10,7 @@ from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.threads import kernel_pool
 from tracker.estimation.appearance.part_colors import Colors, PartColors
 from tracker.estimation.appearance.region_residuals import region_residuals
-from tracker.estimation.by_frame.frame_problem import Bodies, trust, with_body
+from tracker.estimation.by_frame.frame_problem import Bodies, prediction_sigmas, with_body
 from tracker.estimation.by_frame.pose_score import (
     FrameEvidence,
     PoseScorer,
@@ -61,7 +61,7 @@ class FrameHypotheses:
         recover, colors = settings.recover or RecoverSettings(), Colors(views, bodies, person)
         self._scorer = PoseScorer.of(residuals, [*self._priors, *keypoints], colors, None, recover, active_dofs)
         self._keypoints = [keypoint_blocks([view], person, bodies[person].velocity) for view in views]
-        self._sigma = OWN_TRUST * trust(self.model, settings)
+        self._sigma = OWN_TRUST * prediction_sigmas(self.model, settings)
         self._tried: list[Array] = []
         self._found: HypothesisSet | None = None
         self.anchor: HypothesisSet | None = None

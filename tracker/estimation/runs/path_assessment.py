@@ -18,7 +18,7 @@ from tracker.estimation.fitting.hypothesis import SAME_POSE_M, Hypothesis, dista
 from tracker.estimation.runs.frame_hypotheses import FrameHypotheses
 from tracker.estimation.runs.path_search import PathSearch
 from tracker.estimation.tracking.confidence import OFF_ODDS, probabilities
-from tracker.estimation.trajectory.hypotheses import HypothesisSet, Paths, reduce_log_sum, through
+from tracker.estimation.trajectory.hypotheses import HypothesisSet, Paths, path_marginals, reduce_log_sum
 from tracker.estimation.trajectory.solve import SolvedPath
 from tracker.geometry.arrays import Array, Mask
 
@@ -130,7 +130,7 @@ def _path_masses(motion: Sequence[Array], sets: Sequence[HypothesisSet]) -> list
 
     n_views = sets[0].view_nats.shape[1]
     views = range(n_views) if n_views > 2 else (None,)  # one view shows no depth
-    masked = [through([s.costs(view) for s in sets], motion, reduce_log_sum) for view in views]
+    masked = [path_marginals([s.costs(view) for s in sets], motion, reduce_log_sum) for view in views]
     return [np.mean([softmax(-nats) for nats in of_frame], axis=0) for of_frame in zip(*masked, strict=True)]
 
 

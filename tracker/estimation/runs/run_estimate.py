@@ -19,7 +19,7 @@ from tracker.body.model import PosedBody
 from tracker.body.motion.pose_steps import moving_bodies
 from tracker.compute.progress import mapped
 from tracker.estimation.appearance.region_model import LearningFrame, RegionModel, learn_regions, learning_frames
-from tracker.estimation.by_frame.frame_problem import Bodies, trust, with_body
+from tracker.estimation.by_frame.frame_problem import Bodies, prediction_sigmas, with_body
 from tracker.estimation.by_frame.pose_score import FrameEvidence, common_evidence, scorer_without_prediction
 from tracker.estimation.by_frame.settings import OWN_TRUST, EstimationSettings
 from tracker.estimation.fitting.hypothesis import CLEAR_NATS
@@ -255,7 +255,9 @@ def turning_nats(views: Sequence[ViewEvidence], bodies: Bodies, person: int, set
     """
     body = bodies[person]
     scorer = scorer_without_prediction(views, bodies, person, settings)
-    both = scorer.refined(body.model, [body.values, turned_round(body)], OWN_TRUST * trust(body.model, settings))
+    both = scorer.refined(
+        body.model, [body.values, turned_round(body)], OWN_TRUST * prediction_sigmas(body.model, settings)
+    )
     here, turned = scorer.costs_with_priors(body.model, both)
     return float(turned - here)
 

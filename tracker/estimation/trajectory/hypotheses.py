@@ -81,7 +81,9 @@ def _squares(terms: Sequence[Array], group: Group) -> Array:
     return np.asarray(np.maximum(sums, 0.0))
 
 
-def through(costs: Sequence[Array], motion: Sequence[Array], reduced: Callable[[Array, int], Array]) -> list[Array]:
+def path_marginals(
+    costs: Sequence[Array], motion: Sequence[Array], reduced: Callable[[Array, int], Array]
+) -> list[Array]:
     """Return the reduced cost of all paths through each hypothesis, (K,) for each frame, nats.
 
     Args:
@@ -101,7 +103,7 @@ def through(costs: Sequence[Array], motion: Sequence[Array], reduced: Callable[[
     return [reduced(pairs[0], 1), *(reduced(pair, 0) for pair in pairs)]
 
 
-def cheapest(costs: Array, axis: int) -> Array:
+def reduce_min(costs: Array, axis: int) -> Array:
     """Return the least cost along an axis."""
     return np.asarray(costs.min(axis=axis))
 
@@ -137,7 +139,7 @@ class Paths:
         each hypothesis, (K,) each. The motion is learnt from the path, until the path stays."""
         path, found = np.full(len(sets), -1), list[Array]()
         for _ in range(LEARNING_ROUNDS):
-            found = through([s.costs() for s in sets], self.motion_nats(sets), cheapest)
+            found = path_marginals([s.costs() for s in sets], self.motion_nats(sets), reduce_min)
             before, path = path, np.array([int(f.argmin()) for f in found])
             if np.array_equal(path, before):
                 break

@@ -11,10 +11,10 @@ from tracker.estimation.trajectory.hypotheses import (
     DISTINCT_M,
     HypothesisSet,
     Paths,
-    cheapest,
     motion_nats,
+    path_marginals,
     reduce_log_sum,
-    through,
+    reduce_min,
 )
 from tracker.estimation.trajectory.motion_model import Group, MotionModel, acceleration
 
@@ -61,11 +61,11 @@ def test_paths_cost_what_all_of_them_cost_one_by_one(freedom, sizes, seed):
     known = every_path(sets, motion if len(coefficients) else None, coefficients)
     costs = [s.costs() for s in sets]
     if len(sizes) < 3:  # nothing shows their motion: each frame is on its own
-        for reduced in (cheapest, reduce_log_sum):
-            for found, own in zip(through(costs, nats, reduced), costs, strict=True):
+        for reduced in (reduce_min, reduce_log_sum):
+            for found, own in zip(path_marginals(costs, nats, reduced), costs, strict=True):
                 np.testing.assert_array_equal(found, own)
         return
-    least, together = through(costs, nats, cheapest), through(costs, nats, reduce_log_sum)
+    least, together = path_marginals(costs, nats, reduce_min), path_marginals(costs, nats, reduce_log_sum)
     for t, size in enumerate(sizes):
         for i in range(size):
             own = np.array([cost for path, cost in known.items() if path[t] == i])
@@ -112,7 +112,7 @@ def test_the_likeliest_path_learns_how_the_points_move():
     path, costs = paths.likeliest(sets)
     assert path.tolist() == [0] * 12
     assert np.sqrt(paths.motion.scales_m2).max() < 0.01
-    found = through([s.costs() for s in sets], paths.motion_nats(sets), cheapest)
+    found = path_marginals([s.costs() for s in sets], paths.motion_nats(sets), reduce_min)
     assert [c.argmin() for c in costs] == [c.argmin() for c in found] == [0] * 12
 
 
