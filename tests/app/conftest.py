@@ -50,7 +50,7 @@ def film_once(monkeypatch):
             _films[asked] = film(session, frames)
         return _films[asked]
 
-    monkeypatch.setattr(examine, "film_people", filmed)
+    monkeypatch.setattr(examine, "segment_filmed_people", filmed)
 
 
 @pytest.fixture

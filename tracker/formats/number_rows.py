@@ -126,7 +126,7 @@ def check_size(shape: tuple[int, ...], where: str) -> None:
 class NumberRows:
     """Collects the rows of a table; checks each as it comes, so that no small file takes much memory."""
 
-    def __init__(self, where: str, separator: str, n_camera_parameters: int, n_required: int) -> None:
+    def __init__(self, where: str, separator: str, n_columns: int, n_required: int) -> None:
         """Begin a table.
 
         Args:
@@ -136,7 +136,7 @@ class NumberRows:
             n_required: number of columns, from the first, that are not blank in any row. Others may be: NaN.
         """
         self._where, self._separator = where, separator
-        self._n_columns, self._n_required = n_camera_parameters, n_required
+        self._n_columns, self._n_required = n_columns, n_required
         self._values = array("d")
         self._lines = array("q")
 

@@ -170,7 +170,7 @@ def _names(line: str, where: str) -> tuple[str, ...]:
 
 
 def _read_rows(
-    lines: Iterator[_Line], where: str, n_camera_parameters: int, n_promised: int | None
+    lines: Iterator[_Line], where: str, n_columns: int, n_promised: int | None
 ) -> tuple[NDArray[np.int64], Array]:
     """Return the frame numbers, (n,), and the other columns, (n, n_columns - 1).
 
@@ -183,18 +183,16 @@ def _read_rows(
     Raises:
         FormatError: a row is malformed, or the file ends within one.
     """
-    rows = NumberRows(where, "\t", n_camera_parameters, n_required=2)
+    rows = NumberRows(where, "\t", n_columns, n_required=2)
     n_rows = 0
     for number, line in lines:
         if not (text := line.rstrip()):
             continue
         n_rows += 1
         n_found = line.count("\t") + 1
-        if not line.endswith("\n") and (n_found < n_camera_parameters or n_rows < (n_promised or 0)):
+        if not line.endswith("\n") and (n_found < n_columns or n_rows < (n_promised or 0)):
             of_rows = f" of {n_promised}" if n_promised else ""
-            cut = (
-                f"after {n_found} of {n_camera_parameters} columns in row {n_rows}{of_rows}, so that it may be cut off"
-            )
+            cut = f"after {n_found} of {n_columns} columns in row {n_rows}{of_rows}, so that it may be cut off"
             advice = "copy or export it again, or end the line if it is complete"
             place = f"{where}, line {number}"
             raise FormatError.mismatch(place, "the end of a line", f"that of the file, {cut}", advice)

@@ -139,13 +139,13 @@ def test_a_ratio_beyond_the_tolerance_is_slower(tmp_path):
 
 
 @pytest.mark.parametrize(("width", "n_columns"), [(1000, 8), (95, 4)])
-def test_a_table_breaks_no_word_and_shows_the_verdict(width, n_camera_parameters):
+def test_a_table_breaks_no_word_and_shows_the_verdict(width, n_columns):
     work = "a search of the trunk in six views of a child"
     found = report.report([row(work, 125, must=0.11)], {"tolerance": 0.3, "ratios": {}})
     console = Console(width=width, file=io.StringIO())
     report.show(found, console)
     head, line, *_ = console.file.getvalue().splitlines()
-    assert len(head.split()) == n_camera_parameters
+    assert len(head.split()) == n_columns
     assert (work in line, line.rstrip().endswith("fails")) == (True, True)
 
 

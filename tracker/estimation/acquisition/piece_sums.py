@@ -50,8 +50,8 @@ def sum_pieces(
         b: gradients by part, (P, k), 0 before.
         M: normal matrices by part, (P, k, k), 0 before.
     """
-    n_camera_parameters = b.shape[1]
-    world, eye, J = np.empty(3), np.empty(3), np.empty((2, n_camera_parameters))
+    n_columns = b.shape[1]
+    world, eye, J = np.empty(3), np.empty(3), np.empty((2, n_columns))
     for n in range(len(parts)):
         h00, h01, h11 = hessians[n, 0, 0], hessians[n, 0, 1], hessians[n, 1, 1]
         if h00 == 0.0 and h11 == 0.0:
@@ -67,13 +67,13 @@ def sum_pieces(
             for j in range(3):
                 eye[i] += T_camera_world[i, j] * world[j]
         _differentiate(unit, by_shapes[n], T, world, eye, T_camera_world, K, J)
-        for i in range(n_camera_parameters):
+        for i in range(n_columns):
             b[p, i] += gradients[n, 0] * J[0, i] + gradients[n, 1] * J[1, i]
             first, second = h00 * J[0, i] + h01 * J[1, i], h01 * J[0, i] + h11 * J[1, i]
-            for j in range(i, n_camera_parameters):
+            for j in range(i, n_columns):
                 M[p, i, j] += first * J[0, j] + second * J[1, j]
     for p in range(len(M)):
-        for i in range(n_camera_parameters):
+        for i in range(n_columns):
             for j in range(i):
                 M[p, i, j] = M[p, j, i]
 

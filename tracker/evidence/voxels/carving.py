@@ -52,8 +52,8 @@ def lookup_of_lens(lens: Lens) -> SensorLookup:
     camera = lens.camera
     low, high = _border(camera)
     step = max(1 / (_STEPS_PER_PX * max(camera.K[0, 0], camera.K[1, 1])), float((high - low).max()) / _MAX_ENTRIES)
-    n_camera_parameters, n_rows = (int(np.ceil(n)) + 1 for n in (high - low) / step)
-    x, rows = low[0] + step * np.arange(n_camera_parameters), low[1] + step * np.arange(n_rows)
+    n_columns, n_rows = (int(np.ceil(n)) + 1 for n in (high - low) / step)
+    x, rows = low[0] + step * np.arange(n_columns), low[1] + step * np.arange(n_rows)
     exact = np.concatenate([_exact_pixels(camera, x, y) for y in np.array_split(rows, -(-n_rows // _ROWS_AT_ONCE))])
     pixels = np.round(np.clip(exact, BEYOND_PX, -BEYOND_PX)).astype(np.int16)
     return SensorLookup(pixels, low, step, _steepest(exact) / step)

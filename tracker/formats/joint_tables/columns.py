@@ -55,7 +55,7 @@ class Columns:
     """Column of names of points, in tables with a row for each point; None for a row for each frame."""
     groups: tuple[int, ...] = ()
     """Columns of groups of points, such as the model of body or hand, in which a name may come again."""
-    n_camera_parameters: int = 0
+    n_columns: int = 0
     """Number of columns of each row; 0 if rows may be shorter than the header."""
     first: int = 0
     """Number of the first frame of a recording."""
@@ -109,7 +109,7 @@ def stacked_columns(table: Delimited) -> Columns:
     is_labelled, axes = "coords" in labels, rows[-1].cells
     names = labels.get("bodyparts", []) if is_labelled else rows[0].cells
     points = _stacked_points(names, axes, where, labels.get("individuals", []))
-    return Columns(points, 0 if is_labelled else None, n_camera_parameters=len(axes))
+    return Columns(points, 0 if is_labelled else None, n_columns=len(axes))
 
 
 def motive_columns(table: Delimited) -> Columns:
@@ -136,7 +136,7 @@ def motive_columns(table: Delimited) -> Columns:
     rate = facts.get("Export Frame Rate") or facts.get("Capture Frame Rate", "")
     points = _stacked_points(names, [a if c else "" for a, c in zip(axes, chosen, strict=False)], where)
     notes = tuple(f"columns of {kind} of Motive are left out" for kind in found)
-    return Columns(points, 0, 1, facts.get("Length Units", ""), rate, 1.0, n_camera_parameters=len(kinds), notes=notes)
+    return Columns(points, 0, 1, facts.get("Length Units", ""), rate, 1.0, n_columns=len(kinds), notes=notes)
 
 
 def nexus_columns(table: Delimited) -> Columns:

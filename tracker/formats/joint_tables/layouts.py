@@ -95,10 +95,8 @@ def _read_rows(table: Delimited, columns: Columns) -> _Rows:
             continue
         n += 1
         place = f"{table.where}, line {line}"
-        if len(cells) != (columns.n_camera_parameters or len(cells)):
-            raise FormatError(
-                f"{place}: expected {columns.n_camera_parameters} columns, found {len(cells)}; export it again"
-            )
+        if len(cells) != (columns.n_columns or len(cells)):
+            raise FormatError(f"{place}: expected {columns.n_columns} columns, found {len(cells)}; export it again")
         cells += [""] * (last + 1 - len(cells))
         key_of.append(keys.setdefault(tuple(cells[i] for i in named), len(keys)))
         numbers = [str(n) if columns.frame is None else cells[columns.frame], *(cells[i] for i in chosen)]

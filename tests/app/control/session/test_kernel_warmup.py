@@ -167,7 +167,7 @@ def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monk
         work(*arguments)
         return Beside()
 
-    monkeypatch.setattr(compile_kernels, "start_beside", start_child)
+    monkeypatch.setattr(compile_kernels, "start_child", start_child)
     monkeypatch.setattr(compile_kernels, "record_stage", lambda stage: stages.append(stage) or record_stage(stage))
     monkeypatch.setattr(
         compile_kernels, "_track", lambda cameras, settings, models, start: tracked.append((cameras, settings, models))

@@ -49,7 +49,7 @@ def test_the_wrong_arm_is_named_and_a_true_pose_is_not_contradicted(doubted):
 def test_the_run_is_learnt_once_and_again_when_its_poses_change(doubted, monkeypatch):
     learnt = []
     learn = reasons.learn_usual_evidence
-    monkeypatch.setattr(reasons, "learn_run", lambda *words: learnt.append(0) or learn(*words))
+    monkeypatch.setattr(reasons, "learn_usual_evidence", lambda *words: learnt.append(0) or learn(*words))
     explained(doubted)
     drag(doubted, "left_wrist", (4.0, 0.0))
     wait_for(lambda: doubted.state.reason is not None, 30)

@@ -108,7 +108,7 @@ NOTHING, SUSPECT, MISSING = (
 ])  # fmt: skip
 def test_people_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, quality, searched):
     bodies, asked = (PosedBody(gavrila, truth),) * n_people, []
-    monkeypatch.setattr(start_pose, "estimate_at", lambda *_: SimpleNamespace(quality=quality))
+    monkeypatch.setattr(start_pose, "assess_given_pose", lambda *_: SimpleNamespace(quality=quality))
     monkeypatch.setattr(start_pose, "search_start", lambda _, person, at, __: asked.append(person) or (at[person], ()))
     contours = [occluding_contours.trace(bodies, v.camera) for v in views]
     memories = [PersonMemory(gavrila, truth) for _ in bodies]

@@ -96,7 +96,9 @@ def test_the_judge_tracks_people_by_these_names(session, tmp_path, monkeypatch):
     store(session, "ann")
     tracked = []
     monkeypatch.setattr(
-        judged, "run_chain", lambda plan, opened, sink: tracked.append(load_observations(opened.session, "op").people)
+        judged,
+        "find_and_track",
+        lambda plan, opened, sink: tracked.append(load_observations(opened.session, "op").people),
     )
     judged.best_motion(session, None, "op", (0, 1), None, None)
     assert tracked == [("ben", "ann")]

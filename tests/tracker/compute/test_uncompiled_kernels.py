@@ -14,7 +14,7 @@ _SCORE = """
 import numpy as np
 from app.session.samples import bundled
 from tracker.body.model import PosedBody
-from tracker.compute.uncompiled_kernels import interpreted
+from tracker.compute.uncompiled_kernels import run_uncompiled
 from tracker.evidence.contours import occluding_contours
 from tracker.evidence.observer import open_observer
 from tracker.estimation.posing.default_pose import default_pose
@@ -36,7 +36,7 @@ def figures():
 
 with open_observer(session.cameras) as observer:
     views = observer.evidence(25)
-with interpreted():
+with run_uncompiled():
     slow = figures()
 assert not chamfer_kernels.score_traced.signatures
 fast = figures()

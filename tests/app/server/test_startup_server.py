@@ -68,8 +68,12 @@ def test_the_files_of_the_page_are_kept(doorway):
 @pytest.mark.skipif(not doorways.FORKS, reason="threads answer on this system")
 def test_a_process_of_its_own_answers_and_ends_with_the_program(monkeypatch, tmp_path):
     """However the program ends: the port is free again."""
-    code = "import os, sys; from app.server.startup_server import Doorway; from app.server.address import Serving\n"
-    code += "with Doorway(Serving(port=0)) as d: print(d.port, d._process.pid, flush=True); os.kill(os.getpid(), 9)"
+    code = (
+        "import os, sys; from app.server.startup_server import StartupServer; from app.server.address import Serving\n"
+    )
+    code += (
+        "with StartupServer(Serving(port=0)) as d: print(d.port, d._process.pid, flush=True); os.kill(os.getpid(), 9)"
+    )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     port, process = map(int, ended.stdout.split())
 
@@ -142,7 +146,7 @@ import sys
 import app.main
 from app.cli import open
 from app.runtime.kernel_compiler import KernelCompiler
-from app.server.startup_server import Doorway
+from app.server.startup_server import StartupServer
 from app.session.samples import sample_copy
 from tracker.compute.kernel_cache import is_compiled
 from tracker.session.folder import session_folder
