@@ -111,7 +111,7 @@ WORDS = {
     "rotation": "turned", "position": "moved", "focal": "zoomed", "time": "shifted in time",
     "drift": "drifting in time",
 }  # fmt: skip
-"""How a camera is said to be off, by the kind of its correction."""
+"""Phrase that describes the fault of a camera, by the kind of its correction."""
 SEEN_PX = 1.0
 """Misfit below which a camera is not named, px of the footage. Surfaces of acquired bodies are off by about 1 cm, which
 is 1 to 2 px at 4 m: contours cannot distinguish a smaller fault from the shape of the person."""
