@@ -295,11 +295,11 @@ class BodyModel:
         return places, self.point_jacobian(kinematics, parts, places)
 
     def retract(self, values: Array, step: Array) -> Array:
-        """Move a pose, (n_values,), by steps in its degrees of freedom, (..., n_dofs), to (..., n_values).
+        """Move poses, (..., n_values), by steps in their degrees of freedom, (..., n_dofs), to (..., n_values).
 
         Angles and lengths add; ball joints rotate.
         """
-        out = np.empty((*step.shape[:-1], len(values)))
+        out = np.empty((*step.shape[:-1], values.shape[-1]))
         out[:] = values
         dofs, at = self._plain
         out[..., at] += step[..., dofs]
@@ -313,14 +313,15 @@ class BodyModel:
         return self.clip(self.retract(values, step))
 
     def difference(self, values_to: Array, values_from: Array) -> Array:
-        """Return the step in the degrees of freedom, (n_dofs,), by which `retract` gets from one pose to the other."""
+        """Return the steps in the degrees of freedom, (..., n_dofs), by which `retract` gets from poses to others, each
+        (..., n_values)."""
         to, start = np.asarray(values_to, dtype=np.float64), np.asarray(values_from, dtype=np.float64)
-        step = np.empty(self.n_dofs)
+        step = np.empty((*to.shape[:-1], self.n_dofs))
         dofs, at = self._plain
-        step[dofs] = to[at] - start[at]
+        step[..., dofs] = to[..., at] - start[..., at]
         for ball in self._balls:
-            back = start[ball.values] * (1.0, -1.0, -1.0, -1.0)
-            step[ball.dofs] = rigid.quaternion_log(rigid.quaternion_multiply(back, to[ball.values]))
+            back = start[..., ball.values] * (1.0, -1.0, -1.0, -1.0)
+            step[..., ball.dofs] = rigid.quaternion_log(rigid.quaternion_multiply(back, to[..., ball.values]))
         return step
 
     def clip(self, values: Array) -> Array:

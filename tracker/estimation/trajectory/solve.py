@@ -5,7 +5,7 @@ The scales of the accelerations are learnt by expectation maximization (R. H. Sh
 Series Anal. 3:253). The covariance of the path counts: without it the smoothest path makes itself ever smoother.
 """
 
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -92,10 +92,24 @@ def even_blocks(n_frames: int) -> list[tuple[slice, slice]]:
     ]
 
 
+class _Evidence(NamedTuple):
+    """Normal equations of the evidence of each frame, where they were linearized last."""
+
+    poses: Array
+    """There, (T, n_values)."""
+    costs: Array
+    """(T,)."""
+    gradients: Array
+    """(T, n_dofs)."""
+    hessians: Array
+    """(T, n_dofs, n_dofs)."""
+
+
 class _State(NamedTuple):
     """A path and its normal equations."""
 
-    poses: list[Array]
+    poses: Array
+    """(T, n_values)."""
     cost: float
     gradient: Array
     """(T, n_dofs)."""
@@ -105,8 +119,7 @@ class _State(NamedTuple):
     """Squared accelerations of the points, (T - 2, P)."""
     jacobians: Array
     """Of the places of the points, (T, 3 P, n_dofs)."""
-    frames: list[tuple[Array, NormalEquations]]
-    """Pose and equations of the evidence of each frame, where they were linearized last."""
+    evidence: _Evidence
 
 
 class _Solver:
@@ -123,7 +136,7 @@ class _Solver:
         active = np.ones(model.n_dofs, bool) if path.active_dofs is None else path.active_dofs
         self.locked = self.fixed[:, None] | ~active
         self.locked_values = value_mask(model, ~active)
-        self.start = self._within_limits(path.poses[used], [*path.poses[used]])
+        self.start = self._within_limits(path.poses[used], path.poses[used])
         self.evidence: list[Sequence[ResidualBlock]] = []
         self.motion: MotionModel | None = None
         self.reach = CLOSE_ENOUGH
@@ -131,10 +144,9 @@ class _Solver:
         self.spread_m2 = np.zeros(1)
         """Variance of the accelerations by the uncertainty of the path, (T - 2, P), or zero."""
 
-    def _within_limits(self, poses: Iterable[Array], before: Sequence[Array]) -> list[Array]:
-        """Return poses within the limits, with fixed and locked ones as before."""
-        at = zip(self.path.model.clip(np.array([*poses])), before, self.fixed, strict=True)
-        return [old if fixed else np.where(self.locked_values, old, pose) for pose, old, fixed in at]
+    def _within_limits(self, poses: Array, before: Array) -> Array:
+        """Return poses within the limits, with fixed and locked ones as before, (T, n_values)."""
+        return np.where(self.fixed[:, None] | self.locked_values, before, self.path.model.clip(poses))
 
     def read(self, t: int) -> None:
         """Read the evidence of the next frame, given by its place in the path."""
@@ -154,7 +166,7 @@ class _Solver:
                 self.reach = CLOSE_ENOUGH
             found = self._descended(self._linearized(first.poses, first))
             covariances = np.where(self.locked[:, None] | self.locked[:, :, None], 0.0, self._inverse(found)[0])
-            return SolvedPath(np.array(found.poses), covariances)
+            return SolvedPath(found.poses, covariances)
 
     def _learn(self, here: _State, inverse: Array) -> None:
         """Learn the motion from the path and its covariance; see `_inverse`."""
@@ -205,12 +217,12 @@ class _Solver:
                 return None
             gradient = here.gradient + product(here.hessian, stopped)
             step = np.where(held, stopped, -known.solve(np.where(held, 0.0, gradient)))
-            beyond = [*map(model.retract, here.poses, step)]
+            beyond = model.retract(here.poses, step)
             poses = self._within_limits(beyond, here.poses)
-            crossed = ~held & (np.abs(_differences(model, poses, beyond)) > TINY)
+            crossed = ~held & (np.abs(model.difference(poses, beyond)) > TINY)
             if not crossed.any():
                 break
-            held, stopped = held | crossed, np.where(crossed, _differences(model, poses, here.poses), stopped)
+            held, stopped = held | crossed, np.where(crossed, model.difference(poses, here.poses), stopped)
         promised = -float(np.vdot(here.gradient + product(here.hessian, step) / 2, step))
         if promised < self.min_decrease:
             return None if promised < 0 else (here, promised)
@@ -218,7 +230,7 @@ class _Solver:
 
     def _held(self, here: _State) -> Mask:
         """Return the degrees of freedom that stay: locked ones, and those that press against a limit, (T, n_dofs)."""
-        return self.locked | pressed_against_limit(self.path.model, np.array(here.poses), here.gradient)
+        return self.locked | pressed_against_limit(self.path.model, here.poses, here.gradient)
 
     def _held_equations(self, here: _State, held: Mask, damping: float) -> Array:
         blocks = np.array(here.hessian)
@@ -237,20 +249,17 @@ class _Solver:
         assert known is not None  # with an unknown's variance on the diagonal
         return known.inverse()
 
-    def _linearized(self, poses: list[Array], before: _State | None) -> _State:
+    def _linearized(self, poses: Array, before: _State | None) -> _State:
         """Return a path with its normal equations; frames that hardly moved keep those of their evidence."""
         model, T = self.path.model, len(poses)
         kinematics = [model.kinematics(pose) for pose in poses]
-
-        def of_frame(t: int) -> tuple[tuple[Array, NormalEquations], NormalEquations]:
-            return self._evidence(t, poses[t], kinematics[t], None if before is None else before.frames[t])
-
-        frames, equations = zip(*map_parallel(of_frame, range(T)), strict=True)
+        known = self._evidence(poses, kinematics, None if before is None else before.evidence)
+        gap = model.difference(poses, known.poses)
+        slopes = np.einsum("tij,tj->ti", known.hessians, gap)
+        cost = float(known.costs.sum() + np.vdot(gap, known.gradients + slopes / 2))
+        gradient, hessian = known.gradients + slopes, np.zeros((3, T, model.n_dofs, model.n_dofs))
+        hessian[0] = known.hessians
         places, jacobians = self.points.linearized(kinematics)
-        gradient = np.array([e.gradient for e in equations])
-        hessian = np.zeros((3, T, model.n_dofs, model.n_dofs))
-        hessian[0] = [e.hessian for e in equations]
-        cost = sum(e.cost for e in equations)
         n, c = len(self.coefficients), self.coefficients
         residuals = sum((c[:, i, None, None] * places[i : i + n] for i in range(3)), np.zeros((n, 1, 3)))
         squares = np.sum(np.square(residuals), axis=-1)
@@ -266,28 +275,24 @@ class _Solver:
                     hessian[i - k, k : k + n] += weighted.transpose(0, 2, 1) @ (
                         c[:, k, None, None] * jacobians[k : k + n]
                     )
-        return _State(poses, cost, gradient, hessian, squares, jacobians, list(frames))
+        return _State(poses, cost, gradient, hessian, squares, jacobians, known)
 
-    def _evidence(
-        self, t: int, pose: Array, kinematics: Kinematics, before: tuple[Array, NormalEquations] | None
-    ) -> tuple[tuple[Array, NormalEquations], NormalEquations]:
-        """Return where the evidence of a frame is linearized, its equations there, and those at a pose."""
-        model, blocks = self.path.model, self.evidence[t]
-        if not blocks:
-            nothing = NormalEquations(0.0, np.zeros(model.n_dofs), np.zeros((model.n_dofs, model.n_dofs)))
-            return (pose, nothing), nothing
-        if before is not None:
-            gap = model.difference(pose, before[0])
-            if np.abs(gap).max() < self.reach:
-                cost, gradient, hessian = before[1]
-                slope = hessian @ gap
-                return before, NormalEquations(cost + float(gap @ (gradient + slope / 2)), gradient + slope, hessian)
-        found = [block.linearize(model, pose, kinematics) for block in blocks]
-        cost, gradient, hessian = (sum(parts[1:], start=parts[0]) for parts in zip(*found, strict=True))
-        here = NormalEquations(float(cost), gradient, hessian)
-        return (pose, here), here
+    def _evidence(self, poses: Array, kinematics: Sequence[Kinematics], before: _Evidence | None) -> _Evidence:
+        """Return the equations of the evidence: at the poses, or before where these hardly moved since."""
+        model, T = self.path.model, len(poses)
+        moved = np.array([len(blocks) > 0 for blocks in self.evidence])
+        if before is None:
+            n = model.n_dofs
+            out = _Evidence(poses.copy(), np.zeros(T), np.zeros((T, n)), np.zeros((T, n, n)))
+        else:
+            out = _Evidence(*map(np.copy, before))
+            moved &= np.abs(model.difference(poses, before.poses)).max(axis=1) >= self.reach
 
+        def of_frame(t: int) -> list[NormalEquations]:
+            return [block.linearize(model, poses[t], kinematics[t]) for block in self.evidence[t]]
 
-def _differences(model: BodyModel, poses: Sequence[Array], others: Sequence[Array]) -> Array:
-    """Return the steps in the degrees of freedom from other poses to poses, (T, n_dofs), rad and metres."""
-    return np.array([model.difference(*at) for at in zip(poses, others, strict=True)])
+        at = np.flatnonzero(moved).tolist()
+        for t, found in zip(at, map_parallel(of_frame, at), strict=True):
+            equations = (sum(parts[1:], start=parts[0]) for parts in zip(*found, strict=True))
+            out.poses[t], (out.costs[t], out.gradients[t], out.hessians[t]) = poses[t], equations
+        return out
