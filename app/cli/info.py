@@ -42,13 +42,13 @@ def summarize(
         clocks: of the footage, by camera.
         notes: sentences on them.
     """
+    from tracker.footage.camera_source import missing_files
     from tracker.interchange.observations.stored import list_observations
     from tracker.interchange.observations.stored_masks import list_masks
-    from tracker.session.missing_files import missing_files
     from tracker.session.store.annotation_store import AnnotationStore
     from tracker.session.store.calibration_log import read_posed_revisions
 
-    missing = missing_files(session)
+    missing = missing_files(session.cameras)
     poses: dict[str, list[FrameRow]] = {p.name: [] for p in session.people}
     if session.annotations_path.exists():
         with AnnotationStore(session.annotations_path, read_only=True) as store:

@@ -58,10 +58,10 @@ def relink(folder: Path, places: "Places", no_masks: bool = False) -> dict[str, 
     Raises:
         TrackerError: a file does not fit, or files are missing and no place is given.
     """
+    from tracker.footage.camera_source import missing_files
     from tracker.footage.proxy import FOLDER, Proxy
     from tracker.session import relink as relinking
     from tracker.session.lock import SessionLock
-    from tracker.session.missing_files import missing_files
     from tracker.session.session import load_session
 
     session = load_session(folder)
@@ -69,7 +69,7 @@ def relink(folder: Path, places: "Places", no_masks: bool = False) -> dict[str, 
     if left:
         with SessionLock(session.folder):
             session = relinking.leave_masks(session)
-    missing = missing_files(session)
+    missing = missing_files(session.cameras)
     if missing and places == relinking.Places():
         raise SessionError(
             f"camera '{missing[0].camera}': {missing[0].kind} {missing[0].path} is missing; say where to look with "
@@ -87,7 +87,7 @@ def relink(folder: Path, places: "Places", no_masks: bool = False) -> dict[str, 
             for f in found
         ],
         "left": [_row(c.camera.name, "masks") | {"path": str(c.masks)} for c in left],
-        "missing": [_row(m.camera, m.kind) | {"path": str(m.path)} for m in missing_files(session)],
+        "missing": [_row(m.camera, m.kind) | {"path": str(m.path)} for m in missing_files(session.cameras)],
     }
 
 

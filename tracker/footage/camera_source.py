@@ -118,3 +118,17 @@ def ahead_frames(cameras: Sequence[CameraSource], shown: Sequence[int], k: int) 
 def whole_frames(start_frames: float) -> int:
     """Return the nearest whole frame; frame 0 within a frame before it, since footage has none earlier."""
     return 0 if -1 < start_frames < 0 else round(start_frames)
+
+
+class MissingFile(NamedTuple):
+    """A file or folder that a session names and that is not there."""
+
+    camera: str
+    kind: PathKind
+    path: Path
+
+
+def missing_files(cameras: Sequence[CameraSource]) -> tuple[MissingFile, ...]:
+    """Return what a session names and is not there, by camera; opens none of its files."""
+    named = ((s.camera.name, kind, path) for s in cameras for kind, path in s.paths.items())
+    return tuple(MissingFile(*found) for found in named if not found[-1].exists())

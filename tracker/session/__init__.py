@@ -12,7 +12,6 @@ __all__ = [
     "lock",
     "locked_dofs",
     "matching",
-    "missing_files",
     "relink",
     "rig_summary",
     "row_placement",

@@ -12,13 +12,12 @@ from typing import NamedTuple
 
 from tracker.errors import RecordingError, Remedy, SessionError, TrackerError
 from tracker.files import entries_below
-from tracker.footage.camera_source import CameraSource, PathKind
+from tracker.footage.camera_source import CameraSource, MissingFile, PathKind, missing_files
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
 from tracker.session.footage_files import check_side_files, find_background, find_masks
 from tracker.session.matching import check_names, find_entry
-from tracker.session.missing_files import MissingFile, missing_files
 from tracker.session.session import Session, save_camera_files
 from tracker.validation import nfc_name
 
@@ -53,7 +52,7 @@ def require_files(session: Session) -> None:
     Raises:
         SessionError: some are not; the message says how to give them their new place.
     """
-    if missing := missing_files(session):
+    if missing := missing_files(session.cameras):
         first = missing[0]
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         raise SessionError(
@@ -77,7 +76,7 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
     check_names(places.camera_paths, [c.camera.name for c in session.cameras], "camera", "the footage by camera")
     given = _given(session, places)
     asked = {(f.camera, f.kind) for f in given}
-    missing = [m for m in missing_files(session) if (m.camera, m.kind) not in asked]
+    missing = [m for m in missing_files(session.cameras) if (m.camera, m.kind) not in asked]
     if places.search:
         named = _files_named({m.path.name for m in missing}, places.search)
         for lost in missing:

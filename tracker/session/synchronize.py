@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from tracker.compute.progress import Report, unreported
 from tracker.errors import RecordingError, Remedy, SessionError
-from tracker.footage.camera_source import CameraSource
+from tracker.footage.camera_source import CameraSource, missing_files
 from tracker.footage.flash import Flash, find_flash
 from tracker.footage.recording import Recording
 from tracker.footage.sound import read_sound, sound_delay
@@ -22,7 +22,6 @@ from tracker.session.footage_clocks import (
     sound_disagreement,
 )
 from tracker.session.matching import check_names
-from tracker.session.missing_files import missing_files
 from tracker.session.session import Session, check_content
 
 
@@ -50,7 +49,7 @@ def require_footage(session: Session) -> None:
     """
     if len(session.cameras) < 2:
         raise SessionError("expected two cameras or more, found one, which has nothing to be compared with")
-    for missing in missing_files(session):
+    for missing in missing_files(session.cameras):
         if missing.kind == "footage":
             raise SessionError(
                 f"camera '{missing.camera}': its footage {missing.path} is not there",

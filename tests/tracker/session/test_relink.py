@@ -13,6 +13,7 @@ from unreadable_folders import refuse_folders
 
 from tracker import files
 from tracker.errors import RecordingError, Remedy, SessionError
+from tracker.footage.camera_source import missing_files
 from tracker.footage.proxy import FOLDER, Proxy
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import write_calibration
@@ -20,7 +21,6 @@ from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.matching import check_names
-from tracker.session.missing_files import missing_files
 from tracker.session.relink import Places, _files_named, relink, require_files
 from tracker.session.session import load_session
 
@@ -65,7 +65,7 @@ def test_everything_is_found_by_a_search(room):
     require_files(loaded(room))
     moved(room)
     session = loaded(room)
-    assert [(m.camera, m.kind) for m in missing_files(session)] == [
+    assert [(m.camera, m.kind) for m in missing_files(session.cameras)] == [
         (camera, kind) for camera in "ab" for kind in ("footage", "background", "masks")
     ]
     with pytest.raises(SessionError, match=r"'a': footage .*a\.mp4 and 5 more not found") as caught:
@@ -75,7 +75,7 @@ def test_everything_is_found_by_a_search(room):
     assert len(found) == 6
     again = loaded(room)
     for at in (session, again):
-        assert missing_files(at) == ()
+        assert missing_files(at.cameras) == ()
         assert at.cameras[1].footage == room / "disk" / "take1" / "b.mp4"
         assert at.cameras[1].masks == room / "disk" / "take1" / "masks" / "b"
         assert (at.fps, at.cameras[1].declared_fps) == (90.0, 30.0)
@@ -104,7 +104,7 @@ def test_equal_names_in_strange_folders_are_left_to_the_user(room):
     shutil.copytree(take, room / "disk" / "x" / "two")
     refuse(room, SessionError, "'a': the footage may be .*(one|two)", Places(search=[room / "disk"]))
     session, _ = relink(loaded(room), Places(search=[room / "disk" / "x" / "two"]))
-    assert missing_files(session) == ()
+    assert missing_files(session.cameras) == ()
 
 
 def test_a_longer_video_of_common_frames_is_found_again(room):
@@ -120,7 +120,7 @@ def test_a_longer_video_of_common_frames_is_found_again(room):
         room, RecordingError, "'b': expected 12 frames .* found 9", Places(camera_paths={"b": room / "disk" / "b.mp4"})
     )
     session, _ = relink(loaded(room), Places(search=[take]))
-    assert missing_files(session) == ()
+    assert missing_files(session.cameras) == ()
 
 
 def test_other_footage_is_refused(room):
@@ -137,13 +137,13 @@ def test_a_renamed_file_is_given(room):
     take = moved(room)
     (take / "b.mp4").rename(take / "other.mp4")
     session, _ = relink(loaded(room), Places(search=[take]))
-    assert [(m.camera, m.kind) for m in missing_files(session)] == [("b", "footage")]
+    assert [(m.camera, m.kind) for m in missing_files(session.cameras)] == [("b", "footage")]
     refuse(room, SessionError, "unknown camera 'c'", Places(camera_paths={"c": take / "other.mp4"}))
     refuse(room, RecordingError, "'b'.*nowhere", Places(camera_paths={"b": take / "nowhere.mp4"}))
     both = {"a": take / "other.mp4", "b": take / "other.mp4"}
     refuse(room, SessionError, "'a' and 'b' would share", Places(camera_paths=both))
     session, found = relink(loaded(room), Places(camera_paths={"b": take / "other.mp4"}))
-    assert (missing_files(session), len(found)) == ((), 1)
+    assert (missing_files(session.cameras), len(found)) == ((), 1)
 
 
 def test_side_files_are_given_by_folder(room):
@@ -152,7 +152,7 @@ def test_side_files_are_given_by_folder(room):
         loaded(room),
         Places(camera_paths={n: take / f"{n}.mp4" for n in "ab"}, background=take / "empty", masks=take / "masks"),
     )
-    assert missing_files(session) == ()
+    assert missing_files(session.cameras) == ()
     bare = replace(session, cameras=tuple(replace(c, masks=None) for c in session.cameras))
     masked, found = relink(bare, Places(masks=take / "masks"))
     assert [(f.camera, f.kind, f.old) for f in found] == [("a", "masks", None), ("b", "masks", None)]

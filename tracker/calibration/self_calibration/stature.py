@@ -8,8 +8,7 @@ import numpy as np
 
 from tracker.errors import CalibrationError, TrackerError
 from tracker.estimation.acquisition.segment_lengths import segment_lengths
-from tracker.estimation.acquisition.size_parameters import SizePriors
-from tracker.estimation.acquisition.typical_body import typical_body
+from tracker.estimation.acquisition.size_parameters import SizePriors, typical_body
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array

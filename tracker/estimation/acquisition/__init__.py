@@ -17,5 +17,4 @@ __all__ = [
     "size_parameters",
     "size_report",
     "two_views",
-    "typical_body",
 ]

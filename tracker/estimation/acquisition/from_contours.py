@@ -32,8 +32,7 @@ from tracker.estimation.acquisition.from_voxels import (
 from tracker.estimation.acquisition.part_derivatives import part_jacobian
 from tracker.estimation.acquisition.piece_sums import GroupSums, sums_of_views
 from tracker.estimation.acquisition.size_fit import SightedPerson, SizeFit, SizeFitSettings, fit_sizes_to_contours
-from tracker.estimation.acquisition.size_parameters import SizeParameters, SizePriors
-from tracker.estimation.acquisition.typical_body import typical_body
+from tracker.estimation.acquisition.size_parameters import SizeParameters, SizePriors, typical_body
 from tracker.estimation.by_frame.forward_pass import update_static_edges
 from tracker.estimation.by_frame.frame_problem import FrameProblem, PersonPrior
 from tracker.estimation.chamfer.settings import TrackSettings

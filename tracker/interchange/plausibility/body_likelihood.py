@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.estimation.acquisition.segment_lengths import SEGMENTS
-from tracker.estimation.acquisition.size_parameters import SizePriors
-from tracker.estimation.acquisition.typical_body import typical_body
+from tracker.estimation.acquisition.size_parameters import SizePriors, typical_body
 from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import TINY, Array
 from tracker.geometry.lengths import USUAL_SIZES

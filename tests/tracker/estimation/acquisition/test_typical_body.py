@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tracker.body.dimensions import dimensions_of, stature_m, with_dimensions
-from tracker.estimation.acquisition.typical_body import typical_body
+from tracker.estimation.acquisition.size_parameters import typical_body
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 
 each_model = pytest.mark.parametrize("name", PRESETS)

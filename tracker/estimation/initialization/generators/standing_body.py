@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.body.limbs import display_name, limb_display_name, limbs
 from tracker.body.model import BodyModel
-from tracker.estimation.acquisition.typical_body import typical_body
+from tracker.estimation.acquisition.size_parameters import typical_body
 from tracker.estimation.initialization.generators.limb_poses import trunk_parts
 from tracker.evidence.voxels.voxel_grid import VOXEL_M, VoxelGrid, Voxels
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M, load_model
