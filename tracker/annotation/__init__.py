@@ -4,12 +4,4 @@ Imports `pipeline` and `evaluation`. Callers use `plan`, `from_contours`, `comme
 `session_copies`, `merge_sessions` and `speed`.
 """
 
-__all__ = [
-    "expected_error",
-    "frame_choice",
-    "merge_sessions",
-    "next_click",
-    "plan",
-    "session_copies",
-    "speed",
-]
+__all__ = ["expected_error", "frame_choice", "merge_sessions", "next_click", "plan", "session_copies", "speed"]

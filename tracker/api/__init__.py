@@ -3,8 +3,4 @@
 Imports all rooms of the tracker; none imports it. docs/library.md describes it.
 """
 
-__all__ = [
-    "results",
-    "sessions",
-    "work",
-]
+__all__ = ["results", "sessions", "work"]

@@ -4,10 +4,4 @@ The room `motion` has poses over time. Imports `compute` and `geometry`. Callers
 the schema in `parts`, `dimensions`, `limbs`, and the kernels of `kinematics`.
 """
 
-__all__ = [
-    "dimensions",
-    "kinematics",
-    "limbs",
-    "model",
-    "parts",
-]
+__all__ = ["dimensions", "kinematics", "limbs", "model", "parts"]

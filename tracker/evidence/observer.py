@@ -18,13 +18,7 @@ import numpy as np
 from tracker.evidence.foreground import Foreground, Prepared, prepare_views
 from tracker.evidence.images.edges import StaticEdgeModel
 from tracker.evidence.keypoints import KeypointEvidence
-from tracker.evidence.view_evidence import (
-    DEFAULT_EDGES,
-    EdgeSettings,
-    RegionFeatures,
-    ViewEvidence,
-    select_evidence,
-)
+from tracker.evidence.view_evidence import DEFAULT_EDGES, EdgeSettings, RegionFeatures, ViewEvidence, select_evidence
 from tracker.footage.camera_source import CameraSource, ahead_frames
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import FloatArray, Image

@@ -11,12 +11,7 @@ from numpy.typing import NDArray
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import TINY, Array
-from tracker.geometry.lenses import (
-    distort_slopes,
-    fisheye_directions,
-    fisheye_limit,
-    fisheye_project,
-)
+from tracker.geometry.lenses import distort_slopes, fisheye_directions, fisheye_limit, fisheye_project
 
 MAX_LENS_RADIUS = 20.0
 """Tangent of the widest angle from the optical axis, 87 degrees, at which a lens is examined."""

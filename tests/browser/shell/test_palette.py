@@ -158,7 +158,7 @@ async def test_every_key_and_button_is_in_it(page):
     )
     # These stand for many keys, and the palette has the places that they lead to one by one.
     assert [m for m in missing if m != "Commands"] == [
-        "Fill the grid with a camera (toggle, two digits for 10 to 16), 0: show the whole image",
+        "Fill the grid with a camera (toggle, two digits for 10 to 16), 0: show the whole image"
     ]
 
 

@@ -5,7 +5,4 @@ Imports the other rooms of its wing. Callers use
 and `silhouette_calibration.calibrate_by_silhouettes` for silhouettes.
 """
 
-__all__ = [
-    "person_calibration",
-    "person_files",
-]
+__all__ = ["person_calibration", "person_files"]

@@ -15,12 +15,7 @@ from tracker.body.limbs import Limb, Search
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.motion.pose_steps import PredictSettings, shortest_step
 from tracker.estimation.appearance.part_colors import Colors, PartColors
-from tracker.estimation.by_frame.settings import (
-    MAX_ITERATIONS,
-    OWN_TRUST,
-    TOLERANCE,
-    EstimationSettings,
-)
+from tracker.estimation.by_frame.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE, EstimationSettings
 from tracker.estimation.fitting.clocked_residuals import ClockedResiduals, PersonResiduals, person_residuals
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE, PartCosts
 from tracker.estimation.fitting.gauss_newton import Fit, PosePrior, ResidualBlock

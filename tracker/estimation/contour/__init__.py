@@ -4,9 +4,4 @@ Imports the rooms of its wing up to `estimation.by_frame`. Callers use `tracker.
 `settings.ContourSettings` and `paper.paper_settings`.
 """
 
-__all__ = [
-    "fit_steps",
-    "method",
-    "paper",
-    "settings",
-]
+__all__ = ["fit_steps", "method", "paper", "settings"]

@@ -6,8 +6,4 @@ people on given frames, and `frame_trials.find_first_poses_anywhere` for those o
 room fits, searches, tracks and compares (`first_pose.compare_starts`).
 """
 
-__all__ = [
-    "first_pose",
-    "frame_trials",
-    "silhouette_check",
-]
+__all__ = ["first_pose", "frame_trials", "silhouette_check"]

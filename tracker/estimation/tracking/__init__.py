@@ -4,12 +4,4 @@ Imports `estimation.fitting` and `estimation.appearance` of its wing. Callers us
 `Subjects` and `PoseEstimate`, and `confidence.Status`.
 """
 
-__all__ = [
-    "confidence",
-    "evidence_assignment",
-    "method",
-    "person_memory",
-    "pose_errors",
-    "tracker",
-    "view_regions",
-]
+__all__ = ["confidence", "evidence_assignment", "method", "person_memory", "pose_errors", "tracker", "view_regions"]

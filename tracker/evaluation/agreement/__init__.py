@@ -4,8 +4,4 @@ Imports nothing of its wing. Callers use `copies.read_copies`, `comparison.compa
 `copies.mean_pose`.
 """
 
-__all__ = [
-    "comparison",
-    "copies",
-    "statistics",
-]
+__all__ = ["comparison", "copies", "statistics"]

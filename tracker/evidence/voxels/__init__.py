@@ -4,12 +4,4 @@ The room imports `compute`, `geometry`, `evidence` and `evidence.images`, and kn
 `visual_hull.carve_people`, `carving.Carver`, `geodesic_distance.path_lengths` and `part_size.principal_axes`.
 """
 
-__all__ = [
-    "carving",
-    "figure_masks",
-    "geodesic_distance",
-    "part_size",
-    "shadows",
-    "visual_hull",
-    "voxel_grid",
-]
+__all__ = ["carving", "figure_masks", "geodesic_distance", "part_size", "shadows", "visual_hull", "voxel_grid"]

@@ -5,14 +5,4 @@
 and method of each pose and point.
 """
 
-__all__ = [
-    "export_files",
-    "faces",
-    "formats",
-    "keypoints",
-    "label_writers",
-    "motion",
-    "provenance",
-    "views",
-    "writers",
-]
+__all__ = ["export_files", "faces", "formats", "keypoints", "label_writers", "motion", "provenance", "views", "writers"]

@@ -13,12 +13,7 @@ from tracker.evidence.contours.label_image import part_labels
 from tracker.evidence.images.distance_transform import distance_image
 from tracker.evidence.images.silhouette_contour import trace_silhouette
 from tracker.evidence.observer import Observer
-from tracker.evidence.view_evidence import (
-    Silhouette,
-    ViewEvidence,
-    default_theta_px,
-    thin_points,
-)
+from tracker.evidence.view_evidence import Silhouette, ViewEvidence, default_theta_px, thin_points
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
 from tracker.simulate.people.skin import Skin

@@ -114,11 +114,7 @@ POPULATION: Mapping[str, Individual] = MappingProxyType(
             (_SMALL_BELLY, *_BUST, *_WIDE_HIPS, *_FLANKS),
         ),
         "short_woman": _individual(
-            1.50,
-            _bones(legs=0.96, arms=0.96, hips=1.08, trunk=1.03),
-            WOMAN.girths,
-            WOMAN.further,
-            head_size=1.05,
+            1.50, _bones(legs=0.96, arms=0.96, hips=1.08, trunk=1.03), WOMAN.girths, WOMAN.further, head_size=1.05
         ),
         "long_legged_woman": _individual(
             1.74,

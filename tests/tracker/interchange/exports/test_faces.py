@@ -100,9 +100,7 @@ def test_heads_of_bystanders_are_known_by_their_key_points(couple):
 
 
 @pytest.mark.parametrize(
-    ("known", "least"),
-    [((0,), 16), ((0, 2), 16), ((2, 3), 75)],
-    ids=["nose alone", "nose and arm", "no head"],
+    ("known", "least"), [((0,), 16), ((0, 2), 16), ((2, 3), 75)], ids=["nose alone", "nose and arm", "no head"]
 )
 def test_a_bystander_who_is_seen_in_part_is_hidden(known, least):
     names = ("nose", "left_ear", "left_forearm", "left_ankle")

@@ -4,6 +4,4 @@ Imports what exports do, and `observations`. Callers use `patched_files.export_p
 points on the poses of a session.
 """
 
-__all__ = [
-    "patched_files",
-]
+__all__ = ["patched_files"]
