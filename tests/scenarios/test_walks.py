@@ -5,13 +5,18 @@ from tracking_runs import track, with_reference
 from walks import traced
 
 import quadrille
+from tracker.compute.progress import result_of
+from tracker.estimation.chamfer.settings import TrackSettings
+from tracker.estimation.runs.run_estimate import RunFrames, estimate_run
+from tracker.estimation.tracking.tracker import Subjects
 from tracker.evidence.observer import open_observer
 from tracker.formats.model_toml import load_model
 from tracker.session.session import save_model
 from tracker.simulate import Simulation, simulate
 
-MAX_FILES, MAX_CROSSINGS = 41, 245
-"""Of a frame of one person in four views, from the pose before to its own; they may only fall."""
+MAX_FILES, MAX_CROSSINGS, MAX_OF_ESTIMATE = 41, 245, 1200
+"""Of a frame of one person in four views, from the pose before to its own; crossings of the estimate of all frames for
+each of them. They may only fall."""
 
 
 @pytest.mark.slow
@@ -31,11 +36,15 @@ def test_a_tracked_frame_passes_few_files(data_folder, tmp_path):
     sides, frames = ("background", "masks"), []
     session, _, start = with_reference(data_folder("walk"), tmp_path / "s", sides=sides, heights=1.75)
     with traced() as walk, open_observer(session.cameras) as observer:
-        steps = iter(track(observer, [session.people[0].model], [start], range(9)))
-        for _ in range(9):
+        subjects, poses = Subjects.of([session.people[0].model]), {}
+        steps = iter(track(observer, subjects.models, [start], range(40)))
+        for k in range(40):
             with walk.counted() as crossings:
-                next(steps)
+                poses[k] = next(steps).poses
             frames.append(crossings)
+        with walk.counted() as of_estimate:
+            result_of(estimate_run(RunFrames(observer, subjects, TrackSettings(), session.fps, poses)))
     files, crossings = zip(*((len({*sum(c, ())}), c.total()) for c in frames[2:]), strict=True)
     assert min(files) <= MAX_FILES, sorted({*sum(frames[-1], ())})
     assert min(crossings) <= MAX_CROSSINGS, frames[-1].most_common(20)
+    assert of_estimate.total() <= 40 * MAX_OF_ESTIMATE, of_estimate.most_common(20)

@@ -186,6 +186,24 @@ def _turn(T: Array, w: float, x: float, y: float, z: float) -> None:
 
 
 @njit(nogil=True, cache=True)
+def place_points(
+    poses: Array, tree: Tree, is_length: NDArray[np.bool_], moves: NDArray[np.bool_], parts: IntArray,
+    points_part: Array, places: Array, out: Array,
+) -> None:  # fmt: skip
+    """Fill the places, (T, N, 3), of points fixed to parts, (N, 3), in poses, (T, n_values), and their derivatives, (T,
+    N, 3, n_dofs)."""
+    n_dofs, Ts = moves.shape[0], np.empty((tree.parents.shape[0], 4, 4))
+    axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
+    for t in range(poses.shape[0]):
+        forward_kinematics(poses[t], tree, Ts, axes, origins)
+        for n in range(parts.shape[0]):
+            T, x = Ts[parts[n]], points_part[n]
+            for i in range(3):
+                places[t, n, i] = T[i, 0] * x[0] + T[i, 1] * x[1] + T[i, 2] * x[2] + T[i, 3]
+        point_jacobian(Kinematics(Ts, axes, origins), is_length, moves, parts, places[t], out[t])
+
+
+@njit(nogil=True, cache=True)
 def point_jacobian(
     kinematics: Kinematics,
     is_length: NDArray[np.bool_],

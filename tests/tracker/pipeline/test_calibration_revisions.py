@@ -1,13 +1,11 @@
 """Revisions of the calibration: entries of the history, undone and redone, and named by poses."""
 
 import operator
-import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from command_line import SAMPLE
 from stored_motions import put_poses
 
 from tracker.calibration.check.diagnosis import CameraFinding
@@ -30,11 +28,6 @@ from tracker.session.store.annotation_store import AnnotationStore
 from tracker.session.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, present_revision, revisions_of_poses
 from tracker.session.store.records import AssessmentChange
 from tracker.session.synchronize import with_starts
-
-
-@pytest.fixture
-def session(tmp_path):
-    return load_session(shutil.copytree(SAMPLE, tmp_path / "session"))
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """A moment at which something moves fast in two views: by joints, key points and pictures."""
 
-import shutil
-
 import numpy as np
 import pytest
 from command_line import SAMPLE
@@ -17,11 +15,6 @@ from tracker.pipeline.fast_moment import find_fast_moment
 from tracker.session.session import load_session
 
 VIEWS = (0, 2)
-
-
-@pytest.fixture
-def session(tmp_path):
-    return load_session(shutil.copytree(SAMPLE, tmp_path / "session"))
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """First poses that a file gives are stored as keyframes, or refused before anything is written."""
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -11,13 +10,7 @@ from tracker.estimation.posing.default_pose import default_pose
 from tracker.evaluation.references import read_joints
 from tracker.formats.pose_csv import PoseTable
 from tracker.pipeline.given_pose import set_pose_at_joints, set_pose_from_table
-from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-
-
-@pytest.fixture
-def session(tmp_path, sample_folder):
-    return load_session(shutil.copytree(sample_folder, tmp_path / "session"))
 
 
 @pytest.fixture

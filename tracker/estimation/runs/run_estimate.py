@@ -103,6 +103,8 @@ class _RunEstimate:
         self._found: dict[int, dict[int, RunPose]] = {i: {} for i in run.subjects.tracked}
         self._facing = dict.fromkeys(run.subjects.tracked, KNOWN)
         self._colors: RegionModel | None = None
+        seen = run.observer, run.observer.origin
+        self._timed = {k for k in self._frames if any(t for observer in seen for t in observer.ahead_frames(k))}
 
     def steps(self) -> Generator[Progress, None, dict[int, dict[int, RunPose]]]:
         """Do the work, block by block."""
@@ -182,11 +184,11 @@ class _RunEstimate:
         return out
 
     def _bodies(self, frame: int) -> Bodies:
-        """Return all people on a frame, with their velocities where a view needs them."""
-        models, observer = self._run.subjects.models, self._run.observer
-        if not any((*observer.ahead_frames(frame), *observer.origin.ahead_frames(frame))):
-            return tuple(map(PosedBody, models, self._poses[frame]))
-        return moving_bodies(models, self._poses, frame)
+        """Return all people on a frame, with their velocities where views need them."""
+        models = self._run.subjects.models
+        if frame in self._timed:
+            return moving_bodies(models, self._poses, frame)
+        return tuple(map(PosedBody, models, self._poses[frame]))
 
     def _observe(self, frame: int, proposals: Sequence[tuple[int, Array]] = ()) -> tuple[ViewEvidence, ...]:
         """Return the evidence of a frame around all people, and around proposals, (n_values,) each, of some of them."""

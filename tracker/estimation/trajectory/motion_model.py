@@ -8,7 +8,6 @@ Points outnumber the degrees of freedom that move them. The squares of all point
 those of its degrees of freedom: their sum in units of the scale has the mean d.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -16,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.dimensions import main_axis
-from tracker.body.kinematics import Kinematics
+from tracker.body.kinematics import Kinematics, place_points
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array, IntArray, Mask
@@ -60,11 +59,13 @@ class MotionPoints:
         Ts = kinematics.Ts_world_part[self.parts]
         return np.asarray(np.einsum("pij,pj->pi", Ts[:, :3, :3], self.points_part) + Ts[:, :3, 3])
 
-    def linearized(self, kinematics: Sequence[Kinematics]) -> tuple[Array, Array]:
-        """Return their places in poses, (T, P, 3), and the derivatives, (T, 3 P, n_dofs), metres per rad or metre."""
-        places = [self.at(k) for k in kinematics]
-        J = [self.model.point_jacobian(k, self.parts, at) for k, at in zip(kinematics, places, strict=True)]
-        return np.array(places), np.array(J).reshape(len(J), -1, self.model.n_dofs)
+    def linearized(self, poses: Array) -> tuple[Array, Array]:
+        """Return their places in poses, (T, n_values), (T, P, 3), and the derivatives, (T, 3 P, n_dofs), metres per rad
+        or metre."""
+        model, places = self.model, np.empty((len(poses), len(self.parts), 3))
+        J = np.empty((*places.shape, model.n_dofs))
+        place_points(poses, model.tree, model.dof_is_length, model.moves, self.parts, self.points_part, places, J)
+        return places, J.reshape(len(J), -1, model.n_dofs)
 
 
 @lru_cache(maxsize=16)

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.compute.threads import map_parallel, one_blas_thread
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
@@ -252,14 +251,13 @@ class _Solver:
     def _linearized(self, poses: Array, before: _State | None) -> _State:
         """Return a path with its normal equations; frames that hardly moved keep those of their evidence."""
         model, T = self.path.model, len(poses)
-        kinematics = [model.kinematics(pose) for pose in poses]
-        known = self._evidence(poses, kinematics, None if before is None else before.evidence)
+        known = self._evidence(poses, None if before is None else before.evidence)
         gap = model.difference(poses, known.poses)
         slopes = np.einsum("tij,tj->ti", known.hessians, gap)
         cost = float(known.costs.sum() + np.vdot(gap, known.gradients + slopes / 2))
         gradient, hessian = known.gradients + slopes, np.zeros((3, T, model.n_dofs, model.n_dofs))
         hessian[0] = known.hessians
-        places, jacobians = self.points.linearized(kinematics)
+        places, jacobians = self.points.linearized(poses)
         n, c = len(self.coefficients), self.coefficients
         residuals = sum((c[:, i, None, None] * places[i : i + n] for i in range(3)), np.zeros((n, 1, 3)))
         squares = np.sum(np.square(residuals), axis=-1)
@@ -277,7 +275,7 @@ class _Solver:
                     )
         return _State(poses, cost, gradient, hessian, squares, jacobians, known)
 
-    def _evidence(self, poses: Array, kinematics: Sequence[Kinematics], before: _Evidence | None) -> _Evidence:
+    def _evidence(self, poses: Array, before: _Evidence | None) -> _Evidence:
         """Return the equations of the evidence: at the poses, or before where these hardly moved since."""
         model, T = self.path.model, len(poses)
         moved = np.array([len(blocks) > 0 for blocks in self.evidence])
@@ -289,7 +287,8 @@ class _Solver:
             moved &= np.abs(model.difference(poses, before.poses)).max(axis=1) >= self.reach
 
         def of_frame(t: int) -> list[NormalEquations]:
-            return [block.linearize(model, poses[t], kinematics[t]) for block in self.evidence[t]]
+            kinematics = model.kinematics(poses[t])
+            return [block.linearize(model, poses[t], kinematics) for block in self.evidence[t]]
 
         at = np.flatnonzero(moved).tolist()
         for t, found in zip(at, map_parallel(of_frame, at), strict=True):

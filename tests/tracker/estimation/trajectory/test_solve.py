@@ -146,7 +146,7 @@ def test_covariances_are_those_of_a_linear_problem(monkeypatch):
     found, covariances = result_of(solve_path(path_of(poses, evidence)))
     n, c = MODEL.n_dofs, np.array([1.0, -2.0, 1.0])
     kinematics = [MODEL.kinematics(pose) for pose in found]
-    _, J = motion_points(MODEL).linearized(kinematics)
+    _, J = motion_points(MODEL).linearized(found)
     H = np.zeros((T, n, T, n))
     for t, pose in enumerate(found):
         H[t, :, t] += evidence[t][0].linearize(MODEL, pose, kinematics[t]).hessian
