@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.body.model import BodyModel
 from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.evidence.contours import occluding_contours
-from tracker.evidence.contours.pieces import Pieces, StaticContours, piece_buffer
-from tracker.evidence.contours.surfaces import Surfaces
+from tracker.evidence.contours.pieces import Pieces, StaticContours, piece_buffer, static_contours_buffer
+from tracker.evidence.contours.surfaces import Surfaces, surfaces_of
 from tracker.evidence.images.silhouette_contour import SAME_PX
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray, IntArray
@@ -125,6 +126,21 @@ class ContourTerm(NamedTuple):
     scratch: Scratch
     sums: Sums
     """Output."""
+
+
+def no_contours(model: BodyModel) -> ContourTerm:
+    """Return the term of no views, which adds nothing: a body without contours, for kernels that expect some."""
+    surfaces, n_parts = surfaces_of((model,)), len(model.parts)
+    views = ViewArrays(
+        np.empty((0, 3, 4)), np.empty((0, 3)), np.empty((0, 2), np.int64), np.empty(0, np.float32),
+        np.empty((N_COLUMNS, 0), np.float32), np.zeros(1, np.int64), np.empty((0, 0, 0), np.int64), np.empty(0),
+        np.empty((0, 2)),
+    )  # fmt: skip
+    static = static_contours_buffer(0, 0, 0, np.ones(n_parts, np.bool_))
+    return ContourTerm(
+        np.empty((n_parts, 4, 4)), 0, n_parts, surfaces, views, 1.0, 1.0, int(ContourMotion.ACROSS), static,
+        scratch_buffer(surfaces, 0, 0), sums_buffer(n_parts, 0),
+    )  # fmt: skip
 
 
 N_COLUMNS = 6

@@ -1,4 +1,4 @@
-"""`gauss_newton.solve` in one compiled call, for contour residuals with priors and penetration terms.
+"""`gauss_newton.solve` in one compiled call, for contours, key points, known points, priors and penetration terms.
 
 A descent takes a dozen steps of a tenth of a millisecond each. In Python the calls between kernels take as long as the
 kernels, and hold the interpreter's lock. `gauss_newton.solve` is the readable version, for any blocks and for ball
@@ -16,9 +16,18 @@ from tracker.body.model import BodyModel
 from tracker.compute.jit import FAST_MATH, NO_REFCOUNT, njit
 from tracker.estimation.fitting import gauss_newton
 from tracker.estimation.fitting.clocked_residuals import ClockedResiduals
+from tracker.estimation.fitting.contour_arrays import no_contours
 from tracker.estimation.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations
 from tracker.estimation.fitting.contour_residuals import ContourResiduals
-from tracker.estimation.fitting.gauss_newton import DAMPING, MAX_ITERATIONS, TOLERANCE, Fit, PosePrior, ResidualBlock
+from tracker.estimation.fitting.gauss_newton import (
+    DAMPING,
+    MAX_ITERATIONS,
+    TOLERANCE,
+    Fit,
+    PointTargets,
+    PosePrior,
+    ResidualBlock,
+)
 from tracker.estimation.fitting.interpenetration import (
     NO_PENETRATION,
     BodyPenetration,
@@ -30,7 +39,24 @@ from tracker.estimation.fitting.keypoints import NO_KEYPOINTS, KeypointBlock, Ke
 from tracker.estimation.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import TINY, Array, IntArray
 
-_KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration, KeypointBlock)
+_KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration, KeypointBlock, PointTargets)
+
+
+class _TargetTerm(NamedTuple):
+    """`PointTargets` of points of parts as arrays."""
+
+    parts: IntArray
+    """Part that each point moves with, (N,)."""
+    points_part: Array
+    """Place of each in its part, (N, 3), metres."""
+    targets_world: Array
+    """Where it is drawn to, (N, 3), metres."""
+    weights: Array
+    """See `PointTargets`, (N,)."""
+
+
+_NO_TARGETS = _TargetTerm(*NO_KEYPOINTS[:2], NO_KEYPOINTS.points_part, NO_KEYPOINTS.precisions)
+"""A term that adds nothing."""
 
 
 class _Blocks(NamedTuple):
@@ -57,6 +83,8 @@ class _Blocks(NamedTuple):
     """Penetration between bodies."""
     keypoints: KeypointTerm
     """Key points."""
+    targets: _TargetTerm
+    """Known points."""
 
 
 class _Linear(NamedTuple):
@@ -128,20 +156,23 @@ def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks:
     within = [b.term(model) for b in blocks if isinstance(b, SelfPenetration)]
     between = [b.term(model) for b in blocks if isinstance(b, BodyPenetration)]
     keypoints = [b.arrays for b in blocks if isinstance(b, KeypointBlock)]
-    if len(contours) != 1 or max(len(within), len(between), len(keypoints)) > 1:
-        found = (
-            f"{len(contours)} ContourResiduals, {len(within)} SelfPenetration, {len(between)} BodyPenetration and "
-            f"{len(keypoints)} KeypointBlock"
-        )
+    targets = [
+        _TargetTerm(model.point_parts[b.points], model.points_part[b.points], b.targets_world, b.weights)
+        for b in blocks if isinstance(b, PointTargets) and not b.centers
+    ]  # fmt: skip
+    terms = contours, within, between, keypoints, targets
+    if max(map(len, terms)) > 1 or any(isinstance(b, PointTargets) and b.centers for b in blocks):
         raise TypeError(
-            f"expected one ContourResiduals and at most one of the others, found {found}; call gauss_newton.solve"
+            "expected at most one block of each kind, and points that are not anatomical centres, found others; call "
+            "gauss_newton.solve"
         )
     return _Blocks(
-        model.tree, model.dof_is_length, model.dof_joint, model.moves, model.limits, contours[0],
+        model.tree, model.dof_is_length, model.dof_joint, model.moves, model.limits,
+        contours[0] if contours else no_contours(model),
         np.array([p.pose for p in priors], np.float64).reshape(-1, model.n_dofs),
         np.array([p.weights for p in priors], np.float64).reshape(-1, model.n_dofs),
         within[0] if within else NO_PENETRATION, between[0] if between else NO_PENETRATION,
-        keypoints[0] if keypoints else NO_KEYPOINTS,
+        keypoints[0] if keypoints else NO_KEYPOINTS, targets[0] if targets else _NO_TARGETS,
     )  # fmt: skip
 
 
@@ -200,6 +231,7 @@ def _linearize(blocks: _Blocks, pose: Array, out: _Linear) -> float:
     forward_kinematics(pose, blocks.tree, Ts, out.axes, out.origins)
     cost = accumulate_normal_equations(term, WITH_JACOBIAN)
     cost += add_keypoints(blocks.keypoints, Ts, sums.M[first:last], sums.b[first:last])
+    cost += _add_targets(blocks.targets, Ts, sums.M[first:last], sums.b[first:last])
     twists_to_dofs(
         sums.M[first:last], sums.b[first:last], out.axes, out.origins, blocks.is_length, blocks.parts,
         blocks.tree.parents, blocks.moves, out.gradient, out.hessian,
@@ -214,6 +246,26 @@ def _linearize(blocks: _Blocks, pose: Array, out: _Linear) -> float:
     kinematics = Kinematics(Ts, out.axes, out.origins)
     for apart in (blocks.within, blocks.between):
         cost += add_penetration(apart, kinematics, blocks.is_length, blocks.moves, out.gradient, out.hessian)
+    return cost
+
+
+@njit(**NO_REFCOUNT)
+def _add_targets(term: _TargetTerm, Ts: Array, M: Array, b: Array) -> float:
+    """Add the normal equations of known points to those of the parts' twists, as `add_keypoints`; return the cost."""
+    cost = 0.0
+    for n in range(term.parts.shape[0]):
+        p, x, target, weight = term.parts[n], term.points_part[n], term.targets_world[n], term.weights[n] ** 2
+        X = Ts[p, 0, 0] * x[0] + Ts[p, 0, 1] * x[1] + Ts[p, 0, 2] * x[2] + Ts[p, 0, 3]
+        Y = Ts[p, 1, 0] * x[0] + Ts[p, 1, 1] * x[1] + Ts[p, 1, 2] * x[2] + Ts[p, 1, 3]
+        Z = Ts[p, 2, 0] * x[0] + Ts[p, 2, 1] * x[1] + Ts[p, 2, 2] * x[2] + Ts[p, 2, 3]
+        off = (X - target[0], Y - target[1], Z - target[2])
+        rows = ((0.0, Z, -Y, 1.0, 0.0, 0.0), (-Z, 0.0, X, 0.0, 1.0, 0.0), (Y, -X, 0.0, 0.0, 0.0, 1.0))
+        for r, row in zip(off, rows):  # noqa: B905, numba knows no strict
+            cost += 0.5 * weight * r * r
+            for i in range(6):
+                b[p, i] += weight * r * row[i]
+                for j in range(i, 6):
+                    M[p, i, j] += weight * row[i] * row[j]
     return cost
 
 

@@ -9,8 +9,8 @@ from tracker.body.dimensions import mirror_part
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.fitting.contour_residuals import MIN_DECREASE
-from tracker.estimation.fitting.gauss_newton import PointTargets, solve
-from tracker.estimation.fitting.hypothesis import SAME_POSE_M
+from tracker.estimation.fitting.gauss_newton import JOINT_M, UNKNOWN, PointTargets, PosePrior, ResidualBlock
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.geometry.arrays import Array
 
 
@@ -24,8 +24,9 @@ def paired_limbs(limbs: Sequence[Limb]) -> list[tuple[Limb, Limb]]:
 def exchanged(body: PosedBody, pair: tuple[Limb, Limb]) -> Array:
     """Return the pose, (n_values,), in which two limbs lie where the other was, as far as the joints allow."""
     of_pair = np.isin(body.model.point_parts, np.concatenate([limb.parts for limb in pair]))
-    mirrored = _mirrored(body, np.flatnonzero(of_pair).tolist())
-    return solve(body.model, body.values, [mirrored], pair[0].dofs | pair[1].dofs, gain=MIN_DECREASE).pose
+    blocks = _mirrored(body, np.flatnonzero(of_pair).tolist())
+    moved = pair[0].dofs | pair[1].dofs
+    return solve_compiled_or_plain(body.model, body.values, blocks, moved, gain=MIN_DECREASE).pose
 
 
 def turned_round(body: PosedBody) -> Array:
@@ -33,19 +34,19 @@ def turned_round(body: PosedBody) -> Array:
     model = body.model
     half_turn = np.zeros(model.n_dofs)
     half_turn[np.flatnonzero((model.dof_joint == 0) & ~model.dof_is_length)[-1]] = np.pi
-    mirrored = _mirrored(body, range(len(model.point_names)))
-    return solve(model, model.retract(body.values, half_turn), [mirrored], gain=MIN_DECREASE).pose
+    blocks = _mirrored(body, range(len(model.point_names)))
+    return solve_compiled_or_plain(model, model.retract(body.values, half_turn), blocks, gain=MIN_DECREASE).pose
 
 
-def _mirrored(body: PosedBody, moved: Sequence[int]) -> PointTargets:
-    """Return what draws some points of a body, by their indices, to where those of the other side are.
-
-    The pose is a proposal: nearer than `SAME_POSE_M` refinement by contours leads to the same one.
-    """
-    other_side = _other_side(body.model)
+def _mirrored(body: PosedBody, moved: Sequence[int]) -> list[ResidualBlock]:
+    """Return what draws some points of a body, by their indices, to where those of the other side are."""
+    model, other_side = body.model, _other_side(body.model)
     targets = {i: other_side[i] for i in moved if i in other_side}
     points = np.array([*targets], dtype=np.int64)
-    return PointTargets(points, body.points_world[[*targets.values()]], np.full(len(points), 1 / SAME_POSE_M))
+    return [
+        PointTargets(points, body.points_world[[*targets.values()]], np.full(len(points), 1 / JOINT_M)),
+        PosePrior(model.neutral(), np.full(model.n_dofs, 1 / UNKNOWN)),
+    ]
 
 
 @lru_cache(maxsize=32)
