@@ -21,9 +21,9 @@ from tracker.estimation.fitting.gauss_newton import (
     PosePrior,
     ResidualBlock,
     fit_to_points,
-    solve,
     weak_pull,
 )
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.fitting.keypoints import GROSS_SIGMAS
 from tracker.evidence.keypoints import PersonKeypoints
 from tracker.geometry import rigid
@@ -77,7 +77,7 @@ def fit_to_keypoints(
     points, out, near = _points(model, seen), dict[int, PosedBody](), None
     for k in range(len(seen.joints_world)) if frames is None else frames:
         if len(seen.places(k)) >= 4:
-            near = fit_to_points(model, seen.places(k), near, centers=True).pose
+            near = fit_to_points(model, seen.places(k), near, True, solve_compiled_or_plain).pose
             out[k] = PosedBody(model, near)
     for _ in range(_ROUNDS - 1 if out else 0):
         offsets = learn_offsets(out, seen)
@@ -91,7 +91,7 @@ def _refitted(body: PosedBody, points: IntArray, targets_world: Array) -> PosedB
     weights = np.full(np.count_nonzero(known), 1 / OTHER_BODY_M)
     block = PointTargets(points[known], targets_world[known], weights, centers=True)
     blocks: list[ResidualBlock] = [block, PosePrior.of_spreads(body.model), weak_pull(body.model, body.values)]
-    return PosedBody(body.model, solve(body.model, body.values, blocks).pose)
+    return PosedBody(body.model, solve_compiled_or_plain(body.model, body.values, blocks).pose)
 
 
 def learn_offsets(bodies: Mapping[int, PosedBody], seen: PersonObservations) -> Array:

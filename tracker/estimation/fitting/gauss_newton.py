@@ -5,7 +5,7 @@ A residual block returns the normal equations of its weighted residuals at a pos
 """
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol
@@ -288,8 +288,9 @@ def weak_pull(model: BodyModel, pose: Array) -> PosePrior:
 
 
 def fit_to_points(
-    model: BodyModel, targets_world: dict[str, Array], near: Array | None = None, centers: bool = False
-) -> Fit:
+    model: BodyModel, targets_world: dict[str, Array], near: Array | None = None, centers: bool = False,
+    solver: Callable[..., Fit] = solve,
+) -> Fit:  # fmt: skip
     """Fit a pose to known positions of points of the body (triangulated or measured joints).
 
     Without an initial pose the body starts at the mean of the targets: upright, lying and upside down, in each of eight
@@ -300,6 +301,7 @@ def fit_to_points(
         targets_world: position of each known point by name, (3,), metres; NaN is ignored.
         near: initial pose, (n_values,).
         centers: whether the positions are those of anatomical joint centres.
+        solver: `solve`, or `gauss_newton_compiled.solve_compiled_or_plain` where kernels are needed anyway.
 
     Raises:
         TrackerError: fewer than four of the body's points are known.
@@ -329,7 +331,7 @@ def fit_to_points(
 
     def fitted(start: Array) -> Fit:
         pull = weak_pull(model, start if near is None else near)
-        return solve(model, start, [block, usual, pull], max_iterations=100)
+        return solver(model, start, [block, usual, pull], max_iterations=100)
 
     best = min(map(fitted, starts), key=lambda f: f.cost)
     # Descent cannot lead a limb at a limit around to the right angles: restart from the equivalent angles. Without

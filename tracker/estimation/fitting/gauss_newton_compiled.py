@@ -156,16 +156,9 @@ def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks:
     within = [b.term(model) for b in blocks if isinstance(b, SelfPenetration)]
     between = [b.term(model) for b in blocks if isinstance(b, BodyPenetration)]
     keypoints = [b.arrays for b in blocks if isinstance(b, KeypointBlock)]
-    targets = [
-        _TargetTerm(model.point_parts[b.points], model.points_part[b.points], b.targets_world, b.weights)
-        for b in blocks if isinstance(b, PointTargets) and not b.centers
-    ]  # fmt: skip
-    terms = contours, within, between, keypoints, targets
-    if max(map(len, terms)) > 1 or any(isinstance(b, PointTargets) and b.centers for b in blocks):
-        raise TypeError(
-            "expected at most one block of each kind, and points that are not anatomical centres, found others; call "
-            "gauss_newton.solve"
-        )
+    targets = [_target_term(model, b) for b in blocks if isinstance(b, PointTargets)]
+    if max(map(len, (contours, within, between, keypoints, targets))) > 1:
+        raise TypeError("expected at most one block of each kind but priors, found several; call gauss_newton.solve")
     return _Blocks(
         model.tree, model.dof_is_length, model.dof_joint, model.moves, model.limits,
         contours[0] if contours else no_contours(model),
@@ -174,6 +167,16 @@ def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks:
         within[0] if within else NO_PENETRATION, between[0] if between else NO_PENETRATION,
         keypoints[0] if keypoints else NO_KEYPOINTS, targets[0] if targets else _NO_TARGETS,
     )  # fmt: skip
+
+
+def _target_term(model: BodyModel, block: PointTargets) -> _TargetTerm:
+    """Return points as arrays. A centre is fixed to the part that has the joint at its end, as the joint itself is."""
+    parts, local = model.point_parts[block.points], model.points_part[block.points]
+    if block.centers:
+        kinematics, parts = model.kinematics(model.neutral()), model.proximal_parts[block.points]
+        T = kinematics.Ts_world_part[parts]
+        local = np.einsum("nji,nj->ni", T[:, :3, :3], model.joint_centers_at(kinematics, block.points) - T[:, :3, 3])
+    return _TargetTerm(parts, local, block.targets_world, block.weights)
 
 
 @njit(nogil=True, cache=True)

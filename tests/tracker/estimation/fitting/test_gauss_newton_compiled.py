@@ -173,7 +173,8 @@ def test_a_limb_alone(staged):
 
 def test_known_points_without_views(staged):
     blocks = staged.blocks()
-    assert_same(*both(staged, [blocks[1], blocks[-1]]))
+    for centers in (False, True):
+        assert_same(*both(staged, [blocks[1], replace(blocks[-1], centers=centers)]))
 
 
 def test_points_that_nothing_holds(staged):

@@ -15,6 +15,7 @@ from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel, PosedBody
 from tracker.estimation.fitting.gauss_newton import fit_to_points, value_mask
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.fitting.hypothesis import Hypothesis, distinct
 from tracker.estimation.initialization.generators import limb_poses
 from tracker.estimation.initialization.generators.body_axis import BodyAxis
@@ -173,5 +174,6 @@ def _trunk(model: BodyModel, axis: BodyAxis, R: Array, near: Array | None) -> Ar
     person = typical_person(model.height_m / DEFAULT_HEIGHT_M)
     place = rigid.transform(R, axis.top - person.below_crown_m("left_shoulder") * axis.up)
     known = {n: rigid.apply(place, p - middle) for n, p in own.items()}
-    start = near if near is not None else fit_to_points(model, {n: known[n] for n in _TRUNK if n in known}).pose
-    return fit_to_points(model, known, start).pose
+    trunk = {n: known[n] for n in _TRUNK if n in known}
+    start = near if near is not None else fit_to_points(model, trunk, solver=solve_compiled_or_plain).pose
+    return fit_to_points(model, known, start, solver=solve_compiled_or_plain).pose

@@ -8,6 +8,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
 from tracker.estimation.fitting.gauss_newton import fit_to_points
+from tracker.estimation.fitting.gauss_newton_compiled import solve_compiled_or_plain
 from tracker.estimation.fitting.hypothesis import SAME_POSE_M
 from tracker.estimation.initialization.generators.head_template import Head, find_head, find_upper_head
 from tracker.estimation.initialization.generators.limb_regions import LimbRegion, find_limbs
@@ -96,7 +97,7 @@ def start_pose(model: BodyModel, parts: FigureParts) -> Array:
     for name in parts.unresolved:
         side, kind = name.split("_")
         known |= {j: rigid.apply(place, own[j] - own["neck"]) for j in (f"{side}_{x}" for x in _JOINTS[kind])}
-    return fit_to_points(model, known).pose
+    return fit_to_points(model, known, solver=solve_compiled_or_plain).pose
 
 
 def joint_positions(model: BodyModel, parts: FigureParts) -> dict[str, Array]:
