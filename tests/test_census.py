@@ -11,7 +11,7 @@ from code_counts import code_lines, git, numbers, private_names, unexplained_ris
 MAX_NUMBERS, MAX_OF_ESTIMATES, MAX_UNDOCUMENTED = 838, 199, 0
 """Chosen numbers of the library, of the rooms that decide poses, and constants without a docstring. Each constant has
 its unit, and its source or the benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
-MAX_CODE_LINES = {"tracker": 49274, "app": 20927, "js": 13700, "css": 4189, "tests": 66482}
+MAX_CODE_LINES = {"tracker": 49270, "app": 20927, "js": 13700, "css": 4189, "tests": 66482}
 """Lines without blanks, comments and docstrings. Clocks, curves, the bar of a chain and calibration in the page raised
 them by what was not won back elsewhere; meshes, blurred faces and markers did, too, and one module of systems."""
 MAX_HIDDEN_SUBJECTS = 25

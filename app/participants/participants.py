@@ -16,7 +16,7 @@ from app.control.controller import Controller
 from app.state.role import Role
 from app.state.state import State
 from tracker.errors import TrackerError
-from tracker.session.store.task_log import checked_annotator, normalized_annotator
+from tracker.session.store.annotator import checked_annotator, normalized_annotator
 from tracker.validation import quoted
 
 _MAX_PEOPLE = 12

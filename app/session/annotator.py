@@ -9,7 +9,7 @@ from platformdirs import user_state_path
 
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
-from tracker.session.store.task_log import VARIABLE, annotator, checked_annotator
+from tracker.session.store.annotator import VARIABLE, annotator, checked_annotator
 
 
 def set_annotator(name: str | None) -> None:

@@ -21,7 +21,7 @@ from tracker.formats.model_toml import format_model
 from tracker.interchange.plausibility import examine
 from tracker.session.session import load_session
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.task_log import VARIABLE
+from tracker.session.store.annotator import VARIABLE
 
 _fits = {}
 """Poses that have been fitted to joints in this process."""

@@ -14,7 +14,7 @@ from tracker.formats.model_toml import load_model
 from tracker.session.session import save_model
 from tracker.simulate import Simulation, simulate
 
-MAX_FILES, MAX_CROSSINGS, MAX_OF_ESTIMATE = 41, 245, 1200
+MAX_FILES, MAX_CROSSINGS, MAX_OF_ESTIMATE = 41, 245, 1034
 """Of a frame of one person in four views, from the pose before to its own; crossings of the estimate of all frames for
 each of them. They may only fall."""
 

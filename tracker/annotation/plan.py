@@ -13,18 +13,10 @@ from typing import NamedTuple
 
 from tracker.errors import TrackerError
 from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.annotator import annotator
 from tracker.session.store.edit_tree import now
 from tracker.session.store.records import MarkChange, derived_uid, new_uid
-from tracker.session.store.task_log import (
-    CommentRow,
-    MadePose,
-    PlannedPose,
-    State,
-    StateRow,
-    TaskRow,
-    annotator,
-    last_verdict,
-)
+from tracker.session.store.task_log import CommentRow, MadePose, PlannedPose, State, StateRow, TaskRow, last_verdict
 
 STATES: tuple[State, ...] = ("draft", "annotated", "verified", "rejected")
 """States of the tasks that are not withdrawn, in the order in which they are counted."""

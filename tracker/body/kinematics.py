@@ -185,6 +185,16 @@ def _turn(T: Array, w: float, x: float, y: float, z: float) -> None:
         T[i, 0], T[i, 1], T[i, 2] = a * xx + b * yx + c * zx, a * xy + b * yy + c * zy, a * xz + b * yz + c * zz
 
 
+@njit(**NO_REFCOUNT)
+def place_point(T: Array, x: Array) -> tuple[float, float, float]:
+    """Return the place of a point of a part, (3,), by the pose of the part, (4, 4), metres."""
+    return (
+        T[0, 0] * x[0] + T[0, 1] * x[1] + T[0, 2] * x[2] + T[0, 3],
+        T[1, 0] * x[0] + T[1, 1] * x[1] + T[1, 2] * x[2] + T[1, 3],
+        T[2, 0] * x[0] + T[2, 1] * x[1] + T[2, 2] * x[2] + T[2, 3],
+    )
+
+
 @njit(nogil=True, cache=True)
 def place_points(
     poses: Array, tree: Tree, is_length: NDArray[np.bool_], moves: NDArray[np.bool_], parts: IntArray,
@@ -197,9 +207,7 @@ def place_points(
     for t in range(poses.shape[0]):
         forward_kinematics(poses[t], tree, Ts, axes, origins)
         for n in range(parts.shape[0]):
-            T, x = Ts[parts[n]], points_part[n]
-            for i in range(3):
-                places[t, n, i] = T[i, 0] * x[0] + T[i, 1] * x[1] + T[i, 2] * x[2] + T[i, 3]
+            places[t, n, 0], places[t, n, 1], places[t, n, 2] = place_point(Ts[parts[n]], points_part[n])
         point_jacobian(Kinematics(Ts, axes, origins), is_length, moves, parts, places[t], out[t])
 
 

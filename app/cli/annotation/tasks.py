@@ -65,7 +65,7 @@ def command(arguments: Annotated[TasksArguments, tyro.conf.arg(name="")]) -> Non
     from tracker.annotation.speed import measure_speed
     from tracker.session.lock import SessionLock
     from tracker.session.store.annotation_store import AnnotationStore
-    from tracker.session.store.task_log import normalized_annotator
+    from tracker.session.store.annotator import normalized_annotator
 
     set_annotator(arguments.annotator)
     arguments = replace(arguments, of=None if arguments.of is None else normalized_annotator(arguments.of))

@@ -24,9 +24,9 @@ from tracker.annotation.speed import measure_speed
 from tracker.body.limbs import limbs
 from tracker.errors import TrackerError
 from tracker.session.store.annotation_store import AnnotationStore
+from tracker.session.store.annotator import checked_annotator
 from tracker.session.store.records import MarkChange
 from tracker.session.store.task_log import State as Decision
-from tracker.session.store.task_log import checked_annotator
 
 T = TypeVar("T")
 

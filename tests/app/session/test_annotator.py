@@ -5,7 +5,7 @@ import pytest
 from app.session.annotator import annotator_or_login, set_annotator
 from tracker.errors import TrackerError
 from tracker.session.store.annotation_store import AnnotationStore
-from tracker.session.store.task_log import VARIABLE, annotator
+from tracker.session.store.annotator import VARIABLE, annotator
 
 
 @pytest.fixture(autouse=True)

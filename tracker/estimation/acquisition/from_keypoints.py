@@ -77,7 +77,7 @@ def fit_to_keypoints(
     points, out, near = _points(model, seen), dict[int, PosedBody](), None
     for k in range(len(seen.joints_world)) if frames is None else frames:
         if len(seen.places(k)) >= 4:
-            near = fit_to_points(model, seen.places(k), near, True, solve_compiled_or_plain).pose
+            near = fit_to_points(model, seen.places(k), near, centers=True, solver=solve_compiled_or_plain).pose
             out[k] = PosedBody(model, near)
     for _ in range(_ROUNDS - 1 if out else 0):
         offsets = learn_offsets(out, seen)

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tracker.body.kinematics import chain_poses
+from tracker.body.kinematics import chain_poses, place_point
 from tracker.body.limbs import Limb, Search, SearchKind
 from tracker.body.model import BodyModel
 from tracker.body.motion.pose_steps import nearest_equivalent
@@ -152,9 +152,7 @@ def _put(Ts: Array, parts: IntArray, points: Array, places: Array) -> None:
     """Transform points (k, 3) of parts, indices (k,), by part poses (m, n, 4, 4) to the world, (m, k, 3)."""
     for m in range(places.shape[0]):
         for k in range(places.shape[1]):
-            T, x, y, z = Ts[m, parts[k]], points[k, 0], points[k, 1], points[k, 2]
-            for i in range(3):
-                places[m, k, i] = T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3]
+            places[m, k, 0], places[m, k, 1], places[m, k, 2] = place_point(Ts[m, parts[k]], points[k])
 
 
 def with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:

@@ -203,7 +203,7 @@ def iterate(
     is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
     start, is_locked = pose, value_mask(model, ~is_active)  # locked values stay, even outside the limits
     pose = np.where(is_locked, start, model.clip(start))
-    here = _sum(model, pose, blocks)
+    here = linearize_all(model, pose, blocks)
     damping, iterations = DAMPING.first, 0
     yield Fit(pose, here.cost, iterations, here.hessian)
     while iterations < max_iterations:
@@ -222,7 +222,7 @@ def iterate(
             change[active] = step
             trial = np.where(is_locked, start, model.move(pose, change))
             moved = float(np.abs(model.difference(trial, pose)).max())
-            there = _sum(model, trial, blocks) if worth else here
+            there = linearize_all(model, trial, blocks) if worth else here
             if there.cost < here.cost or not worth or moved < tolerance or damping > DAMPING.most:
                 break
             damping = max(10 * damping, DAMPING.least_again)
@@ -355,7 +355,8 @@ def _by_other_angles(model: BodyModel, pose: Array, joint: int) -> Array:
     return model.clip(out)
 
 
-def _sum(model: BodyModel, pose: Array, blocks: Sequence[ResidualBlock]) -> NormalEquations:
+def linearize_all(model: BodyModel, pose: Array, blocks: Sequence[ResidualBlock]) -> NormalEquations:
+    """Return the normal equations of all blocks together, one or more, at a pose, (n_values,)."""
     kinematics = model.kinematics(pose)
     first, *others = (b.linearize(model, pose, kinematics) for b in blocks)
     cost, gradient, hessian = first

@@ -5,13 +5,14 @@ kernels, and hold the interpreter's lock. `gauss_newton.solve` is the readable v
 joints; `solve_compiled_or_plain` calls the one that a body needs.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
+from tracker.body.kinematics import Kinematics, Tree, forward_kinematics, place_point
 from tracker.body.model import BodyModel
 from tracker.compute.jit import FAST_MATH, NO_REFCOUNT, njit
 from tracker.estimation.fitting import gauss_newton
@@ -50,7 +51,7 @@ class _TargetTerm(NamedTuple):
     points_part: Array
     """Place of each in its part, (N, 3), metres."""
     targets_world: Array
-    """Where it is drawn to, (N, 3), metres."""
+    """Place that each is drawn to, (N, 3), metres."""
     weights: Array
     """See `PointTargets`, (N,)."""
 
@@ -157,8 +158,10 @@ def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks:
     between = [b.term(model) for b in blocks if isinstance(b, BodyPenetration)]
     keypoints = [b.arrays for b in blocks if isinstance(b, KeypointBlock)]
     targets = [_target_term(model, b) for b in blocks if isinstance(b, PointTargets)]
-    if max(map(len, (contours, within, between, keypoints, targets))) > 1:
-        raise TypeError("expected at most one block of each kind but priors, found several; call gauss_newton.solve")
+    kinds = Counter(type(b).__name__ for b in blocks if not isinstance(b, PosePrior))
+    if several := [f"{n} {kind}" for kind, n in kinds.items() if n > 1]:
+        found = " and ".join(several)
+        raise TypeError(f"expected at most one block of each kind but priors, found {found}; call gauss_newton.solve")
     return _Blocks(
         model.tree, model.dof_is_length, model.dof_joint, model.moves, model.limits,
         contours[0] if contours else no_contours(model),
@@ -257,10 +260,8 @@ def _add_targets(term: _TargetTerm, Ts: Array, M: Array, b: Array) -> float:
     """Add the normal equations of known points to those of the parts' twists, as `add_keypoints`; return the cost."""
     cost = 0.0
     for n in range(term.parts.shape[0]):
-        p, x, target, weight = term.parts[n], term.points_part[n], term.targets_world[n], term.weights[n] ** 2
-        X = Ts[p, 0, 0] * x[0] + Ts[p, 0, 1] * x[1] + Ts[p, 0, 2] * x[2] + Ts[p, 0, 3]
-        Y = Ts[p, 1, 0] * x[0] + Ts[p, 1, 1] * x[1] + Ts[p, 1, 2] * x[2] + Ts[p, 1, 3]
-        Z = Ts[p, 2, 0] * x[0] + Ts[p, 2, 1] * x[1] + Ts[p, 2, 2] * x[2] + Ts[p, 2, 3]
+        p, target, weight = term.parts[n], term.targets_world[n], term.weights[n] ** 2
+        X, Y, Z = place_point(Ts[p], term.points_part[n])
         off = (X - target[0], Y - target[1], Z - target[2])
         rows = ((0.0, Z, -Y, 1.0, 0.0, 0.0), (-Z, 0.0, X, 0.0, 1.0, 0.0), (Y, -X, 0.0, 0.0, 0.0, 1.0))
         for r, row in zip(off, rows):  # noqa: B905, numba knows no strict

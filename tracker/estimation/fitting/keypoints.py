@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.kinematics import Kinematics
+from tracker.body.kinematics import Kinematics, place_point
 from tracker.body.model import BodyModel
 from tracker.compute.jit import NO_REFCOUNT, njit
 from tracker.estimation.fitting.clocked_residuals import at_time
@@ -119,10 +119,8 @@ def add_keypoints(term: KeypointTerm, Ts: Array, M: Array, b: Array) -> float:
     """
     cost = 0.0
     for n in range(term.parts.shape[0]):
-        p, P, x = term.parts[n], term.projections[n], term.points_part[n]
-        X = Ts[p, 0, 0] * x[0] + Ts[p, 0, 1] * x[1] + Ts[p, 0, 2] * x[2] + Ts[p, 0, 3]
-        Y = Ts[p, 1, 0] * x[0] + Ts[p, 1, 1] * x[1] + Ts[p, 1, 2] * x[2] + Ts[p, 1, 3]
-        Z = Ts[p, 2, 0] * x[0] + Ts[p, 2, 1] * x[1] + Ts[p, 2, 2] * x[2] + Ts[p, 2, 3]
+        p, P = term.parts[n], term.projections[n]
+        X, Y, Z = place_point(Ts[p], term.points_part[n])
         depth = P[2, 0] * X + P[2, 1] * Y + P[2, 2] * Z + P[2, 3]
         if depth <= NEAR_PLANE_M:
             continue

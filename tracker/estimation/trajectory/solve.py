@@ -19,8 +19,8 @@ from tracker.estimation.fitting.gauss_newton import (
     CLOSE_ENOUGH,
     DAMPING,
     UNKNOWN,
-    NormalEquations,
     ResidualBlock,
+    linearize_all,
     pressed_against_limit,
     value_mask,
 )
@@ -286,12 +286,8 @@ class _Solver:
             out = _Evidence(*map(np.copy, before))
             moved &= np.abs(model.difference(poses, before.poses)).max(axis=1) >= self.reach
 
-        def of_frame(t: int) -> list[NormalEquations]:
-            kinematics = model.kinematics(poses[t])
-            return [block.linearize(model, poses[t], kinematics) for block in self.evidence[t]]
-
         at = np.flatnonzero(moved).tolist()
-        for t, found in zip(at, map_parallel(of_frame, at), strict=True):
-            equations = (sum(parts[1:], start=parts[0]) for parts in zip(*found, strict=True))
-            out.poses[t], (out.costs[t], out.gradients[t], out.hessians[t]) = poses[t], equations
+        found = map_parallel(lambda t: linearize_all(model, poses[t], self.evidence[t]), at)
+        for t, equations in zip(at, found, strict=True):
+            out.poses[t], out.costs[t], out.gradients[t], out.hessians[t] = poses[t], *equations
         return out

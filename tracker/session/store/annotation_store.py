@@ -14,6 +14,7 @@ from typing import Any, Self, TypeVar
 
 from tracker.errors import OvertakenEditError
 from tracker.session.store import edit_tree, own_undo, rows
+from tracker.session.store.annotator import annotator
 from tracker.session.store.connection import Connection
 from tracker.session.store.edit_log import EditLog, Written, read_log, write_log
 from tracker.session.store.edit_tree import write_changes
@@ -31,7 +32,7 @@ from tracker.session.store.records import (
     PoseRecord,
 )
 from tracker.session.store.settings import checked_setting
-from tracker.session.store.task_log import TaskLog, annotator
+from tracker.session.store.task_log import TaskLog
 
 T = TypeVar("T")
 

@@ -1,10 +1,8 @@
 """The plan of annotation as rows that are only added: tasks, their states, comments; and the edits they depend on.
 
-The union of the rows of two copies is their merge: a row has the same `uid` everywhere. The person who annotates is the
-author of edits, tasks and comments; one place says who it is, the environment variable `VARIABLE`.
+The union of the rows of two copies is their merge: a row has the same `uid` everywhere.
 """
 
-import os
 import sqlite3
 from collections import defaultdict
 from collections.abc import Callable, Sequence
@@ -13,44 +11,11 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar
 import msgspec
 from msgspec import Meta
 
-from tracker.errors import DamagedStoreError, TrackerError
+from tracker.errors import DamagedStoreError
 from tracker.session.store.connection import Connection
 from tracker.session.store.own_undo import held_edits
 from tracker.session.store.records import derived_uid
-from tracker.validation import MAX_FRAMES, Name, Time, check, nfc_name, quoted
-
-VARIABLE = "QUADRILLE_ANNOTATOR"
-"""Environment variable with the name of the annotator."""
-
-
-def annotator(default: str = "") -> str:
-    """Return the name of the annotator; the default where none is set.
-
-    Raises:
-        TrackerError: it is no name.
-    """
-    name = os.environ.get(VARIABLE, "")
-    return checked_annotator(name) if name else default
-
-
-def normalized_annotator(name: str) -> str:
-    """Return a name in the form in which annotators are compared: without superfluous space, in one form of Unicode."""
-    return " ".join(nfc_name(name).split())
-
-
-def checked_annotator(name: str) -> str:
-    """Return the name of an annotator, in `normalized_annotator`.
-
-    Raises:
-        TrackerError: it is no name.
-    """
-    try:
-        return normalized_annotator(msgspec.convert(name, Name)) or name
-    except msgspec.ValidationError as error:
-        raise TrackerError(
-            f"expected the annotator as a name of 1 to 200 characters on one line, found {quoted(name)}; choose another"
-        ) from error
-
+from tracker.validation import MAX_FRAMES, Time, check
 
 T = TypeVar("T")
 

@@ -202,7 +202,7 @@ def test_steps_are_those_of_the_readable_version(n):
 @pytest.mark.parametrize(
     ("strange", "named"),
     [
-        ("two matches", "at most one block of each kind"), ("another block", "found Asked"),
+        ("two matches", "found 2 ContourResiduals"), ("another block", "found Asked"),
         ("a ball joint", "found the ball joint 'left_shoulder'"),
     ],
 )  # fmt: skip
